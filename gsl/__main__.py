@@ -1,0 +1,5 @@
+"""`python -m gsl` is the command line."""
+
+from gsl.cli import main
+
+main()

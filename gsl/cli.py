@@ -1,0 +1,165 @@
+"""The command line: one line a stage, and nothing heavy until a command runs."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from gsl import __version__
+from gsl.commandline.completion import CONFIG_DIR, complete, user_folder
+from gsl.commandline.failure import INTERRUPTED, leave_quietly, report, stop_like_ctrl_c
+from gsl.console import Console
+
+
+class StageCommand(TyperCommand):
+    """A command whose help ends with the groups and settings of its configuration."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write usage and options, then what can be set."""
+        from gsl.commandline.help import write_help
+
+        super().format_help(ctx, formatter)
+        formatter.write(write_help(str(ctx.info_name), config_dir=user_folder(ctx)))
+
+
+class Shown(StrEnum):
+    """What --cfg prints."""
+
+    JOB = "job"
+
+
+Overrides = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="KEY=VALUE", help="Choices and settings, see below.", autocompletion=complete),
+]
+Multirun = Annotated[
+    bool, typer.Option("--multirun", "-m", help="Keys with several values (seed=1,2,3) make several jobs.")
+]
+Cfg = Annotated[Shown | None, typer.Option("--cfg", "-c", help="Print the composed configuration and do nothing.")]
+ConfigDir = Annotated[
+    Path | None,
+    typer.Option(envvar=CONFIG_DIR, is_eager=True, help="Folder of your own yaml files; they win over ours."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout.")]
+
+app = typer.Typer(
+    help="Grounded simulation learning: from a few real trajectories to a policy that works on the robot.",
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def stage(name: str, summary: str) -> None:
+    """Add the command of a stage, whose settings are in the yaml file of the same name."""
+
+    @app.command(name, cls=StageCommand, help=summary, short_help=summary)
+    def command(
+        overrides: Overrides = None,
+        multirun: Multirun = False,
+        cfg: Cfg = None,
+        config_dir: ConfigDir = None,
+        json: Json = False,
+    ) -> None:
+        from gsl.config import run
+
+        show = cfg is not None
+        code = run(name, overrides or [], multirun=multirun, cfg=show, config_dir=config_dir, json=json)
+        raise typer.Exit(code)
+
+
+stage("collect", "Record trajectories of a policy in a world.")
+stage("train-forward", "Learn from real trajectories how the robot moves: the forward model.")
+stage("train-inverse", "Learn from simulated trajectories which action makes a motion: the inverse model.")
+stage("optimize", "Improve a policy in the simulator, grounded or not.")
+stage("evaluate", "Measure policies in the real world.")
+stage("compare", "Set groundings against each other over paired trials.")
+stage("iterate", "The whole chain, again and again, until the real return stops improving.")
+
+
+@app.command()
+def runs(json: Json = False) -> None:
+    """List the artifacts below runs/, oldest first."""
+    from gsl.commandline.listing import list_runs
+
+    list_runs(Console(json=json))
+
+
+@app.command()
+def show(
+    reference: Annotated[str, typer.Argument(metavar="REF", help="Path, or name of a run.")], json: Json = False
+) -> None:
+    """Show how an artifact came about and what it holds."""
+    from gsl.commandline.listing import show_artifact
+
+    show_artifact(reference, Console(json=json))
+
+
+@app.command()
+def robot(
+    name: Annotated[str, typer.Argument(help="Name of the robot, such as nao.")],
+    out: Annotated[str, typer.Argument(metavar="[out=DIR]", help="Folder for the files.")] = "out=runs/robot",
+    json: Json = False,
+) -> None:
+    """Write the robot's URDF and a picture of it standing."""
+    from gsl.stages.robot import write_robot
+
+    write_robot(name, Path(out.removeprefix("out=")), Console(json=json))
+
+
+@app.command()
+def bench(json: Json = False) -> None:
+    """Measure what a step costs, as ratios of CPU time."""
+    from gsl.stages.bench import run_bench
+
+    run_bench(Console(json=json))
+
+
+@app.callback(invoke_without_command=True)
+def root(
+    ctx: typer.Context,
+    version: Annotated[bool, typer.Option("--version", is_eager=True, help="Print the version.")] = False,
+) -> None:
+    """Grounded simulation learning: from a few real trajectories to a policy that works on the robot."""
+    if version:
+        Console().result({}, text=__version__)
+        raise typer.Exit
+    if ctx.invoked_subcommand is None:
+        Console().result({}, text=ctx.get_help())
+
+
+def main() -> None:
+    """Run the command line of this process."""
+    stop_like_ctrl_c()
+    sys.path.append(os.getcwd())
+    sys.exit(call(sys.argv[1:]))
+
+
+def call(arguments: Sequence[str]) -> int:
+    """Run one command line and return its exit code, with whatever went wrong told in a line."""
+    words = [word for word in arguments if not word.startswith("-")]
+    command = " ".join(["gsl", *words[:1]])
+    console = Console(json="--json" in arguments)
+    try:
+        code = int(app(args=list(arguments), prog_name="gsl", standalone_mode=False) or 0)
+        return report(KeyboardInterrupt(), console, command=command) if code == INTERRUPTED else code
+    except BrokenPipeError:
+        return leave_quietly()
+    except SystemExit as leaving:
+        return int(leaving.code or 0)
+    except (Exception, KeyboardInterrupt) as failure:
+        return _told(failure, console, command)
+
+
+def _told(failure: BaseException, console: Console, command: str) -> int:
+    usage: Callable[[], str] | None = getattr(failure, "format_message", None)
+    if usage is not None:
+        return console.error(" ".join(usage().split()), 2, command=command)
+    return report(failure, console, command=command)

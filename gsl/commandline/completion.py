@@ -1,0 +1,58 @@
+"""Shell completion of overrides: names of settings and groups, and the options of a group."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import typer
+
+CONFIG_DIR = "GSL_CONFIG_DIR"
+
+
+def complete(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Return what the word under the cursor may become."""
+    typed, words_of_bash = incomplete, os.environ.get("COMP_WORDS")
+    if words_of_bash:
+        typed = joined(words_of_bash.split("\n"), int(os.environ.get("COMP_CWORD", "0")))
+    found = suggestions(str(ctx.info_name), typed, config_dir=user_folder(ctx))
+    cut = len(typed) - len(incomplete.lstrip("="))
+    return [word[cut:] for word in found]
+
+
+def user_folder(ctx: typer.Context) -> Path | None:
+    """Return the user's folder of yaml files; help and completion run before the options are all read."""
+    folder = ctx.params.get("config_dir") or os.environ.get(CONFIG_DIR)
+    return Path(folder) if folder else None
+
+
+def joined(words: Sequence[str], cursor: int) -> str:
+    """Return the whole word at the cursor: bash splits `world=nao` into three."""
+    before = [word for word in words[: cursor + 1]]
+    while len(before) > 1 and ("=" in (before[-1][:1], before[-2][-1:])) and " " not in before[-2]:
+        before[-2:] = [before[-2] + before[-1]]
+    return before[-1] if before else ""
+
+
+def suggestions(command: str, typed: str, *, config_dir: Path | None = None) -> list[str]:
+    """Return the overrides of a command that begin with what was typed."""
+    from gsl.commandline.help import explained
+
+    explanation = explained(command, config_dir=config_dir)
+    key = typed.partition("=")[0]
+    if "=" in typed:
+        words = [f"{key}={name}" for name in explanation.options.get(key, ())]
+    else:
+        words = [*_groups(explanation.options), *_settings(explanation.defaults)]
+    return [word for word in words if word.startswith(typed)]
+
+
+def _groups(options: Mapping[str, Sequence[str]]) -> list[str]:
+    return [f"{group}={name}" for group, names in options.items() for name in names]
+
+
+def _settings(defaults: Mapping[str, Any]) -> list[str]:
+    """A key alone and with its value: two words, so that the shell goes on without a blank."""
+    return [word for key, value in defaults.items() for word in (f"{key}=", f"{key}={value}")]

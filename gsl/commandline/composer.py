@@ -1,0 +1,198 @@
+"""The composer is hydra's door: it turns a command, its yaml files and overrides into one configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from hydra import initialize_config_dir
+from hydra.core.config_search_path import ConfigSearchPath, SearchPathQuery
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.plugins import Plugins
+from hydra.errors import CompactHydraException, HydraException
+from hydra.plugins.search_path_plugin import SearchPathPlugin
+from hydra.types import RunMode
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
+
+from gsl.commandline.config_errors import Vocabulary, translated, unknown_key
+from gsl.commandline.known_settings import declared, known_keys, plain
+from gsl.commandline.overrides import effect_path, key_of, rewrite
+from gsl.core.validation import did_you_mean
+from gsl.effects import __path__ as effects_path
+from gsl.errors import ConfigError, InputError
+
+
+@dataclass(frozen=True)
+class Composition:
+    """One composed configuration and how it came about.
+
+    Attributes:
+        config: The configuration, command keys included, hydra's own part left out.
+        overrides: The arguments as hydra took them.
+        chosen: The defaults list: group, or group@role, to the name of the chosen file.
+        swept: Keys that take several values in a multirun.
+    """
+
+    config: DictConfig
+    overrides: tuple[str, ...]
+    chosen: Mapping[str, str]
+    swept: tuple[str, ...]
+
+
+class UserConfiguration(SearchPathPlugin):
+    """Puts the user's folder of yaml files before ours, so that a file of the same name wins."""
+
+    folder: ClassVar[Path | None] = None
+
+    def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
+        """Add the folder, if there is one."""
+        if self.folder is not None:
+            search_path.prepend("gsl-user", f"file://{self.folder}", anchor=SearchPathQuery(provider="main"))
+
+
+def configuration_folder() -> Path:
+    """Return the folder of our yaml files: inside the wheel, or at the top of the repository."""
+    here = Path(__file__).resolve().parents[1]
+    packed = here / "_conf"
+    return packed if packed.is_dir() else here.parent / "conf"
+
+
+@contextmanager
+def opened(config_dir: Path | None) -> Iterator[None]:
+    """Open hydra on our configuration and, in front of it, the user's.
+
+    Raises:
+        InputError: The user's folder does not exist.
+    """
+    if config_dir is not None and not config_dir.is_dir():
+        raise InputError(f"--config-dir {config_dir}: there is no such folder")
+    UserConfiguration.folder = config_dir.resolve() if config_dir is not None else None
+    Plugins.instance().register(UserConfiguration)
+    with initialize_config_dir(config_dir=str(configuration_folder()), version_base="1.3", job_name="gsl"):
+        yield
+
+
+def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -> Composition:
+    """Compose the configuration of a command; of a multirun, that of its first job.
+
+    Raises:
+        ConfigError: An argument is malformed, or names a setting, option or effect that does not exist.
+    """
+    vocabulary = Vocabulary((), {}, options)
+    try:
+        base = _composed(command, [])
+        vocabulary = Vocabulary(known_keys(_without_hydra(base)), _choices(base), options)
+        overrides = rewrite(arguments, vocabulary.chosen)
+        _check_grammar(overrides)
+        composition = _added_where_declared(command, overrides, multirun)
+    except (CompactHydraException, OmegaConfBaseException, YAMLError) as error:
+        raise translated(error, vocabulary) from error
+    _check_effects(composition)
+    return composition
+
+
+def options(group: str) -> list[str]:
+    """Return the names of the files of a group."""
+    return list(_loader().get_group_options(group))
+
+
+def groups() -> list[str]:
+    """Return the names of all groups of ours and the user's."""
+    return [group for group in _loader().list_groups("") if group != "hydra"]
+
+
+def effects() -> list[str]:
+    """Return the names of the library's effects: each is a module with a class of the same name in camel case."""
+    files = sorted(path for folder in effects_path for path in Path(folder).glob("[a-z]*.py"))
+    return [path.stem for path in files if f"@component\nclass {camel_case(path.stem)}" in path.read_text("utf-8")]
+
+
+def camel_case(name: str) -> str:
+    """Return the name of the class in the module called `name`."""
+    return "".join(part.capitalize() for part in name.split("_"))
+
+
+def _check_grammar(overrides: Sequence[str]) -> None:
+    parser = OverridesParser.create(config_loader=_loader())
+    for override in overrides:
+        try:
+            parser.parse_override(override)
+        except HydraException as error:
+            raise ConfigError(key_of(override), "cannot be read", given=override.partition("=")[2]) from error
+
+
+def _check_effects(composition: Composition) -> None:
+    """Refuse an effect that is neither in the library nor names its own class with `_target_`."""
+    for override in composition.overrides:
+        path = effect_path(key_of(override))
+        name = path.rpartition(".")[2]
+        if not path or override.startswith("~") or name in effects():
+            continue
+        node = OmegaConf.select(composition.config, path)
+        if not (isinstance(node, DictConfig) and "_target_" in node):
+            raise ConfigError(path, f"no such effect{did_you_mean(name, effects())}")
+
+
+def _added_where_declared(command: str, overrides: list[str], multirun: bool) -> Composition:
+    """Compose, adding settings that only the class names: its default is in the signature, not in the yaml."""
+    while True:
+        first, swept = _first_values(overrides) if multirun else (overrides, ())
+        try:
+            config = _composed(command, first)
+        except CompactHydraException as error:
+            key = unknown_key(error)
+            others = [override for override, one in zip(overrides, first, strict=True) if key_of(one) != key]
+            if key is None or len(others) == len(overrides) or not _declares(command, others, key):
+                raise
+            overrides = [f"++{one}" if key_of(one) == key else one for one in overrides]
+            continue
+        return Composition(_without_hydra(config), tuple(overrides), _choices(config), swept)
+
+
+def _declares(command: str, overrides: list[str], key: str) -> bool:
+    parent, _, name = key.rpartition(".")
+    chosen = [one for one in overrides if "=" in one and key_of(one).partition("@")[0] in groups()]
+    config = _composed(command, _first_values(chosen)[0])
+    return name in declared(plain(OmegaConf.select(config, parent) if parent else config))
+
+
+def _first_values(overrides: Sequence[str]) -> tuple[list[str], tuple[str, ...]]:
+    parsed = OverridesParser.create(config_loader=_loader()).parse_overrides(list(overrides))
+    swept = tuple(key_of(str(override.input_line)) for override in parsed if override.is_sweep_override())
+    return [_first_value(override) for override in parsed], swept
+
+
+def _first_value(override: Any) -> str:
+    if not override.is_sweep_override():
+        return str(override.input_line)
+    if override.is_discrete_sweep():
+        return f"{override.get_key_element()}={next(iter(override.sweep_string_iterator()))}"
+    return f"{override.get_key_element()}={override.value().start}"
+
+
+def _composed(command: str, overrides: Sequence[str]) -> DictConfig:
+    hydra = GlobalHydra.instance().hydra
+    assert hydra is not None
+    return hydra.compose_config(
+        config_name=command.replace("-", "_"), overrides=list(overrides), run_mode=RunMode.RUN, from_shell=False,
+        with_log_configuration=False,
+    )  # fmt: skip
+
+
+def _without_hydra(config: DictConfig) -> DictConfig:
+    return OmegaConf.masked_copy(config, [str(key) for key in config if key != "hydra"])
+
+
+def _choices(config: DictConfig) -> dict[str, str]:
+    choices = config.hydra.runtime.choices
+    return {str(key): str(value) for key, value in choices.items() if not str(key).startswith("hydra/")}
+
+
+def _loader() -> Any:
+    return GlobalHydra.instance().config_loader()

@@ -1,0 +1,119 @@
+"""What hydra and its libraries complain about, in one line a user understands."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hydra.errors import InstantiationException
+from hydra.utils import get_object
+from omegaconf.errors import InterpolationKeyError, InterpolationResolutionError, MissingMandatoryValue
+from pydantic import ValidationError
+
+from gsl.core.setting import settings_of
+from gsl.core.validation import config_error, did_you_mean
+from gsl.errors import ConfigError, InputError
+
+_UNKNOWN = re.compile(r"Could not override '([^']+)'")
+_NO_OPTION = re.compile(r"Could not find '([^']+)/([^'/]+)'")
+_NO_PRIMARY = re.compile(r"Cannot find primary config '([^']+)'")
+_AMBIGUOUS = re.compile(r"Ambiguous value for argument '([^'=]+)=([^']*)'")
+_UNEXPECTED = re.compile(r"unexpected keyword argument '(\w+)'")
+_INSTANTIATED = re.compile(r"target '([^']+)'")
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """The words a command understands.
+
+    Attributes:
+        keys: Dotted keys that can be set.
+        chosen: Groups of the command's defaults list, such as `task` and `world@sim`.
+        options: Gives the names in a group.
+    """
+
+    keys: Sequence[str]
+    chosen: Mapping[str, str]
+    options: Callable[[str], Sequence[str]]
+
+
+def unknown_key(error: Exception) -> str | None:
+    """Return the key that hydra did not find, if that was the matter."""
+    match = _UNKNOWN.search(str(error))
+    return match.group(1) if match else None
+
+
+def translated(error: Exception, words: Vocabulary) -> Exception:
+    """Return what composition complains about as a `ConfigError`."""
+    text = str(error)
+    if option := _NO_OPTION.search(text):
+        group, name = option.groups()
+        return InputError(f"no {group} called {name}{did_you_mean(name, words.options(group), listed=True)}")
+    if key := unknown_key(error):
+        return _no_such_setting(key, words)
+    if ambiguous := _AMBIGUOUS.search(text):
+        key, value = ambiguous.groups()
+        return ConfigError(key, f"several values need --multirun; a list is written '{key}=[{value}]'")
+    if primary := _NO_PRIMARY.search(text):
+        return InputError(f"there is no {primary.group(1)}.yaml in the configuration")
+    return InputError(f"configuration: {' '.join(text.split())}")
+
+
+def resolution_error(error: Exception) -> Exception:
+    """Return what resolving the values complains about as a `ConfigError`."""
+    key = str(getattr(error, "full_key", None) or "configuration")
+    if isinstance(error, MissingMandatoryValue):
+        return missing(key)
+    if isinstance(error, InterpolationKeyError | InterpolationResolutionError):
+        return ConfigError(key, f"{str(error).splitlines()[0]}")
+    return ConfigError(key, str(error).splitlines()[0])
+
+
+def missing(key: str) -> ConfigError:
+    """Return the error for a value that the user has to give."""
+    return ConfigError(key, f"has no value yet; say {key}=...")
+
+
+def instantiation_error(error: InstantiationException) -> BaseException:
+    """Return why a component could not be made: a `ConfigError` if it is its settings, else the cause itself."""
+    text, cause = str(error), error.__cause__
+    path = text.rpartition("full_key: ")[2].strip() if "full_key: " in text else ""
+    found = _INSTANTIATED.search(text)
+    target = found.group(1) if found else ""
+    if isinstance(cause, ValidationError):
+        return _of_pydantic(cause, get_object(target), path)
+    if isinstance(cause, ConfigError):
+        return cause.under(path)
+    if isinstance(cause, TypeError) and (unexpected := _UNEXPECTED.search(str(cause))):
+        name = unexpected.group(1)
+        return ConfigError(
+            f"{path}.{name}".lstrip("."), f"no such setting{did_you_mean(name, settings_of(get_object(target)))}"
+        )
+    if text.startswith("Error locating target"):
+        reason = str(cause).splitlines()[1] if cause is not None and "\n" in str(cause) else str(cause)
+        return ConfigError(f"{path}._target_".lstrip("."), f"cannot be loaded: {reason}", given=target)
+    return cause or error
+
+
+def _of_pydantic(error: ValidationError, target: Callable[..., Any], path: str) -> ConfigError:
+    """Return the error; one that comes from a component deeper inside is told by that component's name."""
+    if error.title != getattr(target, "__name__", ""):
+        return config_error(error, target, where=".".join(filter(None, [path, error.title])))
+    return config_error(error, target, where=path)
+
+
+def _no_such_setting(key: str, words: Vocabulary) -> ConfigError:
+    roles = [choice.partition("@")[2] for choice in words.chosen if choice.startswith(f"{key}@")]
+    if roles:
+        return ConfigError(key, f"here a {key} has a role; say {' or '.join(f'{role}=...' for role in roles)}")
+    last = key.rpartition(".")[2]
+    deeper = [known for known in words.keys if known.rpartition(".")[2] == last]
+    if deeper:
+        return ConfigError(key, f"no such setting; did you mean {' or '.join(deeper[:3])}?")
+    shown = [known for known in words.keys if not known.endswith("_target_")]
+    level = [known for known in shown if known.rpartition(".")[0] == key.rpartition(".")[0]]
+    level = level or [known for known in shown if "." not in known]
+    near = did_you_mean(key, words.keys)
+    return ConfigError(key, "no such setting" + (near if "did you mean" in near else did_you_mean(key, level)))

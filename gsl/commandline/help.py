@@ -1,0 +1,142 @@
+"""The help of a stage's command: groups with their options, settings with default, unit and meaning, effects."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gsl.commandline.composer import camel_case, compose, effects, groups, opened, options
+from gsl.commandline.known_settings import declared, plain
+from gsl.commandline.overrides import OPTIONAL_GROUPS
+from gsl.config import CommandSettings, resolved
+from gsl.core.setting import REQUIRED, Setting, settings_of
+from gsl.errors import ConfigError
+
+WIDEST = 34
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What can be said on the command line of a stage.
+
+    Attributes:
+        options: Names of a group by what chooses from it, such as `task` or the role `sim`.
+        chosen: The name that is chosen by default.
+        sections: Settings of the stage (empty name) and of each component, by its dotted path.
+    """
+
+    options: Mapping[str, Sequence[str]]
+    chosen: Mapping[str, str]
+    sections: Mapping[str, Mapping[str, Setting]]
+
+    @property
+    def defaults(self) -> dict[str, str]:
+        """Dotted key of every setting and its default as text."""
+        return {
+            f"{path}.{name}".lstrip("."): _text(known.default)
+            for path, settings in self.sections.items()
+            for name, known in settings.items()
+        }
+
+
+def explained(command: str, *, config_dir: Path | None = None) -> Explanation:
+    """Return what the yaml files and classes of a command say about themselves."""
+    with opened(config_dir):
+        composition = compose(command, [])
+        keys = {choice.partition("@")[2] or choice: choice for choice in composition.chosen}
+        found = {key: options(choice.partition("@")[0]) for key, choice in keys.items()}
+        found |= {group: options(group) for group in OPTIONAL_GROUPS if group in groups()}
+        chosen = {key: composition.chosen[choice] for key, choice in keys.items()}
+        try:
+            values = resolved(composition)
+        except ConfigError:
+            values = plain(composition.config)
+        return Explanation(found, chosen, dict(_sections(values, found)))
+
+
+def write_help(command: str, *, config_dir: Path | None = None) -> str:
+    """Return the part of a command's help that comes from its configuration."""
+    explanation = explained(command, config_dir=config_dir)
+    parts = [_table("Groups (KEY=NAME, * is the default):", list(_group_lines(explanation)))]
+    for path, settings in explanation.sections.items():
+        chosen = explanation.chosen.get(path)
+        title = (
+            f"Settings of {path}{f'={chosen}' if chosen else ''} ({path}.KEY=VALUE):"
+            if path
+            else "Settings (KEY=VALUE):"
+        )
+        parts.append(_table(title, [_setting_line(setting) for setting in settings.values()]))
+    paths = [f"{path}.effects" for path, settings in explanation.sections.items() if "effects" in settings]
+    if paths:
+        parts.append(_table(f"Effects ({' or '.join(paths)}.NAME.PARAMETER=VALUE):", list(_effect_lines())))
+    return "\n".join(part for part in parts if part) + "\n"
+
+
+def _sections(values: Mapping[str, Any], chosen: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Setting]]]:
+    """Yield the stage's own settings first, then those of each component."""
+    own = {key: value for key, value in values.items() if key not in chosen and not _is_component(value)}
+    commands = {name: known for name, known in settings_of(CommandSettings).items() if name not in own}
+    yield "", {**_described(own, values), **commands}
+    for key, value in values.items():
+        if isinstance(value, Mapping) and (key in chosen or _is_component(value)):
+            yield from _component_sections(key, value)
+
+
+def _component_sections(path: str, values: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Setting]]]:
+    inner = {key: value for key, value in values.items() if _is_component(value)}
+    yield path, _described({key: value for key, value in values.items() if key not in inner}, values)
+    for key, value in inner.items():
+        yield from _component_sections(f"{path}.{key}", value)
+
+
+def _described(shown: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Setting]:
+    known = declared(dict(values))
+    own = {**settings_of(CommandSettings), **known}
+    names = [name for name in [*shown, *known] if not name.startswith("_") and name not in values.keys() - shown.keys()]
+    return {
+        name: _with_default(own.get(name, Setting(name)), shown.get(name, REQUIRED)) for name in dict.fromkeys(names)
+    }
+
+
+def _with_default(known: Setting, value: Any) -> Setting:
+    default = known.default if value is REQUIRED else value
+    return Setting(known.name, default, known.meaning, known.unit, known.source, known.lower, known.upper)
+
+
+def _is_component(value: Any) -> bool:
+    return isinstance(value, Mapping) and "_target_" in value
+
+
+def _group_lines(explanation: Explanation) -> Iterator[tuple[str, ...]]:
+    for key, names in explanation.options.items():
+        yield key, " ".join(f"{name}*" if name == explanation.chosen.get(key) else name for name in names), ""
+
+
+def _setting_line(setting: Setting) -> tuple[str, ...]:
+    default = f"{_text(setting.default)} {setting.unit}".strip()
+    return setting.name, default if len(default) <= WIDEST else f"{default[: WIDEST - 3]}...", setting.meaning
+
+
+def _effect_lines() -> Iterator[tuple[str, ...]]:
+    for name in effects():
+        target = getattr(importlib.import_module(f"gsl.effects.{name}"), camel_case(name))
+        for setting in settings_of(target).values():
+            if setting.name != "joints":
+                yield f"{name}.{setting.name}", setting.unit, setting.meaning
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool) or value is None:
+        return {True: "true", False: "false", None: "null"}[value]
+    if isinstance(value, Mapping):
+        return "{" + ",".join(f"{key}:{_text(entry)}" for key, entry in value.items()) + "}"
+    return "[" + ",".join(map(_text, value)) + "]" if isinstance(value, list | tuple) else str(value)
+
+
+def _table(title: str, rows: Sequence[tuple[str, ...]]) -> str:
+    widths = [min(WIDEST, max(len(row[column]) for row in rows)) for column in (0, 1)] if rows else []
+    lines = [f"  {row[0]:<{widths[0]}}  {row[1]:<{widths[1]}}  {row[2]}".rstrip() for row in rows]
+    return "\n".join(["", title, *lines]) if rows else ""

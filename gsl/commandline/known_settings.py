@@ -1,0 +1,40 @@
+"""What can be set in a configuration: the keys of its yaml files and the settings its classes declare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from hydra.utils import get_object
+from omegaconf import DictConfig, OmegaConf
+
+from gsl.commandline.overrides import COMMAND_KEYS
+from gsl.core.setting import Setting, settings_of
+
+
+def known_keys(config: DictConfig) -> list[str]:
+    """Return every dotted key that can be set, those of the command included."""
+    return sorted({*COMMAND_KEYS, *_keys_below(config, "")})
+
+
+def declared(node: Mapping[str, Any]) -> Mapping[str, Setting]:
+    """Return the settings of the class that a mapping names with `_target_`, nothing if it names none."""
+    name = node.get("_target_")
+    try:
+        return settings_of(get_object(name)) if isinstance(name, str) else {}
+    except (ImportError, ValueError, TypeError, AttributeError):
+        return {}
+
+
+def plain(config: Any) -> dict[str, Any]:
+    """Return a configuration as it is written, references and missing values as text; of a single value, nothing."""
+    container = OmegaConf.to_container(config, resolve=False) if isinstance(config, DictConfig) else None
+    return {str(key): value for key, value in container.items()} if isinstance(container, dict) else {}
+
+
+def _keys_below(node: DictConfig, path: str) -> Iterator[str]:
+    for key in {*declared(plain(node)), *map(str, node)}:
+        yield f"{path}{key}"
+        below = None if OmegaConf.is_missing(node, key) or OmegaConf.is_interpolation(node, key) else node.get(key)
+        if isinstance(below, DictConfig):
+            yield from _keys_below(below, f"{path}{key}.")

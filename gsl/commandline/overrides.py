@@ -1,0 +1,64 @@
+"""Overrides are the KEY=VALUE arguments of a stage; short forms are rewritten to hydra's own before hydra sees them.
+
+sim=nao_ideal                           world@sim=nao_ideal
+world.effects.backlash.width=0.02       ++world.effects.backlash.width=0.02
+experiment=arm                          +experiment=arm
+out=runs/a                              ++out=runs/a
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Mapping
+
+from gsl.errors import ConfigError
+
+COMMAND_KEYS = ("name", "out", "force", "trust")
+"""Settings of the command, not of the stage; every command takes them, whether its yaml names them or not."""
+
+OPTIONAL_GROUPS = ("experiment",)
+"""Groups a command may choose from without having a default."""
+
+_EFFECT = re.compile(r"(?:.*\.)?effects\.[A-Za-z_]\w*")
+
+
+def rewrite(arguments: Iterable[str], chosen: Collection[str]) -> list[str]:
+    """Return the arguments as hydra wants them.
+
+    Args:
+        arguments: What the user typed.
+        chosen: Keys of the command's defaults list, such as `task` and `world@sim`.
+
+    Raises:
+        ConfigError: An argument is not of the form key=value.
+    """
+    roles = {choice.partition("@")[2]: choice for choice in chosen if "@" in choice}
+    return [_rewritten(argument, roles, chosen) for argument in arguments]
+
+
+def key_of(argument: str) -> str:
+    """Return the key of an override without its prefix."""
+    return argument.partition("=")[0].lstrip("+~")
+
+
+def effect_path(key: str) -> str:
+    """Return the dotted path of the effect that a key is about, `world.effects.backlash`, or nothing."""
+    match = _EFFECT.match(key)
+    return match.group(0) if match else ""
+
+
+def _rewritten(argument: str, roles: Mapping[str, str], chosen: Collection[str]) -> str:
+    if argument.startswith("~"):
+        return argument
+    if "=" not in argument:
+        raise ConfigError(argument, "has no value; write key=value")
+    key, _, value = argument.partition("=")
+    if key.startswith("+"):
+        return argument
+    if key in roles:
+        return f"{roles[key]}={value}"
+    if effect_path(key) or key in COMMAND_KEYS:
+        return f"++{key}={value}"
+    if key in OPTIONAL_GROUPS and key not in chosen:
+        return f"+{key}={value}"
+    return argument

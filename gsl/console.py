@@ -1,0 +1,184 @@
+"""The console is the only place that prints: people read progress on stderr, results go to stdout."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    import rich.console
+    import rich.table
+
+_log = logging.getLogger("gsl")
+
+SECONDS_BETWEEN_LINES = 10.0
+WIDTH_WITHOUT_TERMINAL = 120
+
+
+class Progress(Protocol):
+    """What a long loop tells how far it is."""
+
+    def advance(self, steps: int = 1) -> None:
+        """Say that `steps` more are done."""
+
+
+class LiveTable(Protocol):
+    """A table that grows while a person watches."""
+
+    def row(self, *cells: object) -> None:
+        """Add a row."""
+
+
+class Console:
+    """Prints for a person, or exactly one JSON document on stdout."""
+
+    def __init__(self, *, json: bool = False) -> None:
+        self.json = json
+        self._live: _RichLiveTable | None = None
+
+    def status(self, text: str) -> None:
+        """Say what is going on, on stderr."""
+        _log.info("%s", text)
+        self._stderr.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def table(
+        self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
+    ) -> None:
+        """Print a table of results on stdout; with JSON it is left to `result`."""
+        _log.info("%s", "\n".join([title, *("\t".join(map(str, row)) for row in [columns, *rows]), caption or ""]))
+        if not self.json:
+            self._stdout.print(_rich_table(title, columns, rows, caption))
+
+    def result(self, document: Mapping[str, Any], *, text: str = "") -> None:
+        """Print the outcome: the document as JSON, or `text` for a person."""
+        if self.json:
+            from gsl.storage.documents import text as strict_json
+
+            sys.stdout.write(strict_json(document, indent=2) + "\n")
+        elif text:
+            sys.stdout.write(text.rstrip("\n") + "\n")
+        sys.stdout.flush()
+
+    def error(self, message: str, exit_code: int, *, command: str = "gsl") -> int:
+        """Say in one line why the command ends, and return the exit code."""
+        _log.info("%s", message)
+        if self.json:
+            self.result({"error": message, "exit_code": exit_code})
+        else:
+            sys.stdout.flush()
+            sys.stderr.write(f"{command}: {message}\n")
+        return exit_code
+
+    @contextmanager
+    def progress(self, total: int, description: str) -> Iterator[Progress]:
+        """Show how far a loop of `total` steps is: a bar on a terminal, else a line every ten seconds."""
+        if self._live is not None:
+            yield _Lines(total, description, self._live.caption, seconds=0.5)
+        elif not self._stderr.is_terminal:
+            yield _Lines(total, description, self.status, seconds=SECONDS_BETWEEN_LINES)
+        else:
+            from rich.progress import Progress as Bars
+            from rich.progress import TimeElapsedColumn
+
+            with Bars(*Bars.get_default_columns(), TimeElapsedColumn(), console=self._stderr, transient=True) as bars:
+                task = bars.add_task(description, total=total)
+                yield _Bar(lambda steps: bars.advance(task, steps))
+
+    @contextmanager
+    def live_table(self, title: str, columns: Sequence[str]) -> Iterator[LiveTable]:
+        """Show a growing table on a terminal, else each row as a line; the final table is for `table`."""
+        if not self._stderr.is_terminal or self._live is not None:
+            yield _LineTable(columns, self.status)
+            return
+        from rich.live import Live
+
+        table = _rich_table(title, columns, [], None)
+        with Live(table, console=self._stderr, transient=True) as live:
+            self._live = _RichLiveTable(table, live.refresh)
+            try:
+                yield self._live
+            finally:
+                self._live = None
+
+    @cached_property
+    def _stdout(self) -> rich.console.Console:
+        return _rich_console(sys.stdout.isatty(), stderr=False)
+
+    @cached_property
+    def _stderr(self) -> rich.console.Console:
+        return _rich_console(sys.stderr.isatty(), stderr=True)
+
+
+class _Bar:
+    def __init__(self, draw: Callable[[int], None]) -> None:
+        self.draw = draw
+
+    def advance(self, steps: int = 1) -> None:
+        self.draw(steps)
+
+
+class _Lines:
+    """Progress as lines of text, not more often than every so many seconds."""
+
+    def __init__(self, total: int, description: str, say: Callable[[str], None], *, seconds: float) -> None:
+        self.total, self.description, self.say, self.seconds = total, description, say, seconds
+        self.done, self.said = 0, time.monotonic()
+
+    def advance(self, steps: int = 1) -> None:
+        self.done += steps
+        if time.monotonic() - self.said >= self.seconds:
+            self.said = time.monotonic()
+            self.say(f"{self.description}: {self.done} of {self.total}")
+
+
+class _LineTable:
+    def __init__(self, columns: Sequence[str], say: Callable[[str], None]) -> None:
+        self.columns, self.say = columns, say
+
+    def row(self, *cells: object) -> None:
+        self.say("  ".join(f"{column}: {cell}" for column, cell in zip(self.columns, cells, strict=True)))
+
+
+class _RichLiveTable:
+    def __init__(self, table: rich.table.Table, refresh: Callable[[], None]) -> None:
+        self.table, self.refresh = table, refresh
+
+    def row(self, *cells: object) -> None:
+        self.table.add_row(*map(str, cells))
+        self.refresh()
+
+    def caption(self, text: str) -> None:
+        self.table.caption = text
+        self.refresh()
+
+
+def _rich_console(is_terminal: bool, *, stderr: bool) -> rich.console.Console:
+    from rich.console import Console as RichConsole
+
+    width = None if is_terminal else int(os.environ.get("COLUMNS") or WIDTH_WITHOUT_TERMINAL)
+    return RichConsole(stderr=stderr, width=width)
+
+
+def _rich_table(
+    title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None
+) -> rich.table.Table:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, caption=caption, box=box.SIMPLE_HEAD, title_justify="left", caption_justify="left")
+    for index, column in enumerate(columns):
+        numbers = bool(rows) and all(_is_number(row[index]) for row in rows)
+        table.add_column(column, justify="right" if numbers else "left")
+    for row in rows:
+        table.add_row(*map(str, row))
+    return table
+
+
+def _is_number(cell: object) -> bool:
+    return str(cell).lstrip("+-")[:1].isdigit() and not any(letter in str(cell) for letter in ":/=")

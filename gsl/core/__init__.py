@@ -1,0 +1,1 @@
+"""Pure numpy: the mathematics and the data types that every other room uses."""

@@ -1,0 +1,159 @@
+"""A robot as data: links, joints and motors of a tree of rigid bodies, in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A primitive on a link [m]: a `box` of full edges, a `sphere` (radius,) or a `cylinder` (radius, length)."""
+
+    kind: str
+    size: tuple[float, ...]
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    collides: bool = False
+    colour: tuple[float, float, float] = (0.9, 0.9, 0.92)
+    along: str = "z"  # a cylinder's axis
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid body.
+
+    Attributes:
+        mass: [kg].
+        com: Centre of mass in link axes [m], shape (3,).
+        inertia: About the centre of mass in link axes [kg·m²], shape (3, 3).
+        shapes: What it looks like and what it collides with.
+    """
+
+    name: str
+    mass: float
+    com: np.ndarray
+    inertia: np.ndarray
+    shapes: tuple[Shape, ...] = ()
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A hinge between two links; with `fixed_at` [rad] it is rigid at that angle.
+
+    Attributes:
+        origin: Of the child's frame in the parent's axes [m], shape (3,).
+        axis: Unit vector, shape (3,).
+        lower, upper: Position limits [rad].
+        max_velocity: [rad/s].
+        effort: Peak torque [N·m].
+        armature: Inertia of the rotor seen at the output [kg·m²].
+    """
+
+    name: str
+    parent: str
+    child: str
+    origin: np.ndarray
+    axis: np.ndarray
+    lower: float
+    upper: float
+    max_velocity: float
+    effort: float
+    armature: float = 0.0
+    fixed_at: float | None = None
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A tree of links with its motors.
+
+    Attributes:
+        links: By name; the first one is the base.
+        joints: Parents before children.
+        controlled: Joints that an action names, in order.
+        coupled: Further motors and the controlled joint whose command drives each.
+        groups: Names for sets of motors, the scopes of effects.
+        feet: Links whose ground contact is felt, by side.
+        gains: Nominal proportional [N·m/rad] and derivative [N·m·s/rad] servo gains by motor.
+        no_load_speed: Factor on max_velocity at which motoring torque vanishes.
+        stance: A usual posture [rad] by joint, the one at which approximations are exact.
+        upright_height: Base height below which it lies on the ground [m].
+    """
+
+    name: str
+    links: Mapping[str, Link]
+    joints: tuple[Joint, ...]
+    controlled: tuple[str, ...]
+    coupled: Mapping[str, str] = field(default_factory=dict)
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    feet: Mapping[str, str] = field(default_factory=dict)
+    gains: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    no_load_speed: float = 1.15
+    stance: Mapping[str, float] = field(default_factory=dict)
+    upright_height: float = 0.0
+
+    @property
+    def base(self) -> str:
+        """Name of the root link."""
+        return next(iter(self.links))
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """Every driven joint: the controlled ones, then the coupled ones."""
+        return (*self.controlled, *self.coupled)
+
+    @property
+    def drive(self) -> np.ndarray:
+        """For each motor the index of the action that drives it, shape (n_motors,)."""
+        return np.array([self.controlled.index(self.coupled.get(name, name)) for name in self.motors])
+
+    @property
+    def mass(self) -> float:
+        """Total mass [kg]."""
+        return sum(link.mass for link in self.links.values())
+
+    def joint(self, name: str) -> Joint:
+        """Return the joint called `name`."""
+        return next(joint for joint in self.joints if joint.name == name)
+
+
+def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Return the matrix that turns by `angle` [rad] about a unit `axis`, shape (3, 3) (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+
+
+def with_mass(link: Link, mass: float, com: np.ndarray, inertia: np.ndarray) -> Link:
+    """Return `link` with another rigid body (mass, com, inertia about com; link axes) welded on."""
+    total = link.mass + mass
+    joint_com = (link.mass * link.com + mass * com) / total
+    moved = [_moved(i, m, c - joint_com) for i, m, c in ((link.inertia, link.mass, link.com), (inertia, mass, com))]
+    return replace(link, mass=total, com=joint_com, inertia=sum(moved))
+
+
+def lumped(robot: Robot) -> Robot:
+    """Return the same robot with every fixed joint's child welded into its parent."""
+    links, joints = dict(robot.links), list(robot.joints)
+    for joint in reversed(robot.joints):  # children before parents
+        if joint.fixed_at is None:
+            continue
+        turn, child = rotation(joint.axis, joint.fixed_at), links.pop(joint.child)
+        links[joint.parent] = _welded(links[joint.parent], child, turn, joint.origin)
+        joints.remove(joint)
+        for other in joints:
+            if other.parent == joint.child:
+                raise ValueError(f"{other.name} moves on {joint.child}, which is welded to {joint.parent}")
+    return replace(robot, links=links, joints=tuple(joints))
+
+
+def _welded(parent: Link, child: Link, turn: np.ndarray, origin: np.ndarray) -> Link:
+    whole = with_mass(parent, child.mass, origin + turn @ child.com, turn @ child.inertia @ turn.T)
+    shapes = tuple(replace(s, centre=tuple(origin + turn @ np.array(s.centre))) for s in child.shapes)
+    return replace(whole, shapes=parent.shapes + shapes)
+
+
+def _moved(inertia: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
+    """Steiner: inertia about a point `offset` away from the centre of mass."""
+    return inertia + mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))

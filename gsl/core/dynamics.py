@@ -1,0 +1,76 @@
+"""Inertia of a tree of rigid bodies, as sums over its links of textbook Jacobians."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from gsl.core.body import Robot, rotation
+
+
+class Frames(NamedTuple):
+    """Where the links are, in base axes.
+
+    Attributes:
+        turn: From link to base axes, by link, each of shape (3, 3).
+        origin: Of the link frames [m], by link, each of shape (3,).
+        axis: Of the joints, by joint, each of shape (3,).
+    """
+
+    turn: Mapping[str, np.ndarray]
+    origin: Mapping[str, np.ndarray]
+    axis: Mapping[str, np.ndarray]
+
+
+def forward_kinematics(robot: Robot, angles: Mapping[str, float]) -> Frames:
+    """Return the frames of a robot without fixed joints, at joint angles [rad] by name; what is not named is at 0."""
+    turn, origin, axis = {robot.base: np.eye(3)}, {robot.base: np.zeros(3)}, {}
+    for joint in robot.joints:
+        axis[joint.name] = turn[joint.parent] @ joint.axis
+        origin[joint.child] = origin[joint.parent] + turn[joint.parent] @ joint.origin
+        turn[joint.child] = turn[joint.parent] @ rotation(joint.axis, angles.get(joint.name, 0.0))
+    return Frames(turn, origin, axis)
+
+
+def mass_matrix(robot: Robot, angles: Mapping[str, float]) -> np.ndarray:
+    """Return the inertia for (base angular velocity, base linear velocity, motor velocities) in base axes.
+
+    Rotor inertia is left out. Shape (6 + n_motors, 6 + n_motors); the base's frame is its link frame.
+    """
+    frames = forward_kinematics(robot, angles)
+    total = np.zeros((6 + len(robot.motors),) * 2)
+    for link in robot.links.values():
+        angular, linear = jacobian(robot, frames, link.name, link.com)
+        inertia = frames.turn[link.name] @ link.inertia @ frames.turn[link.name].T
+        total += link.mass * linear.T @ linear + angular.T @ inertia @ angular
+    return total
+
+
+def jacobian(robot: Robot, frames: Frames, link: str, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the angular and linear velocity of a point of a link per generalised velocity, each (3, 6 + n_motors)."""
+    place = frames.origin[link] + frames.turn[link] @ point
+    angular, linear = np.zeros((2, 3, 6 + len(robot.motors)))
+    angular[:, :3], linear[:, 3:6] = np.eye(3), np.eye(3)
+    linear[:, :3] = -_cross(place)
+    for joint in _ancestors(robot, link):
+        column = 6 + robot.motors.index(joint.name)
+        angular[:, column] = frames.axis[joint.name]
+        linear[:, column] = np.cross(frames.axis[joint.name], place - frames.origin[joint.child])
+    return angular, linear
+
+
+def _ancestors(robot: Robot, link: str) -> list:
+    """Joints between a link and the base."""
+    above = {joint.child: joint for joint in robot.joints}
+    found = []
+    while link in above:
+        found.append(above[link])
+        link = above[link].parent
+    return found
+
+
+def _cross(vector: np.ndarray) -> np.ndarray:
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -1,0 +1,125 @@
+"""A setting is one validated parameter that says its meaning, unit, source and documented range, once for all readers.
+
+    @component
+    class Backlash:
+        width: Annotated[float, setting("full width of the play", unit="rad", ge=0, lower=0.0, upper=0.1)]
+
+Validation, help text, random draws and search ranges all read it from there.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, dataclass_transform, get_type_hints
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as validated_dataclass
+from pydantic.fields import FieldInfo
+
+REQUIRED: Any = "???"
+"""Default of a setting that has none; yaml files write it the same way."""
+
+
+def setting(
+    meaning: str,
+    *,
+    unit: str = "",
+    source: str = "",
+    lower: float | None = None,
+    upper: float | None = None,
+    **bounds: Any,
+) -> FieldInfo:
+    """Describe a field inside `Annotated`; the default stays on the field itself.
+
+    Args:
+        meaning: A few words a user understands, without a full stop.
+        unit: SI unit such as `rad` or `N·m`; empty for a pure number.
+        source: Where the documented range comes from.
+        lower: Lower end of the documented range (random draws, searches); values beyond it are still accepted.
+        upper: Upper end of the documented range.
+        **bounds: What is impossible and refused: pydantic's `ge`, `gt`, `le`, `lt`, `min_length`, `pattern`, ...
+    """
+    extra: dict[str, Any] = {"unit": unit, "source": source, "lower": lower, "upper": upper}
+    field: FieldInfo = Field(description=meaning, json_schema_extra=extra, **bounds)
+    return field
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(Field,))
+def component(cls: type) -> Any:
+    """Make a class a frozen dataclass that checks its fields and refuses unknown ones.
+
+    Fields may have any type; one that is a `Protocol` has to be `runtime_checkable`.
+    """
+    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, allow_inf_nan=False)
+    return validated_dataclass(frozen=True, config=config)(cls)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is known of one parameter of a class or function.
+
+    Attributes:
+        name: The field's name.
+        default: Its default, `REQUIRED` if it has none.
+        meaning: A few words, empty where none were given.
+        unit: SI unit, empty for a pure number.
+        source: Where the documented range comes from.
+        lower: Lower end of the documented range, or else the least possible value, or None.
+        upper: Upper end, likewise.
+    """
+
+    name: str
+    default: Any = REQUIRED
+    meaning: str = ""
+    unit: str = ""
+    source: str = ""
+    lower: float | None = None
+    upper: float | None = None
+
+
+def settings_of(target: Callable[..., Any]) -> Mapping[str, Setting]:
+    """Return the settings of a component in order; of any other class or function, the names and defaults."""
+    fields: Mapping[str, FieldInfo] = getattr(target, "__pydantic_fields__", {})
+    parameters = inspect.signature(target).parameters.values()
+    named = [
+        parameter for parameter in parameters if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+    ]
+    return {parameter.name: _described(parameter, _field(target, parameter.name, fields)) for parameter in named}
+
+
+def _field(target: Callable[..., Any], name: str, fields: Mapping[str, FieldInfo]) -> FieldInfo | None:
+    if name in fields:
+        return fields[name]
+    try:
+        hint = get_type_hints(target, include_extras=True).get(name) if isinstance(target, type) else None
+    except NameError:  # a class that imports its types for the type checker only
+        hint = None
+    return next((part for part in getattr(hint, "__metadata__", ()) if isinstance(part, FieldInfo)), None)
+
+
+def _described(parameter: inspect.Parameter, field: FieldInfo | None) -> Setting:
+    default = REQUIRED if parameter.default is parameter.empty else parameter.default
+    if field is None:
+        return Setting(parameter.name, default)
+    if field.default_factory is not None:
+        default = field.get_default(call_default_factory=True, validated_data={})
+    extra: Mapping[str, Any] = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    return Setting(
+        parameter.name,
+        default,
+        field.description or "",
+        str(extra.get("unit", "")),
+        str(extra.get("source", "")),
+        _first(extra.get("lower"), _bound(field, "ge"), _bound(field, "gt")),
+        _first(extra.get("upper"), _bound(field, "le"), _bound(field, "lt")),
+    )
+
+
+def _bound(field: FieldInfo, name: str) -> float | None:
+    return _first(*(getattr(constraint, name, None) for constraint in field.metadata))
+
+
+def _first(*values: float | None) -> float | None:
+    return next((value for value in values if value is not None), None)

@@ -1,0 +1,48 @@
+"""Means, intervals and rank correlations of a handful of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+
+class Interval(NamedTuple):
+    """A mean with its two-sided confidence interval; the bounds are infinite where one value is all there is."""
+
+    mean: float
+    lower: float
+    upper: float
+
+
+def mean_interval(values: Sequence[float] | np.ndarray, *, confidence: float = 0.95) -> Interval:
+    """Return the mean of independent values, shape (n,), with Student's t interval."""
+    values = np.asarray(values, dtype=float)
+    return _t_interval(values.mean(), values.var(ddof=1) / len(values) if len(values) > 1 else np.inf, len(values) - 1, confidence)
+
+
+def difference_interval(after: np.ndarray, before: np.ndarray, *, confidence: float = 0.95) -> Interval:
+    """Return mean(after) - mean(before) of two independent samples with Welch's t interval."""
+    after, before = np.asarray(after, dtype=float), np.asarray(before, dtype=float)
+    difference = after.mean() - before.mean()
+    if min(len(after), len(before)) < 2:
+        return Interval(float(difference), -np.inf, np.inf)
+    shares = np.array([after.var(ddof=1) / len(after), before.var(ddof=1) / len(before)])
+    if shares.sum() == 0.0:
+        return Interval(float(difference), float(difference), float(difference))
+    freedom = shares.sum() ** 2 / np.sum(shares**2 / (np.array([len(after), len(before)]) - 1))
+    return _t_interval(difference, shares.sum(), freedom, confidence)
+
+
+def rank_correlation(first: np.ndarray, second: np.ndarray) -> float:
+    """Return Spearman's rho of two samples of equal length."""
+    return float(stats.spearmanr(first, second).statistic)
+
+
+def _t_interval(mean: float, variance_of_mean: float, freedom: float, confidence: float) -> Interval:
+    if not np.isfinite(variance_of_mean):
+        return Interval(float(mean), -np.inf, np.inf)
+    half = stats.t.ppf(0.5 + confidence / 2, freedom) * np.sqrt(variance_of_mean)
+    return Interval(float(mean), float(mean - half), float(mean + half))

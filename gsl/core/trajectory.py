@@ -1,0 +1,69 @@
+"""A trajectory is one episode as arrays; a batch is several of one robot at one control rate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One episode of T control steps, hence T + 1 measured states.
+
+    Attributes:
+        time: From the start of the episode [s], shape (T + 1,).
+        action: Desired joint positions the agent issued [rad], shape (T, n_actions).
+        position: Joint positions measured before the action [rad], shape (T + 1, n_joints).
+        velocity: Joint velocities measured before the action [rad/s], shape (T + 1, n_joints).
+        grounded_action: What the grounding sent instead [rad], shape (T, n_actions), if there was one.
+        reward: Reward of each action, shape (T,), if a task gave one.
+        fell: Whether the robot lies on the ground, shape (T + 1,), if it can fall.
+        sensors: Further columns of the contract by name, such as `gyro.x`, each of shape (T + 1,).
+    """
+
+    time: np.ndarray
+    action: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    grounded_action: np.ndarray | None = None
+    reward: np.ndarray | None = None
+    fell: np.ndarray | None = None
+    sensors: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Number of control steps T."""
+        return len(self.action)
+
+    @property
+    def ended_in_a_fall(self) -> bool:
+        """Whether the robot fell in this episode."""
+        return self.fell is not None and bool(self.fell[-1])
+
+    @property
+    def value(self) -> float:
+        """The return: sum of the rewards."""
+        return float(np.sum(self.reward)) if self.reward is not None else float("nan")
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Trajectories of one robot: what one parquet file holds.
+
+    Attributes:
+        episodes: The trajectories.
+        joints: Names of the action, position and velocity columns, in order.
+        control_period: Nominal time between two actions [s].
+        metadata: Where the data come from: role, source, seed, world, policy and whatever else is known.
+    """
+
+    episodes: tuple[Trajectory, ...]
+    joints: tuple[str, ...]
+    control_period: float
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Number of episodes."""
+        return len(self.episodes)

@@ -1,0 +1,85 @@
+"""Validation turns a mapping into a component, or into one line: the setting, its value and what it must be."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+from pydantic_core import ArgsKwargs, ErrorDetails
+
+from gsl.core.setting import settings_of
+from gsl.errors import ConfigError
+
+T = TypeVar("T")
+
+_RULES = {
+    "greater_than_equal": "must be at least {ge:g}",
+    "greater_than": "must be above {gt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "less_than": "must be below {lt:g}",
+    "finite_number": "must be a finite number",
+    "literal_error": "must be one of {expected}",
+    "is_instance_of": "must be a {class}",
+    "string_too_short": "must not be empty",
+    "missing": "has no value",
+    "missing_argument": "has no value",
+}
+_KINDS = {"int": "a whole number", "float": "a number", "bool": "true or false", "string": "a text", "tuple": "a list"}
+
+
+def make(target: Callable[..., T], values: Mapping[str, Any], *, where: str = "") -> T:
+    """Build a component from a mapping of its settings.
+
+    Args:
+        target: A class made by `component`.
+        values: Its settings by name.
+        where: Dotted path of the mapping, such as `effects.backlash`.
+
+    Raises:
+        ConfigError: A setting is unknown, missing or has an impossible value.
+    """
+    try:
+        return target(**values)
+    except ValidationError as error:
+        raise config_error(error, target, where=where) from None
+
+
+def config_error(error: ValidationError, target: Callable[..., Any], *, where: str = "") -> ConfigError:
+    """Return the most telling of pydantic's complaints about building `target` at the dotted path `where`."""
+    details = sorted(error.errors(), key=lambda detail: detail["type"] != "unexpected_keyword_argument")[0]
+    location = [str(part) for part in details["loc"]]
+    path = ".".join([*filter(None, [where]), *location])
+    if details["type"] == "unexpected_keyword_argument":
+        return ConfigError(path, f"no such setting{did_you_mean(location[-1], settings_of(target))}")
+    known = settings_of(target).get(location[0]) if location else None
+    unit = f" ({known.unit})" if known is not None and known.unit else ""
+    return ConfigError(path or target.__name__, f"{_problem(details)}{unit}", given=_given(details["input"]))
+
+
+def did_you_mean(word: str, known: Iterable[str], *, listed: bool = False) -> str:
+    """Return `; did you mean ...?` and, where nothing is near or `listed`, the list of what there is."""
+    names = sorted(known)
+    near = difflib.get_close_matches(word, names, n=2, cutoff=0.6)
+    question = f"; did you mean {' or '.join(near)}?" if near else ""
+    if near and not listed or not names:
+        return question
+    return f"{question}{' T' if near else '; t'}here is {', '.join(names)}"
+
+
+def _problem(details: ErrorDetails) -> str:
+    context = dict(details.get("ctx", {}))
+    if details["type"] == "value_error":
+        return str(context["error"])
+    if details["type"] in _RULES:
+        return _RULES[details["type"]].format(**context)
+    kind = _KINDS.get(details["type"].split("_")[0])
+    return f"must be {kind}" if kind else details["msg"][0].lower() + details["msg"][1:]
+
+
+def _given(value: object) -> str:
+    if isinstance(value, ArgsKwargs):
+        return ""
+    text = value if isinstance(value, str) else repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

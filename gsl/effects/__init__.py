@@ -1,0 +1,1 @@
+"""What a simulator leaves out: one effect, one file."""

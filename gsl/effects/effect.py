@@ -1,0 +1,96 @@
+"""What an effect is, and how a world's `effects:` mapping becomes a tuple of them.
+
+An effect is a component with a `kind`, a `rank` among its kind, parameters and `apply(plant) -> plant`. Its name is its
+module: `backlash` is the class `Backlash` of gsl/effects/backlash.py. A user's own effect is named by `_target_`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import pkgutil
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar, Protocol, runtime_checkable
+
+import numpy as np
+
+from gsl.core.plant import Plant
+from gsl.core.validation import make
+from gsl.errors import ConfigError
+
+KINDS = ("command", "servo", "body", "contact", "environment", "sensor")
+
+Scope = str | tuple[str, ...]
+SCOPE = "where it acts: all, a group such as legs or arms, a joint, or a list of these"
+
+
+@runtime_checkable
+class Effect(Protocol):
+    """Something a simulator leaves out, as a change of the plant."""
+
+    kind: ClassVar[str]
+    rank: ClassVar[int]
+
+    def apply(self, plant: Plant) -> Plant:
+        """Return the plant with this effect in it."""
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of the library's effects."""
+    package = importlib.import_module("gsl.effects")
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(package.__path__) if module.name != "effect"))
+
+
+def effect_class(name: str) -> type:
+    """Return the class of an effect of the library.
+
+    Raises:
+        ConfigError: if there is none of that name.
+    """
+    if name not in names():
+        near = difflib.get_close_matches(name, names(), 1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names())}"
+        raise ConfigError(f"effects.{name}", f"no effect of this name; {hint}")
+    module = importlib.import_module(f"gsl.effects.{name}")
+    return getattr(module, "".join(word.capitalize() for word in name.split("_")))
+
+
+def built(effects: Mapping[str, Any]) -> tuple[Effect, ...]:
+    """Build every entry of an `effects:` mapping, in the order in which they are applied, whatever the mapping's."""
+    made = [
+        _effect(name, entry)
+        for name, entries in effects.items()
+        for entry in (entries if isinstance(entries, list | tuple) else [entries])
+    ]
+    return tuple(sorted(made, key=lambda effect: (KINDS.index(effect.kind), effect.rank)))
+
+
+def _effect(name: str, entry: Any) -> Effect:
+    if isinstance(entry, Mapping):
+        made: Effect = make(effect_class(name), entry, where=f"effects.{name}")
+        return made
+    if not isinstance(entry, Effect):
+        raise ConfigError(f"effects.{name}", "must map the effect's parameters to values", given=str(entry))
+    return entry
+
+
+def applied(plant: Plant, effects: Iterable[Effect]) -> Plant:
+    """Return the plant with all effects in it."""
+    for effect in effects:
+        plant = effect.apply(plant)
+    return plant
+
+
+def scope(plant: Plant, joints: Scope) -> np.ndarray:
+    """Return which motors a scope names, shape (n_motors,).
+
+    Raises:
+        ConfigError: if a word is neither `all`, a group nor a joint of the robot.
+    """
+    try:
+        return plant.mask(joints)
+    except KeyError as error:
+        known = ("all", *plant.robot.groups, *plant.robot.motors)
+        near = difflib.get_close_matches(str(error.args[0]), known, 1)
+        hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(known)}"
+        raise ConfigError("joints", f"the {plant.robot.name} has no joint or group '{error.args[0]}'; {hint}") from None

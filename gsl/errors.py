@@ -1,0 +1,54 @@
+"""The tree of errors a user can cause; each says what is wrong, where, and what to do.
+
+GslError                    exit code 1: a stage failed
+└── InputError              exit code 2: usage, configuration, files
+    ├── ConfigError         a setting does not exist or has an impossible value
+    ├── ArtifactError       an artifact is missing, foreign, incomplete or of another version
+    └── TrajectoryError     a trajectory file breaks the contract
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class GslError(Exception):
+    """Something a user can understand and mend."""
+
+    exit_code = 1
+
+
+class InputError(GslError):
+    """What the user gave does not fit."""
+
+    exit_code = 2
+
+
+class ConfigError(InputError):
+    """A setting does not exist or has an impossible value."""
+
+    def __init__(self, setting: str, problem: str, *, given: str = "") -> None:
+        super().__init__(f"{setting} = {given}: {problem}" if given else f"{setting}: {problem}")
+        self.setting, self.problem, self.given = setting, problem, given
+
+    def under(self, path: str) -> ConfigError:
+        """Return the same error, seen from a mapping that holds this one at the dotted `path`."""
+        setting = ".".join(part for part in (path, self.setting) if part)
+        return ConfigError(setting, self.problem, given=self.given)
+
+
+class ArtifactError(InputError):
+    """An artifact is missing, foreign, incomplete or of another version."""
+
+    def __init__(self, path: Path | str, problem: str) -> None:
+        super().__init__(f"{path}: {problem}")
+        self.path = Path(path)
+
+
+class TrajectoryError(InputError):
+    """A trajectory file breaks the contract."""
+
+    def __init__(self, path: Path | str, problem: str, *, column: str | None = None, row: int | None = None) -> None:
+        where = "".join([f", column {column}" if column else "", f", row {row}" if row is not None else ""])
+        super().__init__(f"{path}{where}: {problem}")
+        self.path, self.column, self.row = Path(path), column, row

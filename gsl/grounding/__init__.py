@@ -1,0 +1,1 @@
+"""What stands between the agent's action and the simulator."""

@@ -1,0 +1,34 @@
+"""Action noise envelope (Jakobi 1995): noise on every action, so that nothing is learned that needs exactness."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+
+from gsl.core.layout import Layout
+from gsl.core.setting import component, setting
+
+
+@component
+class ActionNoise:
+    """Adds independent Gaussian noise to every joint's action in every tick."""
+
+    sd: Annotated[float, setting("standard deviation of the noise", unit="rad", ge=0, lower=0.005, upper=0.04)] = 0.02
+
+    def start(self, layout: Layout, rng: np.random.Generator) -> ActionNoiseRun:
+        """Return the grounding at the beginning of an episode."""
+        return ActionNoiseRun(self.sd, rng)
+
+
+class ActionNoiseRun:
+    """The noise in one episode."""
+
+    def __init__(self, sd: float, rng: np.random.Generator) -> None:
+        self._sd, self._rng = sd, rng
+
+    def transform(self, observation: np.ndarray, action: np.ndarray) -> np.ndarray:
+        """Return the noisy action."""
+        if self._sd == 0.0:
+            return action
+        return action + self._sd * self._rng.standard_normal(len(action))

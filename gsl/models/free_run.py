@@ -1,0 +1,74 @@
+"""A model that is fed with its own answers, as it will be in the grounded simulator: errors of one tick add up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gsl.core.history import History, windows
+from gsl.core.observation import sensed
+from gsl.core.trajectory import Trajectory
+from gsl.core.transitions import actions, usable
+from gsl.models.forward import ForwardModel
+from gsl.models.inverse import InverseModel
+
+TICKS = 10  # of a free run: 0.2 s at 50 Hz
+
+
+class Segments(NamedTuple):
+    """Pieces of trajectories laid end to end, each of `span + TICKS + 1` ticks.
+
+    Attributes:
+        position: Joint positions [rad], shape (N * length, n_joints).
+        action: [rad], shape (N * length, n_joints).
+        sensed: Body sensors, shape (N * length, n_sensed).
+        starts: Tick from which each piece is predicted, shape (N,).
+    """
+
+    position: np.ndarray
+    action: np.ndarray
+    sensed: np.ndarray
+    starts: np.ndarray
+
+
+def segments(episodes: Sequence[Trajectory], history: History, *, carried_out: bool) -> Segments:
+    """Cut trajectories into pieces that overlap by their past only."""
+    length, parts = history.span + TICKS + 1, []
+    for one in episodes:
+        columns = one.position, actions(one, carried_out=carried_out), sensed(one, history.sensors)
+        cuts = range(0, usable(one) - length + 1, TICKS)
+        parts += [tuple(column[cut : cut + length] for column in columns) for cut in cuts]
+    position, action, body = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Segments(position, action, body, history.span + length * np.arange(len(parts)))
+
+
+def predicted_error(model: ForwardModel, pieces: Segments) -> np.ndarray:
+    """Return the error of the joint positions after `TICKS` ticks [rad], shape (N, n_joints)."""
+    x, last = pieces.position.copy(), pieces.starts + TICKS
+    for tick in range(TICKS):
+        now = pieces.starts + tick
+        x[now + 1] = x[now] + model.effects(windows(model.history, x, pieces.action, pieces.sensed, now))
+    error: np.ndarray = x[last] - pieces.position[last]
+    return error
+
+
+def standstill_error(pieces: Segments) -> np.ndarray:
+    """Return the same error of a robot that does not move [rad], shape (N, n_joints)."""
+    error: np.ndarray = pieces.position[pieces.starts] - pieces.position[pieces.starts + TICKS]
+    return error
+
+
+def recovered_error(model: InverseModel, pieces: Segments) -> np.ndarray:
+    """Return how far off the actions are that an inverse model recovers from the motion [rad], shape (.., n_joints).
+
+    The past actions it sees are its own answers; the first tick of a piece, where they are not yet, does not count.
+    """
+    a, errors = pieces.action.copy(), []
+    for tick in range(TICKS + 1 - model.horizon):
+        now = pieces.starts + tick
+        wanted = pieces.position[now + model.horizon] - pieces.position[now]
+        a[now] = model.actions(windows(model.history, pieces.position, a, pieces.sensed, now), a[now], wanted)
+        errors.append(a[now] - pieces.action[now])
+    return np.concatenate(errors[1:] or errors)

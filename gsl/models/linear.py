@@ -1,0 +1,23 @@
+"""A linear model: ridge regression in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gsl.core.scaling import scaling
+from gsl.models.network import Network, unscaled
+
+
+def fit_linear(inputs: np.ndarray, targets: np.ndarray, *, ridge: float) -> Network:
+    """Return W, b that minimise |W z + b - y|^2 / N + ridge |W|^2, where z and y are scaled to unit variance.
+
+    Args:
+        inputs: Shape (N, n).
+        targets: Shape (N, m).
+        ridge: Of collinear inputs (a gait makes all joints nearly so), not of noise; at least 0.
+    """
+    given, wanted = scaling(inputs), scaling(targets)
+    z, y = given.apply(inputs), wanted.apply(targets)
+    square = z.T @ z / len(z) + ridge * np.eye(z.shape[1])
+    weight = np.linalg.solve(square, z.T @ y / len(z)).T
+    return unscaled([(weight, np.zeros(targets.shape[1]))], given, wanted)

@@ -1,0 +1,59 @@
+"""CMA-ES (Hansen 2016) through the library `cma`, as ask and tell on a policy's parameters."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+
+from gsl.core.setting import component, setting
+
+
+@component
+class CmaEs:
+    """Covariance matrix adaptation: maximises, in units of each parameter's scale."""
+
+    candidates: Annotated[int, setting("candidates of a generation", ge=4)]
+    generations: Annotated[int, setting("generations", ge=1)]
+    sigma: Annotated[float, setting("first step size, in units of a parameter's scale", gt=0)] = 0.08
+
+    def start(self, parameters: np.ndarray, scale: np.ndarray, seed: int) -> CmaEsRun:
+        """Return the search at its beginning."""
+        return CmaEsRun(self, np.asarray(parameters, dtype=float), np.asarray(scale, dtype=float), seed)
+
+
+class CmaEsRun:
+    """A search in progress; it is the same again when the same values are told."""
+
+    def __init__(self, settings: CmaEs, parameters: np.ndarray, scale: np.ndarray, seed: int) -> None:
+        import cma  # takes 0.7 s
+
+        self._origin, self._scale = parameters, scale
+        rng = np.random.default_rng(seed)
+        options = {
+            "popsize": settings.candidates,
+            "randn": lambda *shape: rng.standard_normal(shape),  # cma would draw from numpy's global generator
+            "seed": np.nan,  # leaves that generator alone
+            "verbose": -9,
+            "maxiter": settings.generations,
+            "tolfun": 0.0,
+            "tolx": 0.0,
+            "tolflatfitness": settings.generations + 1,
+        }
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            self._search = cma.CMAEvolutionStrategy(np.zeros(len(parameters)), settings.sigma, options)
+        self._asked: list[np.ndarray] = []
+
+    def ask(self) -> list[np.ndarray]:
+        """Return the candidates of the next generation, each of shape (n_parameters,)."""
+        self._asked = self._search.ask()
+        return [self._origin + self._scale * candidate for candidate in self._asked]
+
+    def tell(self, values: Sequence[float]) -> None:
+        """Take the candidates' values, larger is better, in the order of `ask`."""
+        if len(values) != len(self._asked):
+            raise ValueError(f"{len(values)=} but {len(self._asked)=}")
+        self._search.tell(self._asked, [-value for value in values])

@@ -1,0 +1,1 @@
+"""What acts: parameters and a pure step from observation to action."""

@@ -1,0 +1,36 @@
+"""What a policy is: a vector of parameters with names and scales, a start posture, and a pure way to act."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from gsl.core.layout import Layout
+
+
+class PolicyRun(Protocol):
+    """A policy in one episode."""
+
+    def act(self, observation: np.ndarray) -> np.ndarray:
+        """Return desired joint positions [rad], shape (n_joints,)."""
+
+
+@runtime_checkable
+class Policy(Protocol):
+    """A family of policies; one member is a parameter vector."""
+
+    names: tuple[str, ...]
+    initial: np.ndarray
+    scale: np.ndarray
+
+    def posture(self, parameters: np.ndarray, layout: Layout) -> np.ndarray:
+        """Return the joint positions where an episode starts [rad], shape (n_joints,)."""
+
+    def start(self, parameters: np.ndarray, layout: Layout) -> PolicyRun:
+        """Return the policy at the beginning of an episode."""
+
+
+def neighbour(policy: Policy, parameters: np.ndarray, spread: float, rng: np.random.Generator) -> np.ndarray:
+    """Return parameters near others: each moved by a Gaussian of `spread` times its scale."""
+    return parameters + spread * policy.scale * rng.standard_normal(len(parameters))

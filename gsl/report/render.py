@@ -1,0 +1,73 @@
+"""Pictures of the robot: standing, as a strip of a walk, as a moving picture; walks are posed from logged angles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from gsl.core.body import Robot, lumped
+from gsl.core.trajectory import Trajectory
+from gsl.worlds.camera import Camera, View
+from gsl.worlds.start import lowest_point
+
+
+def portrait(robot: Robot, path: Path, *, width: int = 800, height: int = 900) -> None:
+    """Write a picture of the robot standing in its stance."""
+    body = lumped(robot)
+    positions = np.array([robot.stance.get(name, 0.0) for name in robot.motors])
+    place = (0.0, 0.0, -lowest_point(body, positions))
+    with _camera(robot) as camera:
+        camera.pose(dict(zip(robot.motors, positions, strict=True)), place, (0.0, 0.0, 0.0, 1.0))
+        view = View((0.0, 0.0, 0.87 * place[2]), 1.65)
+        _write(camera.picture(view, width, height), path)
+
+
+def walk_strip(robot: Robot, trajectory: Trajectory, path: Path, *, frames: int = 8, height: int = 260) -> None:
+    """Write equally spaced moments of a walk side by side, seen from the side."""
+    rows = np.linspace(0, len(trajectory), frames).round().astype(int)
+    with _camera(robot) as camera:
+        pictures = [_frame(camera, robot, trajectory, row, round(0.62 * height), height) for row in rows]
+    _write(np.concatenate(pictures, axis=1), path)
+
+
+def walk_gif(
+    robot: Robot, trajectory: Trajectory, path: Path, *, width: int = 320, height: int = 240, frames: int = 60
+) -> None:
+    """Write a walk as a moving picture in real time, of at most `frames` frames."""
+    from PIL import Image
+
+    stride = -(-(len(trajectory) + 1) // frames)
+    rows = range(0, len(trajectory) + 1, stride)
+    with _camera(robot) as camera:
+        images = [Image.fromarray(_frame(camera, robot, trajectory, row, width, height)) for row in rows]
+    period = 1000.0 * float(np.median(np.diff(trajectory.time))) * stride
+    images[0].save(path, save_all=True, append_images=images[1:], duration=round(period), loop=0)
+
+
+def _frame(camera: Camera, robot: Robot, trajectory: Trajectory, row: int, width: int, height: int) -> np.ndarray:
+    sensors = trajectory.sensors
+    place = [float(sensors[f"base.position.{axis}"][row]) for axis in "xyz"]
+    turn = [float(sensors[f"base.orientation.{part}"][row]) for part in "xyzw"]
+    angles = dict(zip(robot.controlled, trajectory.position[row], strict=True))
+    angles |= {motor: angles[driver] for motor, driver in robot.coupled.items()}
+    camera.pose(angles, place, turn)
+    middle = (place[0], place[1], 0.27)
+    return camera.picture(View(middle, 1.7, yaw=115.0, pitch=-8.0), width, height)
+
+
+@contextmanager
+def _camera(robot: Robot) -> Iterator[Camera]:
+    camera = Camera(robot)
+    try:
+        yield camera
+    finally:
+        camera.close()
+
+
+def _write(image: np.ndarray, path: Path) -> None:
+    from PIL import Image
+
+    Image.fromarray(image).save(path)

@@ -1,0 +1,1 @@
+"""Robots: one file of sourced constants each, and what is derived from them."""

@@ -1,0 +1,84 @@
+"""URDF text of a robot, each link's inertia in its principal axes."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree as xml
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from gsl.core.body import Joint, Link, Robot, Shape
+
+_ALONG = {"x": (0.0, np.pi / 2, 0.0), "y": (np.pi / 2, 0.0, 0.0), "z": (0.0, 0.0, 0.0)}
+
+
+def urdf(robot: Robot, *, visuals: bool = True) -> str:
+    """Return the robot as URDF text; fixed joints stay joints, `visuals=False` leaves out what only shows."""
+    root = xml.Element("robot", name=robot.name)
+    for link in robot.links.values():
+        _add_link(root, link, visuals)
+    for joint in robot.joints:
+        _add_joint(root, joint)
+    xml.indent(root)  # Bullet reads lines of at most 8191 characters
+    return xml.tostring(root, encoding="unicode") + "\n"
+
+
+def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the principal moments [kg·m²], shape (3,), and the rotation from principal to link axes, shape (3, 3)."""
+    moments, axes = np.linalg.eigh(inertia)
+    if np.linalg.det(axes) < 0.0:
+        axes = axes * np.array([1.0, 1.0, -1.0])
+    return moments, axes
+
+
+def _add_link(root: xml.Element, link: Link, visuals: bool) -> None:
+    node = xml.SubElement(root, "link", name=link.name)
+    inertial = xml.SubElement(node, "inertial")
+    moments, axes = principal_axes(link.inertia)
+    _origin(inertial, link.com, Rotation.from_matrix(axes).as_euler("xyz"))
+    xml.SubElement(inertial, "mass", value=_text(link.mass))
+    if 2 * moments.max() > moments.sum():  # Bullet would set such an inertia to zero; the world sets the true moments
+        moments = np.full(3, moments.max())
+    names = {"ixx": moments[0], "iyy": moments[1], "izz": moments[2], "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
+    xml.SubElement(inertial, "inertia", {name: _text(value) for name, value in names.items()})
+    for shape in link.shapes:
+        if visuals:
+            _add_shape(node, "visual", shape)
+        if shape.collides:
+            _add_shape(node, "collision", shape)
+
+
+def _add_shape(node: xml.Element, role: str, shape: Shape) -> None:
+    element = xml.SubElement(node, role)
+    _origin(element, shape.centre, _ALONG[shape.along])
+    geometry = xml.SubElement(element, "geometry")
+    if shape.kind == "box":
+        xml.SubElement(geometry, "box", size=_text(*shape.size))
+    elif shape.kind == "sphere":
+        xml.SubElement(geometry, "sphere", radius=_text(*shape.size))
+    else:
+        radius, length = shape.size
+        xml.SubElement(geometry, "cylinder", radius=_text(radius), length=_text(length))
+    if role == "visual":
+        name = "rgb_" + "_".join(f"{round(255 * c)}" for c in shape.colour)
+        xml.SubElement(xml.SubElement(element, "material", name=name), "color", rgba=_text(*shape.colour, 1.0))
+
+
+def _add_joint(root: xml.Element, joint: Joint) -> None:
+    fixed = joint.fixed_at is not None
+    node = xml.SubElement(root, "joint", name=joint.name, type="fixed" if fixed else "revolute")
+    xml.SubElement(node, "parent", link=joint.parent)
+    xml.SubElement(node, "child", link=joint.child)
+    turn = Rotation.from_rotvec(joint.axis * joint.fixed_at).as_euler("xyz") if fixed else (0.0, 0.0, 0.0)
+    _origin(node, joint.origin, turn)
+    xml.SubElement(node, "axis", xyz=_text(*joint.axis))
+    limit = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort, "velocity": joint.max_velocity}
+    xml.SubElement(node, "limit", {name: _text(value) for name, value in limit.items()})
+
+
+def _origin(node: xml.Element, xyz: np.ndarray | tuple, rpy: np.ndarray | tuple = (0.0, 0.0, 0.0)) -> None:
+    xml.SubElement(node, "origin", xyz=_text(*xyz), rpy=_text(*rpy))
+
+
+def _text(*values: float) -> str:
+    return " ".join(format(float(value), ".12g") for value in values)

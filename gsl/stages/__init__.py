@@ -1,0 +1,1 @@
+"""One file per subcommand: read, call the components, write."""

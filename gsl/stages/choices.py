@@ -1,0 +1,64 @@
+"""Which parameters a stage starts from: a policy's own, or one that an artifact holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gsl.core.described import described
+from gsl.errors import ArtifactError
+from gsl.policies.policy import Policy
+from gsl.storage.policies import Policies, PolicyRecord, read_policies
+from gsl.storage.references import resolve
+
+FILE = "policies.json"
+
+
+@dataclass(frozen=True)
+class PolicyChoice:
+    """A policy family and the reference to the parameters, None for the family's start values."""
+
+    policy: Policy
+    reference: str | None
+
+    def parents(self, role: str) -> Mapping[str, Path]:
+        """Return what is read, by role."""
+        return {} if self.reference is None else {role: resolve(self.reference)}
+
+    def parameters(self) -> np.ndarray:
+        """Return the parameters, shape (n_parameters,): those of the last record of the file."""
+        if self.reference is None:
+            return self.policy.initial
+        return vector(self.policy, records(self.policy, self.reference)[-1])
+
+
+def records(policy: Policy, reference: str) -> tuple[PolicyRecord, ...]:
+    """Return the policies of a file or artifact.
+
+    Raises:
+        ArtifactError: if they are of another family.
+    """
+    path = resolve(reference)
+    found = read_policies(path / FILE if path.is_dir() else path)
+    if found.policy != described(policy):
+        raise ArtifactError(path, f"its policies are of {found.policy}, not of {described(policy)}; choose policy= accordingly")
+    return found.records
+
+
+def vector(policy: Policy, record: PolicyRecord) -> np.ndarray:
+    """Return a record's parameters in the policy's order, shape (n_parameters,)."""
+    return np.array([record.parameters[name] for name in policy.names])
+
+
+def record(policy: Policy, name: str, parameters: np.ndarray, **more: Any) -> PolicyRecord:
+    """Return parameters, shape (n_parameters,), as a record."""
+    return PolicyRecord(name, dict(zip(policy.names, parameters.tolist(), strict=True)), **more)
+
+
+def policies(policy: Policy, task: Any, found: list[PolicyRecord]) -> Policies:
+    """Return what a policy file holds."""
+    return Policies(described(policy), described(task), tuple(found))

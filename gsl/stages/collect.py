@@ -1,0 +1,84 @@
+"""Collect trajectories of a policy, and of its neighbours, in a world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+
+from gsl.core.described import described
+from gsl.core.seeds import derived_seed
+from gsl.core.setting import component, setting
+from gsl.core.trajectory import Batch
+from gsl.grounding.ane import ActionNoise
+from gsl.policies.policy import Policy, neighbour
+from gsl.stages.choices import PolicyChoice
+from gsl.stages.population import Job, trajectories
+from gsl.stages.rollout import Scenario
+from gsl.storage.trajectories import write
+from gsl.tasks.task import Task
+from gsl.worlds.world import World
+
+FILE = "trajectories.parquet"
+
+
+@component
+class Collect:
+    """`episodes` of the policy itself, then `neighbours` episodes of one perturbed policy each."""
+
+    kind: ClassVar[str] = "collect"
+
+    world: Annotated[World, setting("where to collect")]
+    task: Annotated[Task, setting("what ends an episode, and its reward")]
+    policy: Annotated[Policy, setting("what acts")]
+    role: Annotated[Literal["real", "sim"], setting("whose part the world plays")]
+    episodes: Annotated[int, setting("episodes of the policy itself", ge=1)]
+    neighbours: Annotated[int, setting("episodes of perturbed policies", ge=0)] = 0
+    spread: Annotated[float, setting("size of the perturbation, in units of a parameter's scale", ge=0)] = 0.07
+    action_noise: Annotated[float, setting("Gaussian noise on every action", unit="rad", ge=0)] = 0.0
+    initial: Annotated[str | None, setting("policies file or artifact of the policy; none for its start values")] = None
+    workers: Annotated[int, setting("processes; -1 for one a core")] = -1
+    seed: Annotated[int, setting("of all randomness", ge=0)] = 1
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the artifact that the parameters come from, if any."""
+        return PolicyChoice(self.policy, self.initial).parents("initial")
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write one parquet file."""
+        parameters = PolicyChoice(self.policy, self.initial).parameters()
+        scenario = Scenario(self.world, self.task, self.policy, self.role, ActionNoise(sd=self.action_noise))
+        names, jobs = self._jobs(parameters)
+        with console.progress(len(jobs), f"collecting in the {self.role} world") as progress:
+            episodes = trajectories(scenario, jobs, workers=self.workers, progress=progress)
+        layout = self.world.layout
+        labels = [{"policy": name, "parameters": job.parameters.tolist()} for name, job in zip(names, jobs, strict=True)]
+        about = {
+            "robot": self.world.robot,
+            "role": self.role,
+            "source": "gsl collect",
+            "seed": self.seed,
+            "world": described(self.world),
+            "policy": described(self.policy),
+            "action_noise": self.action_noise,
+            "episodes": labels,
+        }
+        write(folder / FILE, Batch(tuple(episodes), layout.joints, layout.control_period, about))
+        falls = sum(episode.ended_in_a_fall for episode in episodes)
+        values = [episode.value for episode in episodes[: self.episodes]]
+        return {
+            "episodes": len(jobs),
+            "real_episodes": len(jobs) if self.role == "real" else 0,
+            "steps": sum(map(len, episodes)),
+            "falls": falls,
+            "value": float(np.mean(values)),
+        }
+
+    def _jobs(self, parameters: np.ndarray) -> tuple[list[str], list[Job]]:
+        rng = np.random.default_rng(derived_seed(self.seed, self.kind, self.role))
+        near = [neighbour(self.policy, parameters, self.spread, rng) for _ in range(self.neighbours)]
+        names = ["pi0"] * self.episodes + [f"neighbour_{index + 1:02d}" for index in range(self.neighbours)]
+        chosen = [parameters] * self.episodes + near
+        return names, [Job(theta, derived_seed(self.seed, self.kind, self.role, index)) for index, theta in enumerate(chosen)]

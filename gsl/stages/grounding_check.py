@@ -1,0 +1,197 @@
+"""The check of a grounding before anything is optimised in it: is the grounded simulator nearer to the real robot?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gsl.core.seeds import derived_seed
+from gsl.core.trajectory import Batch
+from gsl.errors import InputError
+from gsl.grounding.gat import LoadedTransformation
+from gsl.grounding.none import NoGrounding
+from gsl.stages.grounding_replay import TICKS, Deviations, places, replayed, unmoved
+from gsl.stages.rollout import Scenario, rollout
+from gsl.stages.training import degrees, degrees_by_joint, of_policy
+
+PI0, OFF = "pi0", "off_pi0"
+GROUNDED, BARE, STILL = "grounded", "ungrounded", "no_change"
+REPLAYS = 60  # of each group of trajectories, at most
+EPISODES = 4  # of pi0 in the grounded simulator
+ALPHAS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3)
+
+
+@dataclass(frozen=True)
+class GroundingReport:
+    """What is known of a grounding.
+
+    Attributes:
+        deviations: By group (pi0, off_pi0), simulator (grounded, ungrounded, no_change) and ticks.
+        joints: Names of the joints.
+        episodes: Of pi0 in the grounded simulator.
+        falls: How many of them ended in a fall.
+        values: Their values, shape (episodes,).
+        alpha: How far the grounding goes, where that is known.
+    """
+
+    deviations: Mapping[str, Mapping[str, Mapping[int, Deviations]]]
+    joints: tuple[str, ...]
+    episodes: int
+    falls: int
+    values: np.ndarray
+    alpha: float | None = None
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why nothing should be optimised in this grounding, in words."""
+        group = OFF if OFF in self.deviations else PI0
+        errors = {name: degrees(self.deviations[group][name][TICKS].joints) for name in (GROUNDED, BARE)}
+        found = []
+        if errors[GROUNDED] > errors[BARE]:
+            against = f"{errors[GROUNDED]:.2f}°, without grounding {errors[BARE]:.2f}°"
+            found.append(f"after {TICKS} ticks the joints {_named(group)} are farther from the real ones: {against}")
+        if self.falls:
+            found.append(f"π0 falls in {self.falls} of {self.episodes} episodes of the grounded simulator")
+        return tuple(found)
+
+    @property
+    def acceptable(self) -> bool:
+        """Whether there is no problem."""
+        return not self.problems
+
+    def metrics(self) -> dict[str, Any]:
+        """Return everything as a JSON document."""
+        errors = {
+            group: {
+                name: {_span(ticks): self._errors(one) for ticks, one in by_ticks.items()}
+                for name, by_ticks in sims.items()
+            }
+            for group, sims in self.deviations.items()
+        }
+        pi0 = {"episodes": self.episodes, "falls": self.falls, "value": float(np.mean(self.values))}
+        return {
+            "alpha": self.alpha,
+            "errors": errors,
+            "pi0": pi0,
+            "acceptable": self.acceptable,
+            "problems": self.problems,
+        }
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return a table for people; its titles are `TITLES`."""
+        return [
+            (_named(group), name.replace("_", " "), *_cells(by_ticks[1]), *_cells(by_ticks[TICKS]))
+            for group, simulators in self.deviations.items()
+            for name, by_ticks in simulators.items()
+        ]
+
+    def _errors(self, one: Deviations) -> dict[str, Any]:
+        return {
+            "replays": len(one),
+            "joints_deg": degrees(one.joints),
+            "pitch_deg": degrees(one.pitch),
+            "forward_mm": 1000.0 * float(np.sqrt(np.mean(one.forward**2))),
+            "by_joint_deg": degrees_by_joint(one.joints, self.joints),
+        }
+
+
+TITLES = (
+    *("trajectories", "simulator", "joints 1 tick [°]", "pitch 1 tick [°]", "forward 1 tick [mm]"),
+    *("joints 0.2 s [°]", "pitch 0.2 s [°]", "forward 0.2 s [mm]"),
+)
+
+
+def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int) -> GroundingReport:
+    """Measure a grounding.
+
+    Args:
+        scenario: The simulator with the task, the policy and the grounding.
+        parameters: Of π0, shape (n_parameters,).
+        heldout: Real trajectories that no model has seen.
+        seed: Of all randomness.
+
+    Raises:
+        InputError: The trajectories are of other joints, or lack what a simulation starts from.
+    """
+    layout = scenario.world.layout
+    if heldout.joints != layout.joints:
+        raise InputError(
+            f"the held-out trajectories are of {', '.join(heldout.joints)}, not of {', '.join(layout.joints)}"
+        )
+    env = scenario.world.make()
+    try:
+        deviations = {
+            group: _compared(env, scenario.grounding, of_policy(heldout, pi0=group == PI0), seed)
+            for group in (PI0, OFF)
+        }
+    except KeyError as error:
+        raise InputError(f"the real trajectories lack {error.args[0]}: no simulation can start from them") from error
+    finally:
+        env.close()
+    ran = _grounded_pi0(scenario, parameters, derived_seed(seed, EPISODES))
+    return GroundingReport(
+        {group: found for group, found in deviations.items() if found},
+        layout.joints,
+        len(ran),
+        sum(fell for _, fell in ran),
+        np.array([value for value, _ in ran]),
+        getattr(scenario.grounding, "alpha", None),
+    )
+
+
+def largest_stable_alpha(scenario: Scenario, parameters: np.ndarray, seed: int) -> float:
+    """Return the largest alpha at which π0 stays up in all of `EPISODES` grounded episodes, else the least one tried.
+
+    Args:
+        scenario: With a `LoadedTransformation` as its grounding.
+        parameters: Of π0, shape (n_parameters,).
+        seed: Of all randomness.
+    """
+    grounding = scenario.grounding
+    assert isinstance(grounding, LoadedTransformation)
+    for alpha in ALPHAS:
+        tried = replace(scenario, grounding=replace(grounding, alpha=alpha))
+        if not any(fell for _, fell in _grounded_pi0(tried, parameters, seed, patient=False)):
+            return alpha
+    return ALPHAS[-1]
+
+
+def _compared(env: Any, grounding: Any, episodes: Sequence[Any], seed: int) -> dict[str, dict[int, Deviations]]:
+    starts = places(episodes, env.layout, REPLAYS)
+    if not starts:
+        return {}
+    return {
+        GROUNDED: replayed(env, grounding, starts, seed),
+        BARE: replayed(env, NoGrounding(), starts, seed),
+        STILL: unmoved(env.layout, starts),
+    }
+
+
+def _grounded_pi0(
+    scenario: Scenario, parameters: np.ndarray, seed: int, *, patient: bool = True
+) -> list[tuple[float, bool]]:
+    """Return value and fall of some episodes; the impatient stop at the first fall."""
+    env, done = scenario.make(), []
+    for index in range(EPISODES):
+        episode = rollout(scenario, env, parameters, derived_seed(seed, index))
+        done.append((episode.value, episode.ended_in_a_fall))
+        if episode.ended_in_a_fall and not patient:
+            break
+    env.close()
+    return done
+
+
+def _cells(one: Deviations) -> tuple[str, str, str]:
+    forward = 1000.0 * float(np.sqrt(np.mean(one.forward**2)))
+    return f"{degrees(one.joints):.2f}", f"{degrees(one.pitch):.2f}", f"{forward:.1f}"
+
+
+def _named(group: str) -> str:
+    return "of π0" if group == PI0 else "off π0"
+
+
+def _span(ticks: int) -> str:
+    return "one_tick" if ticks == 1 else f"{ticks}_ticks"

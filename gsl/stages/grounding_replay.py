@@ -1,0 +1,118 @@
+"""Open-loop replay: held-out real actions, from real states, in the simulator, and how far off it is after 0.2 s."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from gsl.core.layout import Layout
+from gsl.core.observation import observations
+from gsl.core.trajectory import Trajectory
+from gsl.core.transitions import usable
+from gsl.grounding.grounding import Grounding
+from gsl.worlds.bullet import BulletEnv
+from gsl.worlds.engine import Reading
+from gsl.worlds.start import Start
+
+TICKS = 10  # of a replay: 0.2 s at 50 Hz
+PAST = 6  # ticks for which the grounding watches the real robot before
+STRIDE = 15  # ticks from one replay to the next
+
+
+class Place(NamedTuple):
+    """Where a replay begins: an episode's observations, shape (T + 1, layout.size), its actions, and the tick."""
+
+    seen: np.ndarray
+    actions: np.ndarray
+    tick: int
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Simulated less real, one row a replay.
+
+    Attributes:
+        joints: [rad], shape (N, n_joints).
+        pitch: Of the body [rad], shape (N,).
+        forward: Of the body's place [m], shape (N,).
+    """
+
+    joints: np.ndarray
+    pitch: np.ndarray
+    forward: np.ndarray
+
+    def __len__(self) -> int:
+        """Number of replays."""
+        return len(self.pitch)
+
+
+def places(episodes: Sequence[Trajectory], layout: Layout, limit: int) -> list[Place]:
+    """Return where replays begin, `limit` at most, spread evenly over the episodes.
+
+    Raises:
+        KeyError: with the name of a column that was not recorded.
+    """
+    found = []
+    for episode in episodes:
+        seen = observations(episode, layout)
+        found += [Place(seen, episode.action, tick) for tick in range(PAST, usable(episode) - TICKS + 1, STRIDE)]
+    chosen = np.unique(np.linspace(0, len(found) - 1, min(limit, len(found))).round().astype(int)) if found else ()
+    return [found[index] for index in chosen]
+
+
+def replayed(env: BulletEnv, grounding: Grounding, starts: Sequence[Place], seed: int) -> dict[int, Deviations]:
+    """Return the deviations of a simulator with a grounding after one tick and after `TICKS`."""
+    ends: dict[int, list[np.ndarray]] = {1: [], TICKS: []}
+    for index, place in enumerate(starts):
+        rng = np.random.default_rng([seed, index])
+        for tick, observation in enumerate(_replay(env, grounding, place, rng), start=1):
+            if tick in ends:
+                ends[tick].append(observation)
+    return {tick: _deviations(env.layout, np.array(seen), starts, tick) for tick, seen in ends.items()}
+
+
+def unmoved(layout: Layout, starts: Sequence[Place]) -> dict[int, Deviations]:
+    """Return the deviations of a prediction that nothing changes."""
+    seen = np.array([place.seen[place.tick] for place in starts])
+    return {tick: _deviations(layout, seen, starts, tick) for tick in (1, TICKS)}
+
+
+def _replay(env: BulletEnv, grounding: Grounding, place: Place, rng: np.random.Generator) -> Iterator[np.ndarray]:
+    """Yield the observations after each tick; the simulator takes over from the real robot at `place.tick`."""
+    run, tick = grounding.start(env.layout, rng), place.tick
+    sent = [run.transform(place.seen[k], place.actions[k]) for k in range(tick - PAST, tick)]
+    start = _start(env, place.seen[tick], np.array(sent[::-1]))
+    observation, _ = env.reset(seed=int(rng.integers(2**31)), options={"start": start})
+    observation[env.layout["foot_force"]] = place.seen[tick][env.layout["foot_force"]]  # no contact is solved yet
+    for k in range(tick, tick + TICKS):
+        observation, *_ = env.step(run.transform(observation, place.actions[k]))
+        yield observation
+
+
+def _start(env: BulletEnv, seen: np.ndarray, sent: np.ndarray) -> Start:
+    layout, drive = env.layout, env.world.plant.robot.drive
+    motion = np.array([seen[layout["position"]][drive], seen[layout["velocity"]][drive]])
+    quaternion = tuple(seen[layout["base.orientation"]].tolist())
+    parts = (seen[layout[part]] for part in ("base.position", "base.velocity", "gyro"))
+    place, velocity, gyro = (part.copy() for part in parts)
+    return Start(Reading(motion, place, quaternion, velocity, gyro, 1.0, ()), sent[:, drive])
+
+
+def _deviations(layout: Layout, seen: np.ndarray, starts: Sequence[Place], ticks: int) -> Deviations:
+    real = np.array([place.seen[place.tick + ticks] for place in starts])
+    forward = layout["base.position"].start
+    turn = layout["base.orientation"]
+    return Deviations(
+        joints=seen[:, layout["position"]] - real[:, layout["position"]],
+        pitch=_pitch(seen[:, turn]) - _pitch(real[:, turn]),
+        forward=seen[:, forward] - real[:, forward],
+    )
+
+
+def _pitch(quaternion: np.ndarray) -> np.ndarray:
+    pitch: np.ndarray = Rotation.from_quat(quaternion).as_euler("ZYX")[:, 1]
+    return pitch

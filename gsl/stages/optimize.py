@@ -1,0 +1,86 @@
+"""Improve a policy in the simulator, grounded or not; the best candidate of every generation is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from gsl.core.seeds import derived_seed
+from gsl.core.setting import component, setting
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.grounding import Grounding
+from gsl.optimizers.cma_es import CmaEs
+from gsl.policies.policy import Policy
+from gsl.stages.choices import FILE, PolicyChoice, policies, record
+from gsl.stages.generations import Generation, GenerationLog
+from gsl.stages.grounding_gate import grounded, grounding_parents
+from gsl.stages.population import Job, episodes
+from gsl.stages.rollout import Scenario
+from gsl.storage.policies import write_policies
+from gsl.tasks.task import SIM, Task
+from gsl.worlds.world import World
+
+
+@component
+class Optimize:
+    """Candidates are judged by the mean value of `rollouts` episodes each; a killed search goes on where it was."""
+
+    kind: ClassVar[str] = "optimize"
+    resumable: ClassVar[bool] = True
+
+    world: Annotated[World, setting("the simulator")]
+    task: Annotated[Task, setting("what is to be maximised")]
+    policy: Annotated[Policy, setting("what is to be improved")]
+    grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
+    optimizer: Annotated[CmaEs, setting("what improves the parameters")]
+    rollouts: Annotated[int, setting("episodes of each candidate", ge=1)]
+    initial: Annotated[str | None, setting("policies file or artifact to start from; none for the start values")] = None
+    accept: Annotated[bool, setting("go on with a grounding that fails its check")] = False
+    workers: Annotated[int, setting("processes; -1 for one a core")] = -1
+    seed: Annotated[int, setting("of all randomness", ge=0)] = 1
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the start policy and what the grounding is made of."""
+        return {**PolicyChoice(self.policy, self.initial).parents("initial"), **grounding_parents(self.grounding)}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write the generations' log and the policies: π0 first, then the best of each generation."""
+        first = PolicyChoice(self.policy, self.initial).parameters()
+        bare = Scenario(self.world, self.task, self.policy, SIM, self.grounding)
+        scenario, checked = grounded(bare, first, folder, console, accept=self.accept, seed=self.seed)
+        log = GenerationLog(folder)
+        search = self.optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
+        found = [record(self.policy, "pi0", first)]
+        total = self.optimizer.generations * self.optimizer.candidates * self.rollouts
+        with console.progress(total, "optimising in simulation") as progress:
+            for index in range(self.optimizer.generations):
+                candidates = search.ask()
+                generation = log.read(index)
+                if generation is None:
+                    generation = self._evaluated(scenario, candidates, index, progress)
+                    log.append(generation)
+                else:
+                    progress.advance(len(candidates) * self.rollouts)
+                search.tell(generation.values)
+                best = int(np.argmax(generation.values))
+                found.append(self._record(index, candidates[best], generation.values[best]))
+        write_policies(folder / FILE, policies(self.policy, self.task, found))
+        return {"generations": len(found) - 1, "best_value_sim": max(p.value_sim or -np.inf for p in found), **checked}
+
+    def _evaluated(self, scenario: Scenario, candidates: list[np.ndarray], index: int, progress: Any) -> Generation:
+        jobs = [
+            Job(candidate, derived_seed(self.seed, self.kind, index, number, rollout))
+            for number, candidate in enumerate(candidates)
+            for rollout in range(self.rollouts)
+        ]
+        done = episodes(scenario, jobs, workers=self.workers, progress=progress)
+        shape = (len(candidates), self.rollouts)
+        values = np.array([episode.value for episode in done]).reshape(shape).mean(axis=1)
+        falls = np.array([episode.fell for episode in done]).reshape(shape).sum(axis=1)
+        return Generation(index, values.tolist(), falls.tolist())
+
+    def _record(self, index: int, parameters: np.ndarray, value: float) -> Any:
+        return record(self.policy, f"generation_{index + 1:02d}", parameters, generation=index + 1, value_sim=value)

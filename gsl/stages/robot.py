@@ -1,0 +1,36 @@
+"""The robot as files that other programs and people can look at: its URDF and a picture of it standing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from gsl.report.render import portrait
+from gsl.robots.catalogue import robot
+from gsl.robots.urdf import urdf
+
+
+def write_robot(name: str, folder: Path, console: Any) -> None:
+    """Write <name>.urdf and <name>.png.
+
+    Args:
+        name: Of the robot, such as `nao`.
+        folder: Where to; made if it does not exist.
+        console: Where to say so.
+
+    Raises:
+        ConfigError: if there is no such robot.
+    """
+    body = robot(name)
+    folder.mkdir(parents=True, exist_ok=True)
+    model, picture = folder / f"{body.name}.urdf", folder / f"{body.name}.png"
+    model.write_text(urdf(body), encoding="utf-8")
+    portrait(body, picture)
+    about = f"{body.name}: {len(body.controlled)} controlled joints, {len(body.links)} links, {body.mass:.3f} kg"
+    document = {
+        "robot": body.name,
+        "mass_kg": body.mass,
+        "joints": list(body.controlled),
+        "files": [str(model), str(picture)],
+    }
+    console.result(document, text=f"{about}\n{model}\n{picture}")

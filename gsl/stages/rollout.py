@@ -1,0 +1,79 @@
+"""One episode of a policy at a task in a world: a function of these and the seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import gymnasium
+import numpy as np
+
+from gsl.core.layout import Layout
+from gsl.core.trajectory import Trajectory
+from gsl.grounding.grounding import Grounding
+from gsl.policies.policy import Policy
+from gsl.tasks.task import Task
+from gsl.worlds.grounded import GroundedEnv
+from gsl.worlds.world import World
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Everything of a rollout but the parameters and the seed."""
+
+    world: World
+    task: Task
+    policy: Policy
+    role: str
+    grounding: Grounding
+
+    def make(self) -> gymnasium.Env:
+        """Build the environment that `rollout` acts in."""
+        return GroundedEnv(self.world.make(), self.grounding)
+
+
+def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed: int) -> Trajectory:
+    """Run one episode.
+
+    Args:
+        scenario: What is to be done.
+        env: From `scenario.make`; nothing of earlier episodes stays in it.
+        parameters: Of the policy.
+        seed: Of the world and of the grounding.
+    """
+    layout = scenario.world.layout
+    observation, _ = env.reset(seed=seed, options={"posture": scenario.policy.posture(parameters, layout)})
+    policy = scenario.policy.start(parameters, layout)
+    task = scenario.task.start(layout, observation, scenario.role)
+    observations, actions, sent, rewards, fell = [observation], [], [], [], False
+    for _ in range(round(scenario.task.duration / layout.control_period)):
+        action = policy.act(observation)
+        before, (observation, _, fell, _, info) = observation, env.step(action)
+        judged = task.step(before, observation, fell)
+        observations.append(observation)
+        actions.append(action)
+        sent.append(info["grounded_action"])
+        rewards.append(judged.reward)
+        if fell or judged.ended:
+            break
+    trajectory = _recorded(layout, np.array(observations), np.array(actions), np.array(rewards), fell=fell)
+    grounded = np.array(sent)
+    return trajectory if np.array_equal(grounded, actions) else replace(trajectory, grounded_action=grounded)
+
+
+def _recorded(layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, fell: bool) -> Trajectory:
+    sensors = {
+        column: states[:, layout[part].start + index]
+        for part, columns in layout.columns.items()
+        for index, column in enumerate(columns)
+    }
+    down = np.zeros(len(states), dtype=bool)
+    down[-1] = fell
+    return Trajectory(
+        time=layout.control_period * np.arange(len(states)),
+        action=actions,
+        position=states[:, layout["position"]],
+        velocity=states[:, layout["velocity"]],
+        reward=rewards,
+        fell=down,
+        sensors=sensors,
+    )

@@ -1,0 +1,129 @@
+"""Train the forward model: learn from trajectories of the real robot how it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from gsl.core.angles import encode
+from gsl.core.setting import component, setting
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.core.transitions import Transitions, transitions
+from gsl.errors import TrajectoryError
+from gsl.models.choice import best, fit_network
+from gsl.models.config import ModelConfig
+from gsl.models.forward import ForwardModel
+from gsl.models.free_run import TICKS, predicted_error, segments, standstill_error
+from gsl.models.network import Samples
+from gsl.stages.training import (
+    Parts,
+    checked,
+    data_file,
+    degrees,
+    degrees_by_joint,
+    explained,
+    of_policy,
+    parts,
+    summary,
+)
+from gsl.storage.models import write_model
+from gsl.storage.trajectories import write
+
+HELDOUT = "heldout.parquet"
+
+
+@component
+class TrainForward:
+    """Fits f to a part of the real trajectories and measures it on the rest, which it stores beside the model.
+
+    `auto` takes the family whose own prediction, fed back to it for 0.2 s, is nearest to the held-out trajectories,
+    those off pi0 if there are any: the error of one tick says little, for in a gait all joints move together.
+    """
+
+    kind: ClassVar[str] = "train_forward"
+
+    data: Annotated[str, setting("real trajectories: a file, or a run or artifact of collect", min_length=1)]
+    model: Annotated[ModelConfig, setting("what to fit")]
+    heldout: Annotated[float, setting("share of the trajectories that is held out", gt=0, lt=1)] = 0.2
+    seed: Annotated[int, setting("of the split and of the fit", ge=0)] = 1
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the file of trajectories, or the artifact."""
+        path = data_file(self.data)
+        return {"data": path if path == Path(self.data) else path.parent}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write the model and the trajectories it has not seen."""
+        path = data_file(self.data)
+        data = parts(path, share=self.heldout, seed=self.seed)
+        self._check(path, data)
+        console.status(f"fitting a forward model to {len(data.training)} trajectories")
+        judges = of_policy(data.heldout, pi0=False) or data.heldout.episodes
+        model, choice = best(
+            self.model, lambda family: self._fitted(family, data), lambda model: self._score(model, judges)
+        )
+        write_model(folder, model)
+        write(folder / HELDOUT, data.heldout)
+        groups = {"pi0": of_policy(data.heldout, pi0=True), "off_pi0": of_policy(data.heldout, pi0=False)}
+        measured = {name: measures(model, episodes) for name, episodes in groups.items() if episodes}
+        show(console, measured)
+        return {**summary(choice), "trajectories": len(data.training) + len(data.validation), "heldout": measured}
+
+    def _check(self, path: Path, data: Parts) -> None:
+        needed = self.model.of_body.span + TICKS + self.model.horizon
+        try:
+            for part in data:
+                long = checked(path, part.episodes, needed)
+                self._transitions(long)
+        except KeyError as error:
+            raise TrajectoryError(
+                path, "was not recorded; leave the sensor out of model.sensors", column=error.args[0]
+            ) from error
+
+    def _transitions(self, episodes: Sequence[Trajectory]) -> Transitions:
+        return transitions(episodes, self.model.of_body, self.model.horizon, carried_out=False)
+
+    def _fitted(self, family: str, data: Parts) -> ForwardModel:
+        config = self.model
+        known, unseen = (self._samples(part) for part in (data.training, data.validation))
+        network = fit_network(family, known, unseen, config, seed=self.seed)
+        return ForwardModel(network, config.of_body, data.training.joints, config.encoding, config.horizon)
+
+    def _samples(self, part: Batch) -> Samples:
+        rows = self._transitions(part.episodes)
+        return rows.windows, encode(rows.change, self.model.encoding)
+
+    def _score(self, model: ForwardModel, episodes: Sequence[Trajectory]) -> float:
+        measured = measures(model, episodes)
+        return float(measured["free_run_deg"] if model.horizon == 1 else measured["one_step_deg"])
+
+
+def measures(model: ForwardModel, episodes: Sequence[Trajectory]) -> dict[str, Any]:
+    """Return the errors of a forward model on trajectories, beside those of "nothing changes" [degrees]."""
+    data = transitions(episodes, model.history, model.horizon, carried_out=False)
+    pieces = segments(episodes, model.history, carried_out=False)
+    errors = model.effects(data.windows) - data.change
+    measured = {
+        "trajectories": len(episodes),
+        "one_step_deg": degrees(errors),
+        "one_step_no_change_deg": degrees(data.change),
+        "r2": explained(errors, data.change),
+        "one_step_by_joint_deg": degrees_by_joint(errors, model.joints),
+        "free_run_no_change_deg": degrees(standstill_error(pieces)),
+    }
+    if model.horizon == 1:
+        ahead = predicted_error(model, pieces)
+        measured |= {"free_run_deg": degrees(ahead), "free_run_by_joint_deg": degrees_by_joint(ahead, model.joints)}
+    return measured
+
+
+def show(console: Any, measured: Mapping[str, Mapping[str, Any]]) -> None:
+    """Show the errors on held-out trajectories."""
+    names = ["one_step_deg", "one_step_no_change_deg", "r2", "free_run_deg", "free_run_no_change_deg"]
+    titles = ["policy", "one tick [°]", "no change [°]", "R²", "0.2 s [°]", "no change [°]"]
+    rows = [
+        (group, *(f"{values[name]:.3f}" if name in values else "-" for name in names))
+        for group, values in measured.items()
+    ]
+    console.table("forward model on held-out real trajectories", titles, rows)

@@ -1,0 +1,97 @@
+"""Train the inverse model: learn from trajectories of the simulator which action makes a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+
+from gsl.core.angles import encode
+from gsl.core.setting import component, setting
+from gsl.core.trajectory import Batch
+from gsl.core.transitions import Transitions, transitions
+from gsl.models.choice import best, fit_network
+from gsl.models.config import ModelConfig
+from gsl.models.forward import ForwardModel
+from gsl.models.free_run import TICKS, recovered_error, segments
+from gsl.models.inverse import InverseModel, Regression, Solver
+from gsl.models.linear import fit_linear
+from gsl.models.network import Samples
+from gsl.stages.training import Parts, checked, data_file, degrees, degrees_by_joint, parts, summary
+from gsl.storage.models import write_model
+
+
+@component
+class TrainInverse:
+    """Fits an inverse model of the simulator; the data need action noise, or it cannot tell one joint from another.
+
+    `auto` takes the family that best recovers the actions of held-out trajectories when it sees its own answers as the
+    past actions.
+    """
+
+    kind: ClassVar[str] = "train_inverse"
+
+    data: Annotated[str, setting("simulated trajectories: a file, or a run or artifact of collect", min_length=1)]
+    model: Annotated[ModelConfig, setting("what to fit")]
+    method: Annotated[
+        Literal["regression", "solve"],
+        setting("fit the action (the paper), or solve a model of the simulator for it, the identity where sim = real"),
+    ] = "regression"
+    damping: Annotated[
+        float, setting("of solve: what a change of action costs, in units of the squared sensitivity", gt=0, upper=1.0)
+    ] = 0.2
+    heldout: Annotated[float, setting("share of the trajectories that is held out", gt=0, lt=1)] = 0.2
+    seed: Annotated[int, setting("of the split and of the fit", ge=0)] = 1
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the file of trajectories, or the artifact."""
+        path = data_file(self.data)
+        return {"data": path if path == Path(self.data) else path.parent}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write the model."""
+        path = data_file(self.data)
+        data = parts(path, share=self.heldout, seed=self.seed)
+        for part in data:
+            checked(path, part.episodes, self.model.of_joints.span + TICKS + self.model.horizon)
+        console.status(f"fitting an inverse model to {len(data.training)} trajectories")
+        fit = self._regression if self.method == "regression" else self._solver
+        pieces = segments(data.heldout.episodes, self.model.of_joints, carried_out=True)
+        model, choice = best(
+            self.model, lambda family: fit(family, data), lambda model: degrees(recovered_error(model, pieces))
+        )
+        write_model(folder, model)
+        errors = recovered_error(model, pieces)
+        console.table(
+            "inverse model on held-out simulated trajectories", ["action error [°]"], [(f"{degrees(errors):.3f}",)]
+        )
+        by_joint = degrees_by_joint(errors, model.joints)
+        measured = {"recovered_action_deg": degrees(errors), "recovered_action_by_joint_deg": by_joint}
+        return {**summary(choice), "method": self.method, "trajectories": len(data.training), "heldout": measured}
+
+    def _regression(self, family: str, data: Parts) -> InverseModel:
+        n = len(data.training.joints)
+        known, unseen = (self._turned(self._transitions(part), n) for part in (data.training, data.validation))
+        network = fit_network(family, known, unseen, self.model, seed=self.seed)
+        config, joints = self.model, data.training.joints
+        return Regression(network, config.of_joints, joints, config.encoding, config.horizon)
+
+    def _turned(self, data: Transitions, n: int) -> Samples:
+        """Let the wanted change take the place of the action in the inputs, and the action become the target."""
+        inputs = np.concatenate([data.change, data.windows[:, n:]], axis=1)
+        return inputs, encode(data.windows[:, :n], self.model.encoding)
+
+    def _solver(self, family: str, data: Parts) -> InverseModel:
+        config, joints = self.model, data.training.joints
+        rows = [self._transitions(part) for part in (data.training, data.validation)]
+        known, unseen = ((part.windows, encode(part.change, config.encoding)) for part in rows)
+        network = fit_network(family, known, unseen, config, seed=self.seed)
+        simulator = ForwardModel(network, config.of_joints, joints, config.encoding, config.horizon)
+        plain = fit_linear(rows[0].windows, rows[0].change, ridge=config.ridge)
+        sensitivity = plain.layers[0][0][:, : len(joints)].astype(float)
+        return Solver(simulator, sensitivity, self.damping)
+
+    def _transitions(self, part: Batch) -> Transitions:
+        return transitions(part.episodes, self.model.of_joints, self.model.horizon, carried_out=True)

@@ -1,0 +1,101 @@
+"""What both training stages share: which trajectories they learn from, which they hold out, and how errors are told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gsl.core.split import split
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.core.transitions import usable
+from gsl.errors import TrajectoryError
+from gsl.storage.references import resolve
+from gsl.storage.trajectories import read
+
+DATA = "trajectories.parquet"
+PI0 = "pi0"
+
+
+class Parts(NamedTuple):
+    """A batch in three: what models learn from, what stops their fit, and what nobody has seen."""
+
+    training: Batch
+    validation: Batch
+    heldout: Batch
+
+
+def data_file(reference: str) -> Path:
+    """Return the trajectory file that a path, an artifact of `collect` or a run's name stands for."""
+    found = resolve(reference, kind="collect")
+    return found / DATA if found.is_dir() else found
+
+
+def labels(batch: Batch) -> list[str]:
+    """Return the policy of each episode, pi0 where nothing is said."""
+    return [entry.get("policy", PI0) for entry in batch.metadata.get("episodes") or [{}] * len(batch)]
+
+
+def of_policy(batch: Batch, *, pi0: bool) -> tuple[Trajectory, ...]:
+    """Return the episodes of pi0, or all others."""
+    return tuple(one for one, label in zip(batch.episodes, labels(batch), strict=True) if (label == PI0) == pi0)
+
+
+def parts(path: Path, *, share: float, seed: int) -> Parts:
+    """Read a trajectory file and split it by trajectory.
+
+    Raises:
+        TrajectoryError: The file breaks the contract or holds fewer than three trajectories.
+    """
+    batch = read(path)
+    if len(batch) < 3:
+        raise TrajectoryError(path, f"holds {len(batch)} episodes; three are the least: to fit, to stop, to hold out")
+    rng = np.random.default_rng(seed)
+    rest, heldout = _split(batch, share, rng)
+    return Parts(*_split(rest, share, rng), heldout)
+
+
+def _split(batch: Batch, share: float, rng: np.random.Generator) -> tuple[Batch, Batch]:
+    chosen = split([label == PI0 for label in labels(batch)], share, rng)
+    return _some(batch, chosen.training), _some(batch, chosen.heldout)
+
+
+def _some(batch: Batch, indices: Sequence[int]) -> Batch:
+    entries = batch.metadata.get("episodes") or [{}] * len(batch)
+    metadata = {**batch.metadata, "episodes": [entries[index] for index in indices]}
+    return replace(batch, episodes=tuple(batch.episodes[index] for index in indices), metadata=metadata)
+
+
+def degrees(errors: np.ndarray) -> float:
+    """Return the root mean square of some angles [rad] in degrees."""
+    return float(np.degrees(np.sqrt(np.mean(np.square(errors)))))
+
+
+def degrees_by_joint(errors: np.ndarray, joints: tuple[str, ...]) -> dict[str, float]:
+    """Return the same joint by joint, for errors of shape (N, n_joints)."""
+    return {joint: degrees(errors[:, index]) for index, joint in enumerate(joints)}
+
+
+def explained(errors: np.ndarray, wanted: np.ndarray) -> float:
+    """Return the share of the variance that is explained, R², over all joints."""
+    return float(1.0 - np.sum(errors**2) / np.sum((wanted - wanted.mean(axis=0)) ** 2))
+
+
+def checked(path: Path, episodes: Sequence[Trajectory], needed: int) -> Sequence[Trajectory]:
+    """Return the episodes that are at least `needed` ticks long before a fall.
+
+    Raises:
+        TrajectoryError: None is.
+    """
+    long = [one for one in episodes if usable(one) >= needed]
+    if not long:
+        raise TrajectoryError(path, f"no episode of one part lasts {needed} ticks before a fall; collect longer ones")
+    return long
+
+
+def summary(choice: Any) -> dict[str, Any]:
+    """Return which family was chosen, and the scores, as metrics."""
+    return {"family": choice.family, "scores": dict(choice.scores)}

@@ -1,0 +1,1 @@
+"""Files: trajectories, checkpoints, policies, manifests."""

@@ -1,0 +1,144 @@
+"""An artifact: a folder that one stage wrote whole, with a manifest that says how."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+import yaml
+
+from gsl.errors import ArtifactError
+from gsl.storage import documents, manifest
+from gsl.storage.identity import Identity, changes, identify
+from gsl.storage.manifest import Manifest, Parent
+from gsl.storage.versions import commit, versions
+from gsl.storage.whole import explained, flush_tree
+from gsl.storage.workplace import KEY, install, locked, logged, stoppable, workplace
+
+CONFIG = "config.yaml"
+METRICS = "metrics.json"
+
+
+class Stage(Protocol):
+    """What `build` needs of a stage; one that can go on where it was killed sets `resumable = True` beside `kind`."""
+
+    kind: ClassVar[str]
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return what the stage reads, artifacts or files, by role: the dotted name of the setting that names it."""
+        ...
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write the results into `folder` and return the metrics."""
+        ...
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """A complete artifact.
+
+    Attributes:
+        folder: Where it lies.
+        manifest: How it came about.
+        unchanged: Whether it was there already and no work had to be done.
+    """
+
+    folder: Path
+    manifest: Manifest
+    unchanged: bool = False
+
+    @property
+    def config(self) -> dict[str, Any]:
+        """The resolved settings it was built with."""
+        config: dict[str, Any] = yaml.safe_load((self.folder / CONFIG).read_text(encoding="utf-8"))
+        return config
+
+    @property
+    def metrics(self) -> dict[str, Any]:
+        """The figures its stage reported; null where a number was not finite."""
+        metrics: dict[str, Any] = json.loads((self.folder / self.manifest.metrics).read_text(encoding="utf-8"))
+        return metrics
+
+
+def build(stage: Stage, *, config: Mapping[str, Any], out: Path, command: str, force: bool, console: Any) -> Artifact:
+    """Return the artifact of `stage` in `out`, building it unless it is there already.
+
+    Args:
+        stage: What to run.
+        config: Its resolved settings.
+        out: Folder of the artifact.
+        command: Command line, for the manifest.
+        force: Whether an artifact built otherwise, or damaged, may be replaced.
+        console: Handed to the stage.
+
+    Raises:
+        ArtifactError: `out` is something else, or was built otherwise and `force` is not set, or is being built.
+        GslError: The folder is full or cannot be written.
+    """
+    identity = identify(stage.kind, config, stage.parents())
+    with locked(out), stoppable(), explained(out.parent):
+        if (existing := _existing(out, identity, config, force=force)) is not None:
+            os.utime(out / manifest.NAME)
+            return existing
+        with workplace(out, identity.key, resumable=getattr(stage, "resumable", False)) as folder:
+            made = _work(stage, identity, config, folder, command, console)
+            manifest.write(folder, made)
+            flush_tree(folder)
+            install(folder, out)
+    return Artifact(out, made)
+
+
+def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force: bool) -> Artifact | None:
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return None
+    try:
+        found = Artifact(out, manifest.read(out), unchanged=True)
+    except ArtifactError as error:
+        raise ArtifactError(out, "exists and is no artifact of gsl; move it away or choose another out=") from error
+    damaged = manifest.damaged_file(out, found.manifest)
+    if found.manifest.key == identity.key and damaged is None:
+        return found
+    if force:
+        return None
+    reason = f"changed since: {damaged}" if damaged else changes(found.manifest, found.config, identity, config)
+    raise ArtifactError(out, f"was built otherwise ({reason}); force=true rebuilds it, out= keeps both")
+
+
+def _work(
+    stage: Stage, identity: Identity, config: Mapping[str, Any], folder: Path, command: str, console: Any
+) -> Manifest:
+    begin = time.perf_counter()
+    created = datetime.now(UTC).isoformat(timespec="seconds")
+    settings = yaml.safe_dump(documents.plain(config), sort_keys=False, allow_unicode=True)
+    (folder / CONFIG).write_text(settings, encoding="utf-8")
+    with logged(folder) as logger:
+        logger.info("%s begins: %s", identity.kind, command)
+        metrics = stage.run(folder, console)
+        logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
+    documents.write_json(folder / METRICS, metrics)
+    return Manifest(
+        kind=identity.kind,
+        key=identity.key,
+        command=command,
+        files={name: file for name, file in manifest.inventory(folder).items() if name != KEY},
+        parents=_parents(stage, identity, folder),
+        seeds=identity.seeds,
+        sources=identity.sources,
+        versions=versions(),
+        git=commit(),
+        created=created,
+        duration=time.perf_counter() - begin,
+    )
+
+
+def _parents(stage: Stage, identity: Identity, folder: Path) -> tuple[Parent, ...]:
+    return tuple(
+        Parent(role, Path(os.path.relpath(path, folder)).as_posix(), identity.parents[role])
+        for role, path in stage.parents().items()
+    )

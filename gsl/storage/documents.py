@@ -1,0 +1,52 @@
+"""JSON documents: strict, stable, written whole."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gsl.storage.whole import replacing
+
+
+def plain(value: Any) -> Any:
+    """Return `value` in the types of JSON: arrays become lists, paths text, numbers those of Python."""
+    match value:
+        case Mapping():
+            return {str(key): plain(entry) for key, entry in value.items()}
+        case list() | tuple():
+            return [plain(entry) for entry in value]
+        case np.ndarray() | np.generic():
+            return plain(value.tolist())
+        case Path():
+            return value.as_posix()
+        case _:
+            return value
+
+
+def strict(value: Any) -> Any:
+    """Return `value` in the types of strict JSON, where a number that is not finite is null."""
+    match plain(value):
+        case dict() as entries:
+            return {key: strict(entry) for key, entry in entries.items()}
+        case list() as entries:
+            return [strict(entry) for entry in entries]
+        case float() as number if not math.isfinite(number):
+            return None
+        case other:
+            return other
+
+
+def text(value: Any, *, indent: int | None = None) -> str:
+    """Return strict JSON with sorted keys: equal values give equal text."""
+    return json.dumps(strict(value), sort_keys=True, ensure_ascii=False, allow_nan=False, indent=indent)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write `value` as a JSON file a person can read, whole or not at all."""
+    with replacing(path) as temporary:
+        temporary.write_text(text(value, indent=2) + "\n", encoding="utf-8")

@@ -1,0 +1,37 @@
+"""Content hashes: of files, of what an artifact holds, and of gsl's own sources."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1]
+CIRCUMSTANCES = ("manifest.json", "config.yaml", "log.txt")
+
+
+def file_hash(path: Path) -> str:
+    """Return the sha256 of a file's bytes."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def contents_hash(kind: str, hashes: Mapping[str, str]) -> str:
+    """Return the hash of an artifact's contents from the hashes of its files by name.
+
+    Manifests, settings and logs tell how the contents came about, with times and paths in them; they do not count, so
+    that the same work done again leaves what was built on it valid.
+    """
+    lines = [f"{name} {sha}" for name, sha in sorted(hashes.items()) if Path(name).name not in CIRCUMSTANCES]
+    return hashlib.sha256("\n".join([kind, *lines]).encode()).hexdigest()
+
+
+@functools.cache
+def sources_hash() -> str:
+    """Return the hash of gsl's sources, read once a process."""
+    digest = hashlib.sha256()
+    for path in sorted(path for path in PACKAGE.rglob("*") if path.is_file() and "__pycache__" not in path.parts):
+        digest.update(f"{path.relative_to(PACKAGE).as_posix()}\0{path.stat().st_size}\0".encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

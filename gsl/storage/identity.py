@@ -1,0 +1,116 @@
+"""The identity of a piece of work: the key that says whether it has to be done again, and what changed when it has."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gsl.errors import ArtifactError
+from gsl.storage import documents, manifest
+from gsl.storage.hashing import file_hash, sources_hash
+from gsl.storage.manifest import Manifest
+
+SHOWN_CHANGES = 3
+SHOWN_CHARACTERS = 40
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What determines the result of a stage.
+
+    Attributes:
+        kind: What the stage makes.
+        settings: Its settings by dotted name, without those that say where a parent lies.
+        parents: Hash of each parent's contents by role.
+        sources: Hash of gsl's sources.
+    """
+
+    kind: str
+    settings: Mapping[str, Any]
+    parents: Mapping[str, str]
+    sources: str
+
+    @property
+    def key(self) -> str:
+        """Hash of all of it."""
+        return hashlib.sha256(json.dumps(vars(self), sort_keys=True).encode()).hexdigest()
+
+    @property
+    def seeds(self) -> dict[str, int]:
+        """The seeds among the settings by dotted name."""
+        named = {name: value for name, value in self.settings.items() if name.rpartition(".")[2].endswith("seed")}
+        return {name: value for name, value in named.items() if isinstance(value, int)}
+
+
+def identify(kind: str, config: Mapping[str, Any], parents: Mapping[str, Path]) -> Identity:
+    """Return the identity of a stage; parents enter by role and contents, so that folders can move.
+
+    A setting says where a parent lies when its dotted name is the parent's role, or when its text is the parent's path.
+    """
+    places = {os.path.abspath(path) for path in parents.values()}
+    settings = {
+        name: value
+        for name, value in flat(documents.plain(config)).items()
+        if not (isinstance(value, str) and (name in parents or os.path.abspath(value) in places))
+    }
+    hashes = {role: content_hash(path) for role, path in parents.items()}
+    return Identity(kind, settings, hashes, sources_hash())
+
+
+def content_hash(path: Path) -> str:
+    """Return the hash of a parent's contents: an intact artifact's folder or a plain file.
+
+    Raises:
+        ArtifactError: It is neither, or a file of the artifact was changed after it was written.
+    """
+    if path.is_file():
+        return file_hash(path)
+    found = manifest.read(path)
+    if damaged := manifest.damaged_file(path, found):
+        raise ArtifactError(path / damaged, "is not as the manifest says; build the artifact again with force=true")
+    return found.contents
+
+
+def flat(value: Any, prefix: str = "") -> dict[str, Any]:
+    """Return nested settings by dotted name, entries of lists by their number."""
+    if not isinstance(value, (dict, list)) or not value:
+        return {prefix: value}
+    entries = value.items() if isinstance(value, dict) else enumerate(value)
+    leaves: dict[str, Any] = {}
+    for name, entry in entries:
+        leaves |= flat(entry, f"{prefix}.{name}" if prefix else str(name))
+    return leaves
+
+
+def changes(old: Manifest, old_config: Any, new: Identity, new_config: Any) -> str:
+    """Return in words what sets the work `new` apart from the artifact `old`."""
+    if old.kind != new.kind:
+        return f"it holds {old.kind}, not {new.kind}"
+    hidden = flat(documents.plain(new_config)).keys() - new.settings.keys()
+    before = {name: value for name, value in flat(documents.plain(old_config)).items() if name not in hidden}
+    words = _changed_settings(before, new.settings)
+    hashes = {parent.role: parent.hash for parent in old.parents}
+    roles = sorted(hashes.keys() | new.parents.keys())
+    words += [f"the data of {role}" for role in roles if hashes.get(role) != new.parents.get(role)]
+    if old.sources != new.sources or not words:
+        words.append("gsl itself")
+    return "changed: " + ", ".join(words)
+
+
+def _changed_settings(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    names = [name for name in [*new, *sorted(old.keys() - new.keys())] if _shown(old, name) != _shown(new, name)]
+    words = [f"{name} {_short(_shown(old, name))} -> {_short(_shown(new, name))}" for name in names[:SHOWN_CHANGES]]
+    return [*words, f"{len(names) - SHOWN_CHANGES} more settings"] if len(names) > SHOWN_CHANGES else words
+
+
+def _shown(settings: Mapping[str, Any], name: str) -> str:
+    return str(settings[name]).replace("\n", " ") if name in settings else "(none)"
+
+
+def _short(words: str) -> str:
+    return words if len(words) <= SHOWN_CHARACTERS else words[: SHOWN_CHARACTERS - 1] + "…"

@@ -1,0 +1,105 @@
+"""References: everywhere a path is asked for, the name of a run serves as well."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from gsl.errors import ArtifactError
+from gsl.storage import manifest
+from gsl.storage.artifact import Artifact
+
+RUNS = Path("runs")
+
+
+def resolve(reference: str | Path, *, kind: str | None = None, runs: Path = RUNS) -> Path:
+    """Return what `reference` names: a file, an artifact, or the only artifact of `kind` below a folder or a run.
+
+    Args:
+        reference: A path, or the name of a run in `runs`, which may go on into it: `quick-start/optimize`.
+        kind: What the artifact has to be; None takes any.
+        runs: Folder of the runs.
+
+    Raises:
+        ArtifactError: There is no such thing, it is of another kind, or several fit.
+    """
+    place = _place(str(reference), runs)
+    if place.is_file():
+        return place
+    found = _artifacts(place)
+    own = [one for one in found if one.folder == place]
+    if own and kind in (None, own[0].manifest.kind):
+        return place
+    fitting = [one for one in found if kind in (None, one.manifest.kind)]
+    if len(fitting) == 1:
+        return fitting[0].folder
+    if fitting:
+        choices = ", ".join(_named(one.folder, runs) for one in fitting)
+        raise ArtifactError(reference, f"several artifacts fit, name one of them: {choices}")
+    if own:
+        raise ArtifactError(place, f"holds {own[0].manifest.kind}, but {kind} is needed")
+    there = ", ".join(sorted({one.manifest.kind for one in found})) or "no complete artifact"
+    raise ArtifactError(place, f"holds {there}" + (f", but {kind} is needed" if kind else "; build one in it first"))
+
+
+def load(reference: str | Path, kind: str, *, runs: Path = RUNS) -> Artifact:
+    """Return the artifact that `reference` names, after a check that it is complete and as it was written.
+
+    Raises:
+        ArtifactError: There is none of this kind, or a file of it is missing or was changed.
+    """
+    folder = resolve(reference, kind=kind, runs=runs)
+    artifact = Artifact(folder, manifest.read(folder))
+    if artifact.manifest.kind != kind:
+        raise ArtifactError(folder, f"holds {artifact.manifest.kind}, but {kind} is needed")
+    if damaged := manifest.damaged_file(folder, artifact.manifest):
+        raise ArtifactError(folder / damaged, "is not as the manifest says; build the artifact again with force=true")
+    return artifact
+
+
+def find_all(runs: Path = RUNS) -> list[Artifact]:
+    """Return the complete artifacts below `runs`, oldest first."""
+    return sorted(_artifacts(runs), key=lambda one: (one.manifest.created, one.folder))
+
+
+def _place(reference: str, runs: Path) -> Path:
+    if not reference:
+        raise ArtifactError("''", "is empty; give a path or the name of a run")
+    for place in (Path(reference), runs / reference):
+        if place.is_file() or (place / manifest.NAME).is_file():
+            return place
+    for place in (runs / reference, Path(reference)):
+        if place.is_dir():
+            return place
+    raise ArtifactError(reference, f"there is no such path and no such run in {runs}{_alternatives(reference, runs)}")
+
+
+def _alternatives(reference: str, runs: Path) -> str:
+    names = {path.name for path in runs.iterdir() if not path.name.startswith(".")} if runs.is_dir() else set()
+    names |= {_named(one.folder, runs) for one in _artifacts(runs)}
+    close = difflib.get_close_matches(reference, sorted(names), n=1, cutoff=0.6)
+    return f", did you mean {close[0]}?" if close else ""
+
+
+def _artifacts(folder: Path) -> list[Artifact]:
+    return list(_walk(folder))
+
+
+def _walk(folder: Path) -> Iterator[Artifact]:
+    for place, folders, files in os.walk(folder):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        if manifest.NAME in files and (found := _readable(Path(place))) is not None:
+            yield Artifact(Path(place), found)
+
+
+def _readable(folder: Path) -> manifest.Manifest | None:
+    try:
+        return manifest.read(folder)
+    except ArtifactError:
+        return None
+
+
+def _named(folder: Path, runs: Path) -> str:
+    return (folder.relative_to(runs) if folder.is_relative_to(runs) else folder).as_posix()

@@ -1,0 +1,113 @@
+"""A batch as the columns of a table, and back."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.errors import TrajectoryError
+from gsl.storage.trajectory_contract import (
+    BOOLEANS,
+    INTEGERS,
+    SCHEMA_VERSION,
+    UNITS,
+    blank_at_the_end,
+    joint_columns,
+)
+
+ARRAYS = ("action", "grounded_action", "position", "velocity")
+OWN_FIELDS = ("schema_version", "joints", "control_period")
+
+
+def columns_of(path: Path, batch: Batch) -> dict[str, np.ndarray]:
+    """Return the columns of `batch` by name; the last row of an episode holds NaN for what was done in it.
+
+    Raises:
+        TrajectoryError: An array has another length or number of joints, or episodes have different columns.
+    """
+    parts = [_episode_columns(path, batch, index, one) for index, one in enumerate(batch.episodes)]
+    for index, part in enumerate(parts):
+        if part.keys() != parts[0].keys():
+            different = sorted(part.keys() ^ parts[0].keys())
+            raise TrajectoryError(path, f"episode {index} and episode 0 differ in it", column=different[0])
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _episode_columns(path: Path, batch: Batch, index: int, one: Trajectory) -> dict[str, np.ndarray]:
+    rows = len(one) + 1
+    columns: dict[str, np.ndarray] = {
+        "episode": np.full(rows, index, dtype=np.int32),
+        "step": np.arange(rows, dtype=np.int32),
+        "time": one.time,
+    }
+    for group in ARRAYS:
+        if (values := getattr(one, group)) is not None:
+            if np.ndim(values) != 2 or values.shape[1] != len(batch.joints):
+                problem = f"episode {index}: shape {np.shape(values)} for {len(batch.joints)} joints"
+                raise TrajectoryError(path, problem, column=group)
+            columns.update(zip(joint_columns(group, batch.joints), np.asarray(values).T, strict=True))
+    columns.update({name: one.sensors[name] for name in sorted(one.sensors)})
+    columns.update({name: getattr(one, name) for name in ("reward", "fell") if getattr(one, name) is not None})
+    return {name: _column(path, index, name, values, rows) for name, values in columns.items()}
+
+
+def _column(path: Path, index: int, name: str, values: np.ndarray, rows: int) -> np.ndarray:
+    blank = blank_at_the_end(name)
+    if np.shape(values) != (rows - blank,):
+        problem = f"episode {index}: {np.shape(values)} values, but {rows - blank} are due"
+        raise TrajectoryError(path, problem, column=name)
+    if name in INTEGERS:
+        return np.asarray(values)
+    values = np.asarray(values, dtype=bool if name in BOOLEANS else np.float64)
+    return np.append(values, np.nan) if blank else values
+
+
+def metadata_of(batch: Batch, columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Return what the file says of itself: the batch's metadata, joints, control period [s] and units."""
+    groups = {*columns, *(name.partition(".")[0] for name in columns), *(name.rpartition(".")[0] for name in columns)}
+    units = {**batch.metadata.get("units", {}), **{group: unit for group, unit in UNITS.items() if group in groups}}
+    return {
+        **dict.fromkeys(("source", "seed", "world", "policy")),
+        **batch.metadata,
+        "units": units,
+        "schema_version": SCHEMA_VERSION,
+        "joints": list(batch.joints),
+        "control_period": batch.control_period,
+    }
+
+
+def batch_of(columns: Mapping[str, np.ndarray], metadata: Mapping[str, Any], bounds: np.ndarray) -> Batch:
+    """Return the batch that checked columns hold.
+
+    Args:
+        columns: All columns by name, each of shape (n_rows,).
+        metadata: What the file says of itself.
+        bounds: Row at which each episode begins, and the number of rows, shape (n_episodes + 1,).
+    """
+    joints = tuple(metadata["joints"])
+    arrays = _arrays(columns, joints)
+    own = {*INTEGERS, *arrays, *(name for group in ARRAYS for name in joint_columns(group, joints))}
+    sensors = {name: values for name, values in columns.items() if name not in own}
+    episodes = tuple(
+        Trajectory(
+            **{name: values[start : end - blank_at_the_end(name)] for name, values in arrays.items()},
+            sensors={name: values[start:end] for name, values in sensors.items()},
+        )
+        for start, end in itertools.pairwise(bounds)
+    )
+    rest = {key: value for key, value in metadata.items() if key not in OWN_FIELDS}
+    return Batch(episodes, joints, float(metadata["control_period"]), rest)
+
+
+def _arrays(columns: Mapping[str, np.ndarray], joints: tuple[str, ...]) -> dict[str, np.ndarray]:
+    groups = {
+        group: np.column_stack([columns[name] for name in joint_columns(group, joints)])
+        for group in ARRAYS
+        if joint_columns(group, joints)[0] in columns
+    }
+    return {**groups, **{name: columns[name] for name in ("time", "reward", "fell") if name in columns}}

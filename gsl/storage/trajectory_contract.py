@@ -1,0 +1,171 @@
+"""The contract of trajectory files: which columns there are, in which units, and what their rows must obey."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gsl.errors import TrajectoryError
+
+SCHEMA_VERSION = 1
+ROLES = ("real", "sim", "imported")
+REQUIRED_KEYS = ("robot", "joints", "control_period", "role", "units")
+UNITS: Mapping[str, str] = {
+    "time": "s",
+    "action": "rad",
+    "grounded_action": "rad",
+    "position": "rad",
+    "velocity": "rad/s",
+    "torque": "N·m",
+    "voltage": "V",
+    "temperature": "°C",
+    "gyro": "rad/s",
+    "acceleration": "m/s²",
+    "foot_force": "N",
+    "base.position": "m",
+    "base.orientation": "1",
+    "base.velocity": "m/s",
+}
+INTEGERS = ("episode", "step")
+BOOLEANS = ("enabled", "fell")
+BLANK_AT_THE_END = ("action", "grounded_action", "reward")
+JOINT_SENSORS = ("torque", "temperature")
+SENSORS = (
+    *("voltage", "enabled", "foot_force.left", "foot_force.right"),
+    *(f"{group}.{axis}" for group in ("gyro", "acceleration", "base.position", "base.velocity") for axis in "xyz"),
+    *(f"base.orientation.{axis}" for axis in "xyzw"),
+)
+
+
+def joint_columns(group: str, joints: Iterable[str]) -> list[str]:
+    """Return the columns of `group`, one a joint, in the joints' order."""
+    return [f"{group}.{joint}" for joint in joints]
+
+
+def required_columns(joints: Iterable[str]) -> list[str]:
+    """Return the columns without which there is no trajectory."""
+    groups = ("action", "position", "velocity")
+    return [*INTEGERS, "time", *(name for group in groups for name in joint_columns(group, joints))]
+
+
+def blank_at_the_end(name: str) -> bool:
+    """Tell whether a column says what was done in a step, so that the last row of an episode has no value."""
+    return name.partition(".")[0] in BLANK_AT_THE_END
+
+
+def check_metadata(path: Path, metadata: Any, robot_joints: tuple[str, ...] | None) -> None:
+    """Refuse metadata of another version, incomplete, or of a robot with other joints than `robot_joints`."""
+    if not isinstance(metadata, Mapping) or "schema_version" not in metadata:
+        raise TrajectoryError(path, "the metadata key `gsl` holds no schema_version; write the file with gsl")
+    if metadata["schema_version"] != SCHEMA_VERSION:
+        found = metadata["schema_version"]
+        raise TrajectoryError(path, f"schema_version {found!r} is unknown; this gsl reads {SCHEMA_VERSION}")
+    if missing := [key for key in REQUIRED_KEYS if metadata.get(key) is None]:
+        raise TrajectoryError(path, f"the metadata lack {', '.join(missing)}; add them under the key `gsl`")
+    if metadata["role"] not in ROLES:
+        raise TrajectoryError(path, f"role {metadata['role']!r} is none of {', '.join(ROLES)}")
+    period = metadata["control_period"]
+    if isinstance(period, bool) or not isinstance(period, (int, float)) or not (math.isfinite(period) and period > 0):
+        raise TrajectoryError(path, f"control_period {period!r} must be a positive number of seconds")
+    _check_joints(path, metadata, robot_joints)
+    _check_units(path, metadata["units"])
+
+
+def _check_joints(path: Path, metadata: Mapping[str, Any], robot_joints: tuple[str, ...] | None) -> None:
+    joints = metadata["joints"]
+    named = isinstance(joints, (list, tuple)) and joints and all(isinstance(joint, str) and joint for joint in joints)
+    if not named or len(set(joints)) != len(joints):
+        raise TrajectoryError(path, "joints must be a list of different names in the metadata")
+    for joint in joints:
+        if robot_joints is not None and joint not in robot_joints:
+            advice = f"{suggestion(joint, robot_joints)}; this file is of {metadata['robot']}"
+            raise TrajectoryError(path, f"the robot has no such joint{advice}", column=f"position.{joint}")
+
+
+def _check_units(path: Path, units: Any) -> None:
+    if not isinstance(units, Mapping):
+        raise TrajectoryError(path, "units must map groups of columns to units in the metadata")
+    for group, unit in units.items():
+        if group in UNITS and _spelled(str(unit)) != _spelled(UNITS[group]):
+            raise TrajectoryError(path, f"the unit is {unit}, not {UNITS[group]}; convert the column", column=group)
+
+
+def _spelled(unit: str) -> str:
+    return unit.replace("·", "").replace("*", "").replace(" ", "").replace("^2", "²")
+
+
+def check_names(path: Path, names: list[str], metadata: Mapping[str, Any]) -> None:
+    """Refuse missing, duplicated and unknown columns; a column named in `units` beside the contract's is known."""
+    joints, units = metadata["joints"], metadata["units"]
+    for name in names:
+        if names.count(name) > 1:
+            raise TrajectoryError(path, f"there are {names.count(name)} columns of this name; keep one", column=name)
+    required = required_columns(joints)
+    if any(name.startswith("grounded_action.") for name in names):
+        required += joint_columns("grounded_action", joints)
+    for name in required:
+        if name not in names:
+            raise TrajectoryError(path, f"is missing{suggestion(name, set(names) - set(required))}", column=name)
+    known = {*required, *SENSORS, "reward", "fell"}
+    known.update(name for group in JOINT_SENSORS for name in joint_columns(group, joints))
+    for name in names:
+        if name not in known and not _declared(name, units):
+            advice = f"is unknown{suggestion(name, known)}; a column of your own needs a unit under `units`"
+            raise TrajectoryError(path, advice, column=name)
+
+
+def _declared(name: str, units: Mapping[str, Any]) -> bool:
+    own = set(units) - set(UNITS)
+    return name in own or name.rpartition(".")[0] in own
+
+
+def check_rows(path: Path, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Refuse rows out of order, time that stands still and values missing or out of place.
+
+    Returns:
+        Row at which each episode begins, and the number of rows at the end, shape (n_episodes + 1,).
+    """
+    episode, step = (columns[name].astype(np.int64) for name in INTEGERS)
+    if not len(episode):
+        raise TrajectoryError(path, "has no rows; collect it again")
+    within = np.diff(episode) == 0
+    _refuse(path, "episode", np.diff(episode) < 0, "falls; sort the rows by (episode, step)", first=1)
+    problem = "must rise by one within an episode; sort the rows and split the episode where rows are missing"
+    _refuse(path, "step", within & (np.diff(step) != 1), problem, first=1)
+    last = np.append(~within, True)
+    _refuse(path, "episode", last & np.insert(last[:-1], 0, True), "has one row only; drop the episode")
+    problem = "does not rise within the episode; drop or mend the row"
+    _refuse(path, "time", ~np.isfinite(columns["time"]), "is not a finite number; drop or mend the row")
+    _refuse(path, "time", within & (np.diff(columns["time"]) <= 0), problem, first=1)
+    for name, values in columns.items():
+        _check_values(path, name, values, last)
+    return np.insert(np.flatnonzero(last) + 1, 0, 0)
+
+
+def _check_values(path: Path, name: str, values: np.ndarray, last: np.ndarray) -> None:
+    if values.dtype.kind != "f":
+        return
+    inside = ~last if blank_at_the_end(name) else slice(None)
+    if np.isfinite(values[inside]).all() and (isinstance(inside, slice) or np.isnan(values[last]).all()):
+        return
+    if isinstance(inside, slice):
+        _refuse(path, name, ~np.isfinite(values), "is not a finite number; drop or mend the row")
+    _refuse(path, name, ~last & ~np.isfinite(values), "only the last row of an episode may be empty; mend the row")
+    problem = "must be empty (NaN) in the last row of an episode; add the row of the last state"
+    _refuse(path, name, last & ~np.isnan(values), problem)
+
+
+def _refuse(path: Path, column: str, wrong: np.ndarray, problem: str, *, first: int = 0) -> None:
+    if wrong.any():
+        raise TrajectoryError(path, problem, column=column, row=int(np.argmax(wrong)) + first)
+
+
+def suggestion(name: str, choices: Iterable[str]) -> str:
+    """Return `, did you mean ...?` when one of `choices` resembles `name`, else nothing."""
+    close = difflib.get_close_matches(name, sorted(choices), n=1, cutoff=0.75)
+    return f", did you mean {close[0]}?" if close else ""

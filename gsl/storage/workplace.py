@@ -1,0 +1,132 @@
+"""The hidden folder beside an artifact in which it is built, under a lock, until it is complete."""
+
+from __future__ import annotations
+
+import fcntl
+import logging
+import os
+import shutil
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from gsl.errors import ArtifactError
+from gsl.storage.whole import explained
+
+KEY = ".key"
+LOG = "log.txt"
+
+
+@contextmanager
+def locked(out: Path) -> Iterator[None]:
+    """Hold the only right to build `out`, in a file beside it that is gone afterwards.
+
+    Raises:
+        ArtifactError: Another process is building it.
+        GslError: The folder around it cannot be written.
+    """
+    lock = out.with_name(f".{out.name}.lock")
+    with explained(out.parent):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = _taken(out, lock)
+    try:
+        recover(out)
+        yield
+    finally:
+        recover(out)
+        lock.unlink(missing_ok=True)
+        os.close(descriptor)
+
+
+def _taken(out: Path, lock: Path) -> int:
+    while True:
+        descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            os.close(descriptor)
+            raise ArtifactError(out, "another process is building it; wait for it or choose another out=") from error
+        if lock.exists() and os.path.samestat(os.fstat(descriptor), lock.stat()):
+            return descriptor
+        os.close(descriptor)
+
+
+def recover(out: Path) -> None:
+    """Put right what a killed or stopped process left: an artifact moved aside comes back, temporary folders go."""
+    aside = _aside(out)
+    with explained(out.parent):
+        if aside.exists() and not out.exists():
+            os.rename(aside, out)
+        for leftover in [aside, *out.parent.glob(f".{out.name}.tmp-*")]:
+            shutil.rmtree(leftover, ignore_errors=True)
+
+
+@contextmanager
+def workplace(out: Path, key: str, *, resumable: bool) -> Iterator[Path]:
+    """Yield the folder to build `out` in, which goes when the block fails, unless the work can be resumed."""
+    folder = out.with_name(f".{out.name}.partial" if resumable else f".{out.name}.tmp-{os.getpid()}")
+    if folder.exists() and not _belongs(folder, key):
+        shutil.rmtree(folder)
+    folder.mkdir(exist_ok=True)
+    (folder / KEY).write_text(key)
+    try:
+        yield folder
+    finally:
+        if not resumable:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _belongs(folder: Path, key: str) -> bool:
+    return (folder / KEY).is_file() and (folder / KEY).read_text() == key
+
+
+def install(folder: Path, out: Path) -> None:
+    """Give the finished `folder` the name `out`; an artifact of that name stays until this moment."""
+    aside = _aside(out)
+    if out.exists():
+        os.rename(out, aside)
+    os.rename(folder, out)
+    (out / KEY).unlink()
+    shutil.rmtree(aside, ignore_errors=True)
+
+
+def _aside(out: Path) -> Path:
+    return out.with_name(f".{out.name}.replaced")
+
+
+@contextmanager
+def logged(folder: Path) -> Iterator[logging.Logger]:
+    """Write what gsl logs to the folder's log file, too; resumed work goes on in the same file."""
+    logger = logging.getLogger("gsl")
+    handler = logging.FileHandler(folder / LOG, encoding="utf-8")
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(min(level, logging.INFO) or logging.INFO)
+    try:
+        yield logger
+    finally:
+        logger.setLevel(level)
+        logger.removeHandler(handler)
+        handler.close()
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Let SIGTERM stop the block as Ctrl-C does, so that it can tidy up; a handler of somebody else's stays."""
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _interrupt(number: int, frame: Any) -> None:
+    raise KeyboardInterrupt

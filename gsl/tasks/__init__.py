@@ -1,0 +1,1 @@
+"""What we want of a body: reward, end of the episode."""

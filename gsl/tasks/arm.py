@@ -1,0 +1,55 @@
+"""Raise both arms to 45 degrees and hold them there (the paper's section 6.2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from gsl.core.layout import Layout
+from gsl.core.setting import component, setting
+from gsl.core.trajectory import Trajectory
+from gsl.tasks.task import Step
+
+JOINTS = ("LShoulderPitch", "RShoulderPitch")
+HANGING = 0.5 * math.pi  # shoulder pitch of an arm that hangs down [rad]
+
+
+@component
+class Arm:
+    """Reward 1 / |x - x*|² with x in degrees of lift, capped within `cap` of the goal; the end is an arm above 45 degrees."""
+
+    unit: ClassVar[str] = "sum of rewards"
+    shown: ClassVar[float] = 1.0
+
+    duration: Annotated[float, setting("planned length of an episode", unit="s", gt=0)] = 4.0
+    goal: Annotated[float, setting("lift to reach and not to exceed", unit="rad", gt=0)] = math.pi / 4
+    cap: Annotated[float, setting("distance below which the reward grows no more", unit="rad", gt=0)] = math.pi / 180
+
+    def start(self, layout: Layout, observation: np.ndarray, role: str) -> ArmRun:
+        """Return the task at the beginning of an episode."""
+        first = layout["position"].start
+        return ArmRun(self, [first + layout.joints.index(name) for name in JOINTS])
+
+    def outcome(self, trajectory: Trajectory) -> Mapping[str, float]:
+        """Return the final distance to the goal, the last one held after an early end."""
+        return {"distance [deg]": math.degrees(self.distance(trajectory.position[-1, -4::2]))}
+
+    def distance(self, shoulders: np.ndarray) -> float:
+        """Return |x - x*| of two shoulder pitches [rad]."""
+        return float(np.linalg.norm(HANGING - shoulders - self.goal))
+
+
+class ArmRun:
+    """An arm movement in progress."""
+
+    def __init__(self, task: Arm, entries: list[int]) -> None:
+        self._task, self._entries = task, entries
+
+    def step(self, before: np.ndarray, after: np.ndarray, fell: bool) -> Step:
+        """Reward closeness after the step."""
+        shoulders = after[self._entries]
+        closest = max(self._task.distance(shoulders), self._task.cap)
+        return Step(1.0 / math.degrees(closest) ** 2, ended=bool((HANGING - shoulders > self._task.goal).any()))

@@ -1,0 +1,48 @@
+"""What a task is: reward of each step, planned length, and what a person wants to know of an episode."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from gsl.core.layout import Layout
+from gsl.core.trajectory import Trajectory
+
+REAL, SIM = "real", "sim"
+
+
+class Step(NamedTuple):
+    """What a task says of one control step."""
+
+    reward: float
+    ended: bool
+
+
+class TaskRun(Protocol):
+    """A task in one episode."""
+
+    def step(self, before: np.ndarray, after: np.ndarray, fell: bool) -> Step:
+        """Judge the step between two observations."""
+
+
+@runtime_checkable
+class Task(Protocol):
+    """What we want of a body.
+
+    Attributes:
+        duration: Planned length of an episode [s].
+        unit: Of a value as people are shown it.
+        shown: What a value is multiplied by to be in that unit.
+    """
+
+    duration: float
+    unit: ClassVar[str]
+    shown: ClassVar[float]
+
+    def start(self, layout: Layout, observation: np.ndarray, role: str) -> TaskRun:
+        """Return the task at the beginning of an episode, in the `real` or in the `sim` world."""
+
+    def outcome(self, trajectory: Trajectory) -> Mapping[str, float]:
+        """Return what is reported of an episode, by name with unit."""

@@ -1,0 +1,51 @@
+"""Walk forward fast without falling (the paper's sections 6.4 and 6.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from gsl.core.layout import Layout
+from gsl.core.setting import component, setting
+from gsl.core.trajectory import Trajectory
+from gsl.tasks.task import REAL, Step
+
+
+@component
+class Walk:
+    """The value is the mean forward speed over the planned time [m/s]; a fall is paid for.
+
+    In the real world an episode with a fall is worth 0; in simulation it keeps the distance and pays the fall cost.
+    """
+
+    unit: ClassVar[str] = "cm/s"
+    shown: ClassVar[float] = 100.0
+
+    duration: Annotated[float, setting("planned length of an episode", unit="s", gt=0)] = 7.5
+    fall_cost: Annotated[float, setting("price of a fall in simulation", unit="m/s", ge=0)] = 0.15
+
+    def start(self, layout: Layout, observation: np.ndarray, role: str) -> WalkRun:
+        """Return the task at the beginning of an episode."""
+        return WalkRun(self, layout["base.position"].start, real=role == REAL)
+
+    def outcome(self, trajectory: Trajectory) -> Mapping[str, float]:
+        """Return the mean forward speed over the planned time, the fall notwithstanding."""
+        x = trajectory.sensors["base.position.x"]
+        return {"speed [cm/s]": 100.0 * float(x[-1] - x[0]) / self.duration}
+
+
+class WalkRun:
+    """A walk in progress."""
+
+    def __init__(self, task: Walk, forward: int, *, real: bool) -> None:
+        self._task, self._forward, self._real, self._so_far = task, forward, real, 0.0
+
+    def step(self, before: np.ndarray, after: np.ndarray, fell: bool) -> Step:
+        """Pay the distance of the step; at a fall take back everything (real) or the fall cost (simulation)."""
+        reward = float(after[self._forward] - before[self._forward]) / self._task.duration
+        if fell:
+            reward = -self._so_far if self._real else reward - self._task.fall_cost
+        self._so_far += reward
+        return Step(reward, ended=False)

@@ -1,0 +1,1 @@
+"""Bodies to act on, as gymnasium environments."""

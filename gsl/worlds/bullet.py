@@ -1,0 +1,153 @@
+"""A robot in Bullet as a gymnasium environment: actions are desired joint positions, observations what sensors tell.
+
+A world is the body: it gives no reward (always 0.0) and ends an episode only when the robot falls. A rollout is a
+function of the world's configuration, the actions and the seed of `reset`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Annotated, Any
+
+import gymnasium
+import numpy as np
+
+from gsl.core.body import lumped
+from gsl.core.layout import Layout
+from gsl.core.plant import Plant, nominal
+from gsl.core.setting import component, setting
+from gsl.effects.effect import applied, built
+from gsl.errors import ConfigError, GslError
+from gsl.robots.catalogue import robot
+from gsl.worlds.engine import Engine, Physics, Reading
+from gsl.worlds.servo import COMMANDS
+from gsl.worlds.start import Start, resting
+
+FALLEN_TILT = 0.5  # cosine of the tilt beyond which the robot has fallen
+
+
+@component
+class BulletWorld:
+    """A world's configuration; `make` builds the environment."""
+
+    robot: Annotated[str, setting("name of the robot, or package.module.function of one's own")]
+    effects: Annotated[Mapping[str, Any], setting("what this world adds to the nominal robot, by name")]
+    floating: Annotated[bool, setting("base on the ground (true) or held in the air (false)")] = True
+    step: Annotated[float, setting("physics period", unit="s", gt=0, le=0.02)] = 0.002
+    iterations: Annotated[int, setting("iterations of the constraint solver", ge=1)] = 50
+    period: Annotated[float, setting("control period", unit="s", gt=0, le=0.1)] = 0.02
+    start_noise: Annotated[float, setting("standard deviation of the joints at the start", unit="rad", ge=0)] = 0.03
+    settle: Annotated[float, setting("time the start posture is held before the episode", unit="s", ge=0)] = 0.5
+
+    def __post_init__(self) -> None:
+        """Refuse periods that do not fit and effects that do not exist."""
+        ratio = self.period / self.step
+        if abs(ratio - round(ratio)) > 1e-9 or ratio < 1.0:
+            raise ConfigError("period", f"{self.period} s is not a multiple of the physics step {self.step} s")
+        latest = (COMMANDS - 1) * self.period
+        if self.plant.servo.delay.max() > latest + 1e-9:
+            given = f"{self.plant.servo.delay.max():g}"
+            raise ConfigError(
+                "effects.command_latency.delay", f"at most {latest:g} s fit {COMMANDS - 1} periods", given=given
+            )
+
+    @cached_property
+    def plant(self) -> Plant:
+        """The robot with its effects."""
+        return applied(nominal(robot(self.robot)), built(self.effects))
+
+    @property
+    def layout(self) -> Layout:
+        """What an observation holds."""
+        joints = self.plant.robot.controlled
+        body = {"gyro": 3, "foot_force": 2, "base.position": 3, "base.orientation": 4, "base.velocity": 3}
+        return Layout(joints, {"position": len(joints), "velocity": len(joints), **body}, self.period)
+
+    def make(self) -> BulletEnv:
+        """Build the environment."""
+        return BulletEnv(self)
+
+
+class BulletEnv(gymnasium.Env):
+    """One robot in one Bullet client."""
+
+    metadata: Mapping[str, Any] = {"render_modes": []}  # noqa: RUF012  gymnasium's own name and type
+
+    def __init__(self, world: BulletWorld) -> None:
+        self.world, self.layout = world, world.layout
+        self._plant, self._robot = world.plant, lumped(world.plant.robot)
+        self._drive, self._n = self._robot.drive, len(self._robot.controlled)
+        limits = [self._robot.joint(name) for name in self._robot.controlled]
+        low, high = np.array([(joint.lower, joint.upper) for joint in limits]).T
+        self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self.layout.size,), dtype=np.float64)
+        self._neutral = np.clip(np.zeros(self._n), low, high)
+        self._engine: Engine | None = None
+
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict]:
+        """Start anew: at rest in a posture, or in a measured state.
+
+        Args:
+            seed: Of the start noise and of every sensor noise.
+            options: `posture`, desired joint positions at the start [rad], shape (n_joints,), by default all zero;
+                or `start`, a `Start` to take up as it is, without noise or settling.
+        """
+        super().reset(seed=seed)
+        options = options or {}
+        start = options.get("start") or self._at_rest(np.asarray(options.get("posture", self._neutral), dtype=float))
+        if self._engine is None:
+            physics = Physics(self.world.step, self.world.iterations, self.world.period, self.world.floating)
+            self._engine = Engine(self._plant, physics)
+        self._engine.load(start.reading, start.commands)
+        reading = self._engine.read()
+        for _ in range(0 if options.get("start") else round(self.world.settle / self.world.period)):
+            self._engine.run(start.commands[0])
+            reading = self._engine.read()
+        return self._observe(reading), {"fell": False}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+        """Hold desired joint positions [rad], shape (n_joints,), for one control period.
+
+        Raises:
+            GslError: if the action has another size or holds what is not a finite number.
+        """
+        assert self._engine is not None, "reset comes first"
+        self._engine.run(self._checked(action)[self._drive])
+        reading = self._engine.read()
+        fell = self.world.floating and (reading.up < FALLEN_TILT or reading.place[2] < self._robot.upright_height)
+        return self._observe(reading), 0.0, bool(fell), False, {"fell": bool(fell)}
+
+    def close(self) -> None:
+        """Free Bullet's client."""
+        if self._engine is not None:
+            self._engine.close()
+            self._engine = None
+
+    def _checked(self, action: np.ndarray) -> np.ndarray:
+        values = np.asarray(action, dtype=float)
+        if values.shape != (self._n,):
+            raise GslError(f"an action has {self._n} desired positions, one a joint; given: shape {values.shape}")
+        if not np.isfinite(values).all():
+            joint = self._robot.controlled[int(np.argmin(np.isfinite(values)))]
+            raise GslError(
+                f"the action for {joint} is {values[~np.isfinite(values)][0]}: a policy must give finite angles"
+            )
+        return values
+
+    def _observe(self, reading: Reading) -> np.ndarray:
+        n = self._n
+        observation = np.empty(self.layout.size)
+        observation[:n], observation[n : 2 * n] = reading.motion[0, :n], reading.motion[1, :n]
+        noise = self._plant.sensors.encoder_noise[:n]
+        if noise.any():
+            observation[:n] += noise * self.np_random.standard_normal(n)
+        rest = observation[2 * n :]
+        rest[:3], rest[3:5], rest[5:8] = reading.gyro, reading.foot_force, reading.place
+        rest[8:12], rest[12:15] = reading.quaternion, reading.velocity
+        return observation
+
+    def _at_rest(self, posture: np.ndarray) -> Start:
+        targets = posture[self._drive]
+        positions = targets + self.world.start_noise * self.np_random.standard_normal(self._n)[self._drive]
+        return resting(self._robot, positions, targets, floating=self.world.floating)

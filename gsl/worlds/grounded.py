@@ -1,0 +1,43 @@
+"""A grounded world: an environment whose actions pass through a grounding on their way in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from gsl.core.layout import Layout
+from gsl.grounding.grounding import Grounding
+
+_STREAM = 7  # sets the grounding's randomness apart from that of the world, whose seed is the same
+
+
+class GroundedEnv(gymnasium.Wrapper):
+    """The agent acts, the world gets the grounded action, `info["grounded_action"]` tells it [rad], shape (n_joints,).
+
+    Args:
+        env: Has a `layout`.
+        grounding: Starts anew with every episode.
+    """
+
+    def __init__(self, env: gymnasium.Env, grounding: Grounding) -> None:
+        super().__init__(env)
+        self.layout: Layout = env.get_wrapper_attr("layout")
+        self._grounding, self._rng = grounding, np.random.default_rng()
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Start anew; `seed` is of the world and of the grounding."""
+        if seed is not None:
+            self._rng = np.random.default_rng([seed, _STREAM])
+        self._seen, info = self.env.reset(seed=seed, options=options)
+        self._run = self._grounding.start(self.layout, self._rng)
+        return self._seen, info
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Send the grounded action."""
+        sent = self._run.transform(self._seen, action)
+        self._seen, reward, ended, cut, info = self.env.step(sent)
+        return self._seen, float(reward), ended, cut, {**info, "grounded_action": sent}

@@ -1,0 +1,308 @@
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+
+from gsl.errors import ArtifactError, GslError
+from gsl.storage import hashing, manifest
+from gsl.storage.artifact import Artifact, build
+
+
+@dataclass
+class Doubling:
+    """A stage that writes its number twice."""
+
+    number: int = 1
+    data: Path | None = None
+    ending: Callable[[Path], None] = lambda folder: None
+    calls: list[Path] = field(default_factory=list)
+    kind: ClassVar[str] = "doubling"
+
+    def parents(self) -> Mapping[str, Path]:
+        return {} if self.data is None else {"data": self.data}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        self.calls.append(folder)
+        (folder / "sub").mkdir(exist_ok=True)
+        (folder / "sub" / "payload.txt").write_text(f"{self.number}{self.number}")
+        logging.getLogger("gsl.doubling").info("half way")
+        self.ending(folder)
+        return {"double": 2 * self.number, "spread": float("nan")}
+
+
+class Resumable(Doubling):
+    """The same, going on where it was killed."""
+
+    resumable: ClassVar[bool] = True
+
+
+def built(stage: Doubling, out: Path, *, force: bool = False, **settings: Any) -> Artifact:
+    config = {"_target_": "Doubling", "number": stage.number, "seed": 7, "data": str(stage.data), **settings}
+    if stage.data is None:
+        del config["data"]
+    return build(stage, config=config, out=out, command="gsl doubling", force=force, console=None)
+
+
+def hidden(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir() if path.name.startswith("."))
+
+
+def raising(error: BaseException) -> Callable[[Path], None]:
+    def ending(folder: Path) -> None:
+        raise error
+
+    return ending
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "runs" / "quick" / "doubling"
+
+
+def test_an_artifact_holds_all_that_the_contract_names(out: Path) -> None:
+    made = built(Doubling(), out)
+    assert not made.unchanged
+    assert made.manifest == manifest.read(out)
+    assert set(made.manifest.files) == {"config.yaml", "log.txt", "metrics.json", "sub/payload.txt"}
+    assert made.metrics == {"double": 2, "spread": None}
+    assert made.config == {"_target_": "Doubling", "number": 1, "seed": 7}
+    assert "half way" in (out / "log.txt").read_text()
+    stored = json.loads((out / "manifest.json").read_text())
+    assert stored["seeds"] == {"seed": 7}
+    assert stored["versions"].keys() >= {"gsl", "python", "numpy", "pybullet", "torch", "cma", "pandas", "pyarrow"}
+    assert stored["files"]["sub/payload.txt"] == {"sha256": hashing.file_hash(out / "sub/payload.txt"), "bytes": 2}
+    assert {path.name for path in out.iterdir()} == {"config.yaml", "log.txt", "manifest.json", "metrics.json", "sub"}
+    assert not hidden(out.parent)
+
+
+def test_the_same_work_is_not_done_twice_but_looks_fresh(out: Path) -> None:
+    built(Doubling(), out)
+    os.utime(out / "manifest.json", (0, 0))
+    stage = Doubling()
+    again = built(stage, out, force=True)
+    assert again.unchanged
+    assert not stage.calls
+    assert time.time() - (out / "manifest.json").stat().st_mtime < 60
+
+
+def test_a_changed_setting_is_refused_by_name(out: Path) -> None:
+    built(Doubling(), out, world={"period": 0.02})
+    stage = Doubling(2)
+    with pytest.raises(ArtifactError, match=r"number 1 -> 2, world\.period 0\.02 -> 0\.01.*force=true"):
+        built(stage, out, world={"period": 0.01})
+    assert not stage.calls
+    with pytest.raises(ArtifactError, match=r"a 1 -> 2, b 1 -> 2, c 1 -> 2, 1 more settings"):
+        built(Doubling(), built(Doubling(), out.with_name("b"), a=1, b=1, c=1, d=1).folder, a=2, b=2, c=2, d=2)
+
+
+def test_changed_sources_are_refused_as_gsl_itself(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    built(Doubling(), out)
+    monkeypatch.setattr("gsl.storage.identity.sources_hash", lambda: "other")
+    with pytest.raises(ArtifactError, match="gsl itself"):
+        built(Doubling(), out)
+
+
+def test_another_kind_is_refused_by_name(out: Path) -> None:
+    class Trebling(Doubling):
+        kind: ClassVar[str] = "trebling"
+
+    built(Doubling(), out)
+    with pytest.raises(ArtifactError, match="holds doubling, not trebling"):
+        built(Trebling(), out)
+
+
+def test_force_replaces_only_when_the_new_one_is_complete(out: Path) -> None:
+    built(Doubling(), out)
+    with pytest.raises(RuntimeError):
+        built(Doubling(2, ending=raising(RuntimeError())), out, force=True)
+    assert (out / "sub/payload.txt").read_text() == "11"
+    assert manifest.damaged_file(out, manifest.read(out)) is None
+    built(Doubling(2), out, force=True)
+    assert (out / "sub/payload.txt").read_text() == "22"
+    assert not hidden(out.parent)
+
+
+def test_a_damaged_artifact_is_refused_and_force_mends_it(out: Path) -> None:
+    built(Doubling(), out)
+    (out / "sub/payload.txt").write_text("12")
+    with pytest.raises(ArtifactError, match=r"sub/payload\.txt.*force=true"):
+        built(Doubling(), out)
+    built(Doubling(), out, force=True)
+    assert (out / "sub/payload.txt").read_text() == "11"
+
+
+def test_a_parent_counts_by_its_contents_and_not_by_its_place(out: Path, tmp_path: Path) -> None:
+    first = built(Doubling(3), tmp_path / "first").folder
+    second = built(Doubling(3), tmp_path / "moved" / "second", note="settings do not count").folder
+    built(Doubling(data=first), out)
+    again = built(Doubling(data=second), out)
+    assert again.unchanged
+    assert (out / again.manifest.parents[0].path).resolve() == first.resolve()
+    third = built(Doubling(4), tmp_path / "third").folder
+    with pytest.raises(ArtifactError, match=r"changed: the data of data\)"):
+        built(Doubling(data=third), out)
+
+
+def test_a_file_is_a_parent_by_its_contents(out: Path, tmp_path: Path) -> None:
+    (tmp_path / "log").write_text("a")
+    made = built(Doubling(data=tmp_path / "log"), out)
+    assert made.manifest.parents[0].hash == hashing.file_hash(tmp_path / "log")
+    (tmp_path / "log").write_text("b")
+    with pytest.raises(ArtifactError, match="the data of data"):
+        built(Doubling(data=tmp_path / "log"), out)
+
+
+def test_a_parent_that_is_missing_foreign_or_damaged_is_refused(out: Path, tmp_path: Path) -> None:
+    parent = built(Doubling(), tmp_path / "parent").folder
+    (parent / "sub/payload.txt").write_text("12")
+    for data, problem in ((parent, "payload"), (tmp_path / "nothing", "not exist"), (tmp_path, "no complete artifact")):
+        with pytest.raises(ArtifactError, match=problem):
+            built(Doubling(data=data), out)
+    assert not out.parent.exists()
+
+
+@pytest.mark.parametrize("error", [RuntimeError("bug"), KeyboardInterrupt(), SystemExit(3), ArtifactError("x", "y")])
+def test_a_failure_leaves_nothing(out: Path, error: BaseException) -> None:
+    with pytest.raises(type(error)):
+        built(Doubling(ending=raising(error)), out)
+    assert not list(out.parent.iterdir())
+    assert not logging.getLogger("gsl").handlers
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS, errno.EACCES])
+def test_a_full_or_read_only_folder_is_one_line(out: Path, number: int) -> None:
+    with pytest.raises(GslError, match="cannot be written") as caught:
+        built(Doubling(ending=raising(OSError(number, os.strerror(number)))), out)
+    assert caught.value.exit_code == 1
+    assert str(caught.value).startswith(str(out.parent))
+    assert not list(out.parent.iterdir())
+
+
+def test_a_folder_below_a_file_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(GslError, match="cannot be written"):
+        built(Doubling(), tmp_path / "file" / "runs" / "doubling")
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_what_is_no_artifact_is_never_replaced(tmp_path: Path, force: bool) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    for out in (tmp_path, tmp_path / "thesis.tex"):
+        with pytest.raises(ArtifactError, match="no artifact"):
+            built(Doubling(), out, force=force)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_second_builder_is_told_so(out: Path) -> None:
+    def ending(folder: Path) -> None:
+        with pytest.raises(ArtifactError, match="another process"):
+            built(Doubling(), out)
+
+    built(Doubling(ending=ending), out)
+
+
+def test_a_lock_left_by_a_dead_process_does_not_bar(out: Path) -> None:
+    out.parent.mkdir(parents=True)
+    (out.parent / ".doubling.lock").touch()
+    (out.parent / ".doubling.tmp-1").mkdir()
+    built(Doubling(), out)
+    assert not hidden(out.parent)
+
+
+def test_an_artifact_moved_aside_by_a_killed_process_comes_back(out: Path) -> None:
+    built(Doubling(), out)
+    out.rename(out.with_name(".doubling.replaced"))
+    assert built(Doubling(), out).unchanged
+    assert not hidden(out.parent)
+
+
+def test_resumable_work_finds_what_it_left(out: Path) -> None:
+    def ending(folder: Path) -> None:
+        (folder / "progress").write_text("half")
+        raise KeyboardInterrupt
+
+    def resuming(folder: Path) -> None:
+        assert (folder / "progress").read_text() == "half"
+
+    with pytest.raises(KeyboardInterrupt):
+        built(Resumable(ending=ending), out)
+    assert hidden(out.parent) == [".doubling.partial"]
+    made = built(Resumable(ending=resuming), out)
+    assert "progress" in made.manifest.files
+    assert ".key" not in {path.name for path in out.iterdir()}
+    assert (out / "log.txt").read_text().count("begins") == 2
+    assert not hidden(out.parent)
+
+
+def test_a_partial_of_other_work_is_discarded(out: Path) -> None:
+    with pytest.raises(RuntimeError):
+        built(
+            Resumable(1, ending=lambda folder: raising(RuntimeError())((folder / "old").write_text("") or folder)), out
+        )
+    assert "old" not in built(Resumable(2), out).manifest.files
+
+
+KILLED = """
+import sys, time
+from pathlib import Path
+from gsl.storage.artifact import build
+class Slow:
+    kind, resumable = "slow", sys.argv[2] == "resumable"
+    def parents(self): return {}
+    def run(self, folder, console):
+        (folder / "half").write_text("half")
+        print("ready", flush=True)
+        time.sleep(60)
+build(Slow(), config={}, out=Path(sys.argv[1]), command="", force=False, console=None)
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "mode", "left"),
+    [
+        (signal.SIGTERM, "plain", []),
+        (signal.SIGINT, "plain", []),
+        (signal.SIGTERM, "resumable", [".doubling.partial"]),
+        (signal.SIGKILL, "resumable", [".doubling.lock", ".doubling.partial"]),
+    ],
+)
+def test_a_signal_leaves_no_half_artifact(out: Path, number: int, mode: str, left: list[str]) -> None:
+    command = [sys.executable, "-c", KILLED, str(out), mode]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        with pytest.raises(ArtifactError, match="another process"):
+            built(Doubling(), out)
+        process.send_signal(number)
+        assert process.wait(20) != 0
+    assert sorted(path.name for path in out.parent.iterdir()) == left
+    with (out.parent / "probe").open("w") as probe:
+        fcntl.flock(probe, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def test_the_hash_of_the_sources_is_cheap() -> None:
+    begin = time.process_time()
+    hashing.sources_hash.__wrapped__()
+    assert time.process_time() - begin < 0.1
+
+
+def test_a_manifest_of_another_version_or_damaged_is_refused(out: Path) -> None:
+    built(Doubling(), out)
+    stored = json.loads((out / "manifest.json").read_text())
+    for contents in ("{", "[]", json.dumps({**stored, "schema_version": 2}), json.dumps({"schema_version": 1})):
+        (out / "manifest.json").write_text(contents)
+        with pytest.raises(ArtifactError):
+            manifest.read(out)

@@ -1,0 +1,224 @@
+"""Configurations are composed, checked and built; whatever is wrong is one line."""
+
+import json
+from pathlib import Path
+
+import pytest
+from example_stage import ExampleWorld
+
+from gsl.cli import call
+from gsl.commandline.composer import configuration_folder
+from gsl.commandline.multirun import job_level
+from gsl.config import build
+from gsl.errors import ConfigError
+
+CONF = Path(__file__).parent / "conf_example"
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GSL_CONFIG_DIR", str(CONF))
+    return tmp_path
+
+
+def test_a_stage_leaves_its_artifact_where_the_configuration_says(
+    elsewhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(["collect", "episodes=2"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "runs/example/collect"
+    assert (elsewhere / "runs/example/collect/count.txt").read_text() == "2\n"
+    assert (elsewhere / "runs/example/collect/manifest.json").is_file()
+    assert call(["collect", "episodes=2"]) == 0
+    assert capsys.readouterr().out == "runs/example/collect (unchanged)\n"
+    assert call(["collect", "episodes=2", "out=elsewhere/mine"]) == 0
+    assert (elsewhere / "elsewhere/mine/manifest.json").is_file()
+
+
+def test_json_is_exactly_one_document(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["collect", "--json", "world.iterations=7"]) == 0
+    assert json.loads(capsys.readouterr().out)["metrics"] == {"episodes": 3, "seed": 1, "iterations": 7}
+    assert call(["collect", "--json", "world.iterations=0", "force=true"]) == 2
+    error = {"error": "world.iterations = 0: must be at least 1", "exit_code": 2}
+    assert json.loads(capsys.readouterr().out) == error
+
+
+def test_the_composed_configuration_can_be_looked_at(elsewhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["evaluate", "--cfg", "job", "--json", "policy=p", "sim=worn", "real=ideal", "preset=toy"]) == 0
+    composed = json.loads(capsys.readouterr().out)
+    assert composed["episodes"] == 1
+    assert "mine" in composed["sim"]["effects"]
+    assert composed["real"]["effects"] == {}
+    assert not (elsewhere / "runs").exists()
+
+
+def test_an_experiment_is_a_whole_scenario(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["collect", "--cfg", "job", "--json", "experiment=long"]) == 0
+    assert json.loads(capsys.readouterr().out)["episodes"] == 9
+
+
+def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) -> None:
+    assert call(["evaluate", "policy=p", "trust=true"]) == 0
+    assert (elsewhere / "runs/example/compared/trust.txt").read_text() == "True"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["wrld=worn"], "wrld: no such setting; did you mean world?"),
+        (["world.control_perod=1"], "world.control_perod: no such setting; did you mean world.control_period?"),
+        (["control_period=1"], "control_period: no such setting; did you mean world.control_period?"),
+        (["+world.foo=1"], "world.foo: no such setting; there is control_period, effects, iterations"),
+        (["sim=ideal"], "sim: no such setting"),
+        (["world=wrn"], "no world called wrn; did you mean worn? There is ideal, plain, worn"),
+        (["experiment=lng"], "no experiment called lng; did you mean long? There is long"),
+        (["episodes=four"], "episodes = four: must be a whole number"),
+        (["episodes=-1"], "episodes = -1: must be above 0"),
+        (["episodes"], "episodes: has no value; write key=value"),
+        (["episodes=[1"], "episodes = [1: cannot be read"),
+        (["episodes=1,2"], "episodes: several values need --multirun; a list is written 'episodes=[1,2]'"),
+        (["episodes=${nope}"], "episodes: Interpolation key 'nope' not found"),
+        (["force=maybe"], "force = maybe: must be true or false"),
+        (["name="], "name: must not be empty"),
+        (["world=plain"], "world.effects.mine.width = -1: must be at least 0 (rad)"),
+        (["world=worn", "world.effects.mine.width=-2"], "world.effects.mine.width = -2: must be at least 0 (rad)"),
+        (["world.effects.bakclash.width=1"], "world.effects.bakclash: no such effect; did you mean backlash?"),
+        (["world._target_=no.Where"], "world._target_ = no.Where: cannot be loaded"),
+        (["hydra/launcher=basik"], "no hydra/launcher called basik; did you mean basic?"),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else "",
+)
+def test_what_is_wrong_is_one_line(
+    arguments: list[str], message: str, elsewhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(["collect", *arguments]) == 2
+    printed = capsys.readouterr()
+    assert printed.err.startswith(f"gsl collect: {message}")
+    assert printed.err.count("\n") == 1
+    assert printed.out == ""
+    assert not (elsewhere / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["evaluate"], "gsl evaluate: policy: has no value yet; say policy=...\n"),
+        (["evaluate", "world=worn", "policy=p"], "gsl evaluate: world: here a world has a role; say "),
+        (["evaluate", "real=wrn", "policy=p"], "gsl evaluate: no world called wrn; did you mean worn?"),
+        (["colect"], "gsl colect: No such command 'colect'. Did you mean 'collect'?\n"),
+        (["collect", "--jsn"], "gsl collect: No such option: --jsn"),
+        (["collect", "--config-dir", "nowhere"], "gsl collect: --config-dir nowhere: there is no such folder\n"),
+        (["show", "nothing"], "gsl show: nothing: there is no such path"),
+    ],
+)
+def test_wrong_usage_is_one_line_too(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(arguments) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith(message)
+    assert printed.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("how", "exit_code", "message"),
+    [
+        ("known", 1, "gsl collect: the robot is on fire; put it out\n"),
+        ("bug", 1, "gsl collect: internal error: ZeroDivisionError: division by zero in two lines; GSL_TRACEBACK=1"),
+        ("ctrl-c", 130, "gsl collect: interrupted\n"),
+    ],
+)
+def test_a_stage_that_fails_leaves_nothing_behind(
+    how: str, exit_code: int, message: str, elsewhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(["collect", f"fails={how}"]) == exit_code
+    assert capsys.readouterr().err.startswith(message)
+    assert [path for path in elsewhere.rglob("*") if path.is_file()] == []
+
+
+def test_a_traceback_is_there_for_who_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GSL_TRACEBACK", "1")
+    with pytest.raises(ZeroDivisionError):
+        call(["collect", "fails=bug"])
+
+
+def test_each_job_of_a_multirun_has_its_own_artifact(elsewhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["collect", "-m", "--json", "seed=1,2", "world=ideal,worn", "world.iterations=7"]) == 0
+    jobs = json.loads(capsys.readouterr().out)["jobs"]
+    assert [job["metrics"]["seed"] for job in jobs] == [1, 1, 2, 2]
+    assert all((elsewhere / job["folder"] / "manifest.json").is_file() for job in jobs)
+    assert jobs[1]["folder"] == "runs/example/collect/seed=1,world=worn"
+    assert {path.name for path in (elsewhere / "runs").iterdir()} == {"example"}
+
+
+def test_a_failing_job_does_not_stop_the_others(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["collect", "-m", "--json", "fails=known,''"]) == 1
+    first, second = json.loads(capsys.readouterr().out)["jobs"]
+    assert first["error"] == "the robot is on fire; put it out"
+    assert second["exit_code"] == 0
+
+
+def test_a_multirun_is_checked_before_it_starts(elsewhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["collect", "-m", "seed=1,2", "episodez=3,4"]) == 2
+    assert "episodez: no such setting; did you mean episodes" in capsys.readouterr().err
+    assert not (elsewhere / "runs").exists()
+
+
+def test_a_job_is_named_by_what_is_particular_about_it() -> None:
+    assert job_level(["seed=1", "++a.b=0.5", "n=3"], ["seed", "a.b"], 4) == "seed=1,a.b=0.5"
+    assert job_level(["world@sim=x/y"], ["world@sim"], 4) == "sim=x_y"
+    assert job_level(["n=3"], [], 4) == "4"
+    assert job_level(["n=" + "x" * 200], ["n"], 4) == "4"
+
+
+def test_a_file_of_the_user_wins_over_ours(elsewhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mine = elsewhere / "mine"
+    (mine / "preset").mkdir(parents=True)
+    (mine / "preset/quick.yaml").write_text("episodes: 77\n")
+    (mine / "collect.yaml").write_text((CONF / "collect.yaml").read_text().replace("world: ideal", "preset@p: quick"))
+    assert call(["collect", "--config-dir", str(mine), "--cfg", "job", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["episodes"] == 77
+
+
+def test_help_shows_groups_settings_and_effects(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["evaluate", "--help"]) == 0
+    text = capsys.readouterr().out
+    assert "  real        ideal plain worn*\n" in text
+    assert "  control_period  0.02 s" in text
+    assert "episodes in each" in text
+    assert "backlash.width" in text
+
+
+@pytest.mark.parametrize("command", sorted(path.stem for path in configuration_folder().glob("*.yaml")))
+def test_our_own_configurations_compose(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("GSL_CONFIG_DIR")
+    assert call([command.replace("_", "-"), "--cfg", "job"]) == 0
+
+
+def test_a_saved_component_is_built_again() -> None:
+    saved = {"_target_": "gsl.config.CommandSettings", "name": "mine"}
+    assert build(saved).name == "mine"
+
+
+@pytest.mark.parametrize(
+    "saved",
+    [
+        {"_target_": "os.getcwd"},
+        {"_target_": "gsl.config.shlex.join", "split_command": []},
+        {"_target_": "gsl.config.build", "mapping": {}, "trust": True},
+        {"_target_": "gsl.config.CommandSettings", "name": {"_target_": "os.getcwd"}},
+        {"_target_": "gsl.config.CommandSettings", "name": [{"_target_": "os.getcwd"}]},
+        {"_target_": "gsl.config.CommandSettings", "name": "${oc.create:'{_target_: os.getcwd}'}"},
+        {"_target_": "${oc.env:HOME}"},
+        {"_target_": "gsl.no_such.Thing"},
+        {"_target_": 3},
+    ],
+)
+def test_a_saved_component_names_classes_of_gsl_and_plain_values_only(saved: dict[str, object]) -> None:
+    with pytest.raises(ConfigError):
+        build(saved)
+
+
+def test_a_saved_component_of_the_users_own_needs_trust() -> None:
+    saved = {"_target_": "example_stage.ExampleWorld", "control_period": 0.02}
+    with pytest.raises(ConfigError, match="trust=true"):
+        build(saved)
+    assert build(saved, trust=True) == ExampleWorld(control_period=0.02)

@@ -1,0 +1,79 @@
+"""An evaluation chooses the best stable policy and measures it again; every real episode is counted."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenarios import GROUND, QUIET
+
+from gsl.errors import ArtifactError
+from gsl.policies.linear import Linear
+from gsl.policies.walk_engine import WalkEngine
+from gsl.stages.choices import policies, record
+from gsl.stages.evaluate import Evaluate
+from gsl.storage.policies import read_policies, write_policies
+from gsl.tasks.walk import Walk
+
+WALK, TASK = WalkEngine(), Walk(duration=1.4)
+
+
+def _theta(**changes: float) -> np.ndarray:
+    values = dict(zip(WALK.names, WALK.initial, strict=True)) | changes
+    return np.array(list(values.values()))
+
+
+FAST = _theta(max_forward=0.33, max_forward_change=0.25)
+FALLING = _theta(com_offset=-0.09)
+
+
+def _evaluated(tmp_path: Path, found: dict[str, np.ndarray], **settings: object) -> tuple[dict, dict]:
+    file = tmp_path / "candidates.json"
+    write_policies(file, policies(WALK, TASK, [record(WALK, name, theta) for name, theta in found.items()]))
+    sizes = {"episodes": 2, "confirmation": 3, **settings}
+    metrics = Evaluate(GROUND, TASK, WALK, str(file), workers=1, **sizes).run(tmp_path, QUIET)
+    return dict(metrics), json.loads((tmp_path / "evaluation.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, dict, Path]:
+    folder = tmp_path_factory.mktemp("evaluate")
+    return (*_evaluated(folder, {"pi0": WALK.initial, "falling": FALLING, "fast": FAST}), folder)
+
+
+def test_the_best_stable_policy_is_returned(three: tuple[dict, dict, Path]) -> None:
+    metrics, _, folder = three
+    assert metrics["best"] == "fast"
+    assert [one.name for one in read_policies(folder / "policies.json").records] == ["fast"]
+    assert metrics["gain"]["value"] == pytest.approx(metrics["returned"]["value"] - metrics["baseline"]["value"])
+    assert metrics["gain"]["value"] > 0.0
+    assert (metrics["stable_policies"], metrics["improving_policies"], metrics["policies"]) == (1, 1, 2)
+
+
+def test_a_policy_that_falls_costs_no_further_episode_and_is_worth_nothing(three: tuple[dict, dict, Path]) -> None:
+    metrics, table, _ = three
+    falling = table["policies"][1]
+    assert falling["falls"] == 1 and falling["values"][-1] == 0.0
+    assert metrics["real_episodes"] == 2 + falling["episodes"] + 2 + 3 + 3
+
+
+def test_fresh_episodes_are_not_those_of_the_choice(three: tuple[dict, dict, Path]) -> None:
+    _, table, _ = three
+    chosen = {value for row in table["policies"] for value in row["values"] if value}
+    assert chosen.isdisjoint(value for row in table["confirmation"] for value in row["values"] if value)
+
+
+def test_without_a_stable_improvement_the_baseline_is_returned(tmp_path: Path) -> None:
+    metrics, _ = _evaluated(tmp_path, {"pi0": WALK.initial, "falling": FALLING})
+    assert metrics["best"] == "pi0" and metrics["gain"]["value"] == 0.0
+    assert metrics["stable_policies"] == 0
+
+
+def test_policies_of_another_family_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "policies.json"
+    write_policies(file, policies(WALK, TASK, [record(WALK, "pi0", WALK.initial)]))
+    other = Linear(start_at={})
+    with pytest.raises(ArtifactError, match="policy="):
+        Evaluate(GROUND, TASK, other, str(file), episodes=1, confirmation=2, workers=1).run(tmp_path, QUIET)

@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gsl.core.history import History
+from gsl.core.trajectory import Batch
+from gsl.errors import InputError
+from gsl.grounding.gat import LoadedTransformation
+from gsl.grounding.none import NoGrounding
+from gsl.models.forward import ForwardModel
+from gsl.models.inverse import Solver
+from gsl.models.network import Network
+from gsl.policies.walk_engine import WalkEngine
+from gsl.stages.grounding_check import ALPHAS, BARE, GROUNDED, OFF, PI0, STILL, check, largest_stable_alpha
+from gsl.stages.grounding_replay import TICKS
+from gsl.stages.rollout import Scenario, rollout
+from gsl.tasks.walk import Walk
+from gsl.worlds.bullet import BulletWorld
+
+POLICY = WalkEngine()
+SCENARIO = Scenario(
+    BulletWorld(robot="nao", effects={}, start_noise=0.02), Walk(duration=1.0), POLICY, "sim", NoGrounding()
+)
+JOINTS = SCENARIO.world.layout.joints
+
+
+@cache
+def heldout() -> Batch:
+    env = SCENARIO.make()
+    parameters = [POLICY.initial, 0.97 * POLICY.initial]
+    episodes = tuple(rollout(SCENARIO, env, theta, seed) for seed, theta in enumerate(parameters))
+    return Batch(episodes, JOINTS, 0.02, {"episodes": [{"policy": "pi0"}, {"policy": "neighbour_01"}]})
+
+
+def a_transformation(push: float) -> LoadedTransformation:
+    """Every joint is sent `push` [rad] beyond the agent's action."""
+    size, n = History(0).size(len(JOINTS)), len(JOINTS)
+    models = [
+        ForwardModel(Network([(np.zeros((n, size)), np.full(n, value))]), History(0), JOINTS) for value in (push, 0.0)
+    ]
+    return LoadedTransformation(models[0], Solver(models[1], np.eye(n), 1e-9))
+
+
+def test_a_grounding_that_does_nothing_replays_as_no_grounding() -> None:
+    report = check(replace(SCENARIO, grounding=a_transformation(0.0)), POLICY.initial, heldout(), 1)
+    assert report.deviations.keys() == {PI0, OFF}
+    for simulators in report.deviations.values():
+        for ticks in (1, TICKS):
+            np.testing.assert_array_equal(simulators[GROUNDED][ticks].joints, simulators[BARE][ticks].joints)
+    errors = report.metrics()["errors"][OFF]
+    assert errors[BARE]["10_ticks"]["joints_deg"] < 0.5 * errors[STILL]["10_ticks"]["joints_deg"]
+    assert report.acceptable
+    assert report.metrics()["pi0"]["falls"] == 0
+
+
+def test_a_grounding_that_makes_things_worse_is_not_acceptable_and_says_why() -> None:
+    report = check(replace(SCENARIO, grounding=a_transformation(0.3)), POLICY.initial, heldout(), 1)
+    assert not report.acceptable
+    assert "off π0 are farther from the real ones" in report.problems[0]
+
+
+def test_alpha_stays_at_one_where_nothing_falls_and_sinks_where_all_falls() -> None:
+    assert largest_stable_alpha(replace(SCENARIO, grounding=a_transformation(0.0)), POLICY.initial, 1) == 1.0
+    assert largest_stable_alpha(replace(SCENARIO, grounding=a_transformation(3.0)), POLICY.initial, 1) < max(ALPHAS)
+
+
+def test_trajectories_without_the_body_cannot_be_replayed() -> None:
+    blind = replace(heldout(), episodes=tuple(replace(one, sensors={}) for one in heldout().episodes))
+    with pytest.raises(InputError, match=r"lack gyro\.x"):
+        check(SCENARIO, POLICY.initial, blind, 1)
+
+
+def test_trajectories_of_another_robot_are_refused() -> None:
+    with pytest.raises(InputError, match="not of"):
+        check(SCENARIO, POLICY.initial, replace(heldout(), joints=JOINTS[::-1]), 1)

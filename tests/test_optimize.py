@@ -1,0 +1,109 @@
+"""A search keeps the best of each generation, and is the same search after a kill."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenarios import AIR, QUIET, REACH
+
+from gsl.grounding.none import NoGrounding
+from gsl.optimizers.cma_es import CmaEs
+from gsl.stages.generations import Generation, GenerationLog
+from gsl.stages.optimize import Optimize
+from gsl.storage.policies import read_policies
+from gsl.tasks.arm import Arm
+
+SETTINGS = [
+    *("name=kill", "grounding=none", "task=arm", "policy=linear", "world.floating=false", "world.settle=0.1"),
+    *("optimizer.candidates=6", "optimizer.generations=6", "optimizer.sigma=0.2", "rollouts=1", "workers=1"),
+]
+
+
+def _search(generations: int, seed: int = 1) -> Optimize:
+    optimizer = CmaEs(candidates=6, generations=generations, sigma=0.2)
+    return Optimize(AIR, Arm(duration=1.0), REACH, NoGrounding(), optimizer, rollouts=1, workers=1, seed=seed)
+
+
+def test_the_file_holds_pi0_and_the_best_of_each_generation(tmp_path: Path) -> None:
+    metrics = _search(3).run(tmp_path, QUIET)
+    found = read_policies(tmp_path / "policies.json").records
+    assert [one.name for one in found] == ["pi0", "generation_01", "generation_02", "generation_03"]
+    assert metrics["best_value_sim"] == max(one.value_sim for one in found[1:])
+    assert found[0].parameters == dict(zip(REACH.names, REACH.initial, strict=True))
+
+
+def test_the_arm_learns_to_reach_its_goal(tmp_path: Path) -> None:
+    optimizer = CmaEs(candidates=12, generations=12, sigma=0.3)
+    search = Optimize(AIR, Arm(), REACH, NoGrounding(), optimizer, rollouts=1, workers=-1)
+    search.run(tmp_path, QUIET)
+    values = [one.value_sim for one in read_policies(tmp_path / "policies.json").records[1:]]
+    assert max(values) > 20 * values[0] or max(values) > 20.0
+
+
+def test_generations_read_from_the_log_are_not_run_again(tmp_path: Path) -> None:
+    _search(2).run(tmp_path, QUIET)
+    whole = (tmp_path / "policies.json").read_bytes()
+    log = tmp_path / "generations.jsonl"
+    first, second = log.read_text().splitlines(keepends=True)
+    log.write_text(first + second[:20])  # as a kill leaves it
+    _search(2).run(tmp_path, QUIET)
+    assert (tmp_path / "policies.json").read_bytes() == whole
+    assert log.read_text() == first + second
+
+
+def test_a_log_returns_its_values_to_the_bit(tmp_path: Path) -> None:
+    values = np.random.default_rng(0).normal(size=5).tolist()
+    GenerationLog(tmp_path).append(Generation(0, values, [0] * 5))
+    assert GenerationLog(tmp_path).read(0) == Generation(0, values, [0] * 5)
+    assert GenerationLog(tmp_path).read(1) is None
+
+
+def test_a_search_told_the_same_values_asks_for_the_same_candidates() -> None:
+    runs = [CmaEs(candidates=8, generations=9).start(np.ones(3), np.ones(3), 5) for _ in range(2)]
+    np.random.seed(1)
+    for _ in range(4):
+        asked = [np.array(run.ask()) for run in runs]
+        np.testing.assert_array_equal(*asked)
+        np.random.random()
+        for run, candidates in zip(runs, asked, strict=True):
+            run.tell([-float(np.sum((c - 2.0) ** 2)) for c in candidates])
+
+
+def test_cma_es_maximises() -> None:
+    run = CmaEs(candidates=12, generations=60, sigma=0.5).start(np.zeros(4), np.array([1.0, 1.0, 10.0, 0.1]), 0)
+    goal = np.array([1.0, -2.0, 20.0, 0.3])
+    for _ in range(60):
+        candidates = run.ask()
+        run.tell([-float(np.sum(((c - goal) / [1.0, 1.0, 10.0, 0.1]) ** 2)) for c in candidates])
+    np.testing.assert_allclose(candidates[0], goal, rtol=1e-2)
+
+
+def test_cma_es_refuses_a_wrong_number_of_values() -> None:
+    run = CmaEs(candidates=8, generations=2).start(np.ones(3), np.ones(3), 5)
+    run.ask()
+    with pytest.raises(ValueError, match="7"):
+        run.tell([0.0] * 7)
+
+
+def test_after_kill_9_a_search_goes_on_to_the_same_bits(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "gsl", "optimize", *SETTINGS]
+    killed = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    log = tmp_path / "runs/kill/.optimize.partial/generations.jsonl"
+    deadline = time.monotonic() + 60.0
+    while not (log.exists() and log.read_text().count("\n") >= 2):
+        assert killed.poll() is None and time.monotonic() < deadline, "the search ended before it could be killed"
+        time.sleep(0.005)
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+    before = log.read_text()
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    subprocess.run([*command, "out=runs/whole"], cwd=tmp_path, check=True, capture_output=True)
+    resumed, whole = tmp_path / "runs/kill/optimize", tmp_path / "runs/whole"
+    assert (resumed / "policies.json").read_bytes() == (whole / "policies.json").read_bytes()
+    assert (resumed / "generations.jsonl").read_text().startswith(before.rpartition("\n")[0])

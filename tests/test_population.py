@@ -1,0 +1,85 @@
+"""A batch of rollouts depends on its jobs alone."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenarios import QUIET, arm, walk
+
+from gsl.core.trajectory import Trajectory
+from gsl.errors import GslError
+from gsl.stages import population
+from gsl.stages.population import Job, episodes, trajectories
+from gsl.stages.rollout import Scenario, rollout
+
+
+def _jobs(scenario: Scenario, count: int = 4) -> list[Job]:
+    rng = np.random.default_rng(0)
+    start = scenario.policy.initial
+    return [Job(start + 0.02 * scenario.policy.scale * rng.standard_normal(len(start)), 10 + k) for k in range(count)]
+
+
+def _bytes(found: list[Trajectory]) -> list[bytes]:
+    return [one.position.tobytes() + one.velocity.tobytes() + one.reward.tobytes() for one in found]
+
+
+def _run(scenario: Scenario, jobs: list[Job], workers: int) -> list[Trajectory]:
+    with QUIET.progress(len(jobs), "") as progress:
+        return trajectories(scenario, jobs, workers=workers, progress=progress)
+
+
+def test_the_number_and_order_of_workers_change_no_bit() -> None:
+    scenario = walk()
+    jobs = _jobs(scenario)
+    alone, together, reversed_ = _run(scenario, jobs, 1), _run(scenario, jobs, 2), _run(scenario, jobs[::-1], 2)
+    assert _bytes(alone) == _bytes(together) == _bytes(reversed_[::-1])
+
+
+def test_an_episode_is_the_summary_of_its_trajectory() -> None:
+    scenario = arm()
+    jobs = _jobs(scenario, 2)
+    with QUIET.progress(2, "") as progress:
+        short = episodes(scenario, jobs, workers=1, progress=progress)
+    long = _run(scenario, jobs, 1)
+    assert [(one.value, one.fell, one.steps) for one in short] == [(t.value, t.ended_in_a_fall, len(t)) for t in long]
+
+
+def test_a_rollout_after_a_very_short_one_is_the_same() -> None:
+    scenario = walk()
+    env = scenario.make()
+    first = rollout(scenario, env, scenario.policy.initial, 3)
+    rollout(walk(duration=0.02), env, scenario.policy.initial, 4)
+    assert _bytes([first]) == _bytes([rollout(scenario, env, scenario.policy.initial, 3)])
+
+
+def _dies_once(marker: Path, frozen: bytes, job: Job) -> int:
+    if job.seed == 12 and not marker.exists():
+        marker.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return job.seed
+
+
+def _dies(marker: Path, frozen: bytes, job: Job) -> int:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return 0
+
+
+def _in_parallel(function: Callable[..., int], tmp_path: Path) -> list[int]:
+    jobs = [Job(np.zeros(1), seed) for seed in range(10, 16)]
+    with QUIET.progress(len(jobs), "") as progress:
+        return population._in_parallel(partial(function, tmp_path / "died"), arm(), jobs, 2, progress)
+
+
+def test_a_killed_worker_costs_only_its_own_jobs(tmp_path: Path) -> None:
+    assert _in_parallel(_dies_once, tmp_path) == list(range(10, 16))
+
+
+def test_workers_that_always_die_end_in_one_clear_line(tmp_path: Path) -> None:
+    with pytest.raises(GslError, match="workers=1"):
+        _in_parallel(_dies, tmp_path)

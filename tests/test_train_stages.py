@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from toy_plant import LAYOUT, QUICK, SLOW, ToyEnv, a_batch
+
+from gsl.errors import TrajectoryError
+from gsl.grounding.gat import LoadedTransformation
+from gsl.models.config import ModelConfig
+from gsl.stages.train_forward import HELDOUT, TrainForward
+from gsl.stages.train_inverse import TrainInverse
+from gsl.stages.training import labels
+from gsl.storage.models import read_forward_model, read_inverse_model
+from gsl.storage.trajectories import read, write
+from gsl.worlds.grounded import GroundedEnv
+
+QUIET: Any = SimpleNamespace(status=lambda text: None, table=lambda title, columns, rows: None)
+LINEAR = ModelConfig(family="linear", ridge=1e-6)
+
+
+@pytest.fixture
+def real(tmp_path: Path) -> str:
+    write(tmp_path / "real.parquet", a_batch(SLOW, "real"))
+    return str(tmp_path / "real.parquet")
+
+
+@pytest.fixture
+def sim(tmp_path: Path) -> str:
+    write(tmp_path / "sim.parquet", a_batch(QUICK, "sim", noise=0.02))
+    return str(tmp_path / "sim.parquet")
+
+
+def test_the_forward_model_is_measured_on_trajectories_of_both_groups_that_it_has_not_seen(
+    real: str, tmp_path: Path
+) -> None:
+    metrics = TrainForward(data=real, model=LINEAR).run(tmp_path, QUIET)
+    heldout = read(tmp_path / HELDOUT)
+    assert "pi0" in labels(heldout)
+    assert set(labels(heldout)) != {"pi0"}
+    assert metrics["trajectories"] + len(heldout) == len(read(Path(real)))
+    for group in ("pi0", "off_pi0"):
+        measured = metrics["heldout"][group]
+        assert measured["one_step_deg"] < 1e-3 < measured["one_step_no_change_deg"]
+        assert measured["free_run_deg"] < 1e-2 < measured["free_run_no_change_deg"]
+        assert measured["r2"] > 0.9999
+        assert measured["one_step_by_joint_deg"].keys() == {"LHipPitch", "LKneePitch"}
+
+
+def test_a_linear_plant_needs_no_mlp(real: str, tmp_path: Path) -> None:
+    model = ModelConfig(hidden=(8,), epochs=3)
+    assert TrainForward(data=real, model=model).run(tmp_path, QUIET)["family"] == "linear"
+
+
+@pytest.mark.parametrize("model", [LINEAR, ModelConfig(family="mlp", hidden=(8,), epochs=2)])
+def test_the_same_seed_writes_the_same_bytes(real: str, tmp_path: Path, model: ModelConfig) -> None:
+    written = []
+    for name in ("first", "again"):
+        (tmp_path / name).mkdir()
+        TrainForward(data=real, model=model).run(tmp_path / name, QUIET)
+        written.append([(tmp_path / name / file).read_bytes() for file in (HELDOUT, "forward_model.safetensors")])
+    assert written[0] == written[1]
+
+
+@pytest.mark.parametrize("horizon", [1, 2])
+@pytest.mark.parametrize("encoding", ["plain", "sincos"])
+def test_every_encoding_and_horizon_predicts(real: str, tmp_path: Path, encoding: str, horizon: int) -> None:
+    model = ModelConfig(family="linear", encoding=encoding, horizon=horizon, sensors=("gyro",))
+    measured = TrainForward(data=real, model=model).run(tmp_path, QUIET)["heldout"]["off_pi0"]
+    assert measured["one_step_deg"] < 0.2 * measured["one_step_no_change_deg"]
+
+
+@pytest.mark.parametrize(("method", "bound"), [("regression", 0.03), ("solve", 0.6)])
+def test_the_inverse_model_recovers_what_was_carried_out(sim: str, tmp_path: Path, method: str, bound: float) -> None:
+    metrics = TrainInverse(data=sim, model=LINEAR, method=method).run(tmp_path, QUIET)
+    assert metrics["method"] == method
+    assert metrics["heldout"]["recovered_action_deg"] < bound
+
+
+@pytest.mark.parametrize(("method", "left"), [("regression", 0.01), ("solve", 0.2)])
+def test_the_chain_makes_a_quick_simulator_move_like_the_slow_robot(
+    real: str, sim: str, tmp_path: Path, method: str, left: float
+) -> None:
+    memoryless = ModelConfig(family="linear", ridge=1e-6, history=0)
+    TrainForward(data=real, model=memoryless).run(tmp_path, QUIET)
+    TrainInverse(data=sim, model=memoryless, method=method, damping=0.05).run(tmp_path, QUIET)
+    models = (str(tmp_path / f"{kind}_model.safetensors") for kind in ("forward", "inverse"))
+    grounding = LoadedTransformation(read_forward_model(next(models)), read_inverse_model(next(models)))
+    worlds = [ToyEnv(SLOW), ToyEnv(QUICK), GroundedEnv(ToyEnv(QUICK), grounding)]
+    paths = []
+    for world in worlds:
+        world.reset(seed=3)
+        paths.append(np.array([world.step(0.4 * np.sin(0.3 * tick + np.array([0.0, 1.0])))[0] for tick in range(60)]))
+    robot, simulator, grounded = (path[5:, LAYOUT["position"]] for path in paths)
+    assert np.abs(grounded - robot).max() < left * np.abs(simulator - robot).max()
+
+
+def test_unlabelled_episodes_are_those_of_pi0(tmp_path: Path) -> None:
+    batch = a_batch(SLOW, "real")
+    del batch.metadata["episodes"]  # type: ignore[attr-defined]
+    write(tmp_path / "real.parquet", batch)
+    assert set(labels(read(tmp_path / "real.parquet"))) == {"pi0"}
+    metrics = TrainForward(data=str(tmp_path / "real.parquet"), model=LINEAR).run(tmp_path, QUIET)
+    assert metrics["heldout"].keys() == {"pi0"}
+
+
+def test_two_trajectories_are_too_few(tmp_path: Path) -> None:
+    write(tmp_path / "real.parquet", a_batch(SLOW, "real", pi0=2, others=0))
+    with pytest.raises(TrajectoryError, match="holds 2 episodes"):
+        TrainForward(data=str(tmp_path / "real.parquet"), model=LINEAR).run(tmp_path, QUIET)
+
+
+def test_a_sensor_that_was_not_recorded_is_named(real: str, tmp_path: Path) -> None:
+    with pytest.raises(TrajectoryError, match=r"foot_force\.left.*leave the sensor out"):
+        TrainForward(data=real, model=ModelConfig(family="linear", sensors=("foot_force",))).run(tmp_path, QUIET)
