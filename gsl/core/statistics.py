@@ -20,7 +20,9 @@ class Interval(NamedTuple):
 def mean_interval(values: Sequence[float] | np.ndarray, *, confidence: float = 0.95) -> Interval:
     """Return the mean of independent values, shape (n,), with Student's t interval."""
     values = np.asarray(values, dtype=float)
-    return _t_interval(values.mean(), values.var(ddof=1) / len(values) if len(values) > 1 else np.inf, len(values) - 1, confidence)
+    return _t_interval(
+        values.mean(), values.var(ddof=1) / len(values) if len(values) > 1 else np.inf, len(values) - 1, confidence
+    )
 
 
 def difference_interval(after: np.ndarray, before: np.ndarray, *, confidence: float = 0.95) -> Interval:

@@ -18,7 +18,7 @@ from gsl.robots.nao_legs import leg_angles
 (COM_OFFSET, PERIOD, HIP_HEIGHT, MAX_FORWARD, MAX_LEFT, MAX_TURN, FORWARD_CHANGE, LEFT_CHANGE, TURN_CHANGE,
  LIFT, ARM_SWING, PENDULUM, FORWARD_LIFT, LEFT_LIFT, START_DIVISOR) = range(15)  # fmt: skip
 
-# rows of the state: clock [s], which leg swings (+1 left, -1 right), 0 in the priming step then 1, the ratcheted request
+# rows of the state: clock [s], which leg swings (+1 left, -1 right), 0 in the priming step or 1, the ratcheted request
 # (3), filtered pitch rate [rad/s], last centre of pressure [m], feet ahead of the hips [m] (left, right), leg opening
 # [rad], yaw of each leg [rad], and these four as they were when the step began
 CLOCK, SWING, WALKING, FORWARD, LEFT, TURN, GYRO, PRESSURE, FEET, BEGAN, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16

@@ -20,9 +20,17 @@ class PolicyRun(Protocol):
 class Policy(Protocol):
     """A family of policies; one member is a parameter vector."""
 
-    names: tuple[str, ...]
-    initial: np.ndarray
-    scale: np.ndarray
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, in order."""
+
+    @property
+    def initial(self) -> np.ndarray:
+        """The parameters of π0."""
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Size of a step in each parameter that is as bold as in any other."""
 
     def posture(self, parameters: np.ndarray, layout: Layout) -> np.ndarray:
         """Return the joint positions where an episode starts [rad], shape (n_joints,)."""

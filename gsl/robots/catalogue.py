@@ -29,6 +29,7 @@ def robot(name: str) -> Robot:
     if not (name in names() or "." in name):
         raise ConfigError("robot", f"no robot called '{name}'{did_you_mean(name, names(), listed=True)}")
     try:
-        return getattr(importlib.import_module(place), function)()
+        built: Robot = getattr(importlib.import_module(place), function)()
+        return built
     except (ImportError, AttributeError) as error:
         raise ConfigError("robot", f"'{name}' cannot be imported: {error}") from error

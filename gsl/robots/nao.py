@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from gsl.core.body import Joint, Link, Robot
-from gsl.robots.nao_shapes import SHAPES
+from gsl.robots.nao_shapes import SHAPES, Triple
 
 HIP_OFFSET_Y, HIP_OFFSET_Z = 0.05, 0.085  # [m] A
 THIGH, TIBIA, FOOT_HEIGHT = 0.100, 0.1029, 0.04519  # [m] A
@@ -28,9 +28,9 @@ ARMATURE = {  # gear ratio² x rotor inertia [kg·m²], E and M
 }
 LEG_GAINS = (
     150.0,
-    3.0,
+    4.0,
 )  # [N·m/rad], [N·m·s/rad]: no published servo gains; chosen with the rotor inertia (docs/worlds.md)
-ARM_GAINS = (0.35 * 150.0, 0.35 * 3.0)
+ARM_GAINS = (0.35 * LEG_GAINS[0], 0.35 * LEG_GAINS[1])
 
 # name, mass [kg], centre of mass [m], inertia about it [1e-6 kg·m²] as (xx, xy, xz, yy, yz, zz); A
 _LINKS = (
@@ -105,18 +105,20 @@ def nao() -> Robot:
     )
 
 
-def _link(name: str, mass: float, com: tuple, moments: tuple) -> Link:
+def _link(name: str, mass: float, com: Triple, moments: tuple[float, ...]) -> Link:
     xx, xy, xz, yy, yz, zz = (1e-6 * value for value in moments)
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return Link(name, mass, np.array(com), inertia, SHAPES.get(name, ()))
 
 
-def _driven(name: str, parent: str, child: str, origin: tuple, axis: tuple, *limits_and_motor: float | str) -> Joint:
-    lower, upper, speed, effort, motor = limits_and_motor
+def _driven(
+    name: str, parent: str, child: str, origin: Triple, axis: Triple,
+    lower: float, upper: float, speed: float, effort: float, motor: str,
+) -> Joint:  # fmt: skip
     return Joint(name, parent, child, np.array(origin), np.array(axis), lower, upper, speed, effort, ARMATURE[motor])
 
 
-def _held(name: str, parent: str, child: str, origin: tuple, axis: tuple, angle: float) -> Joint:
+def _held(name: str, parent: str, child: str, origin: Triple, axis: Triple, angle: float) -> Joint:
     return Joint(name, parent, child, np.array(origin), np.array(axis), angle, angle, 0.0, 0.0, fixed_at=angle)
 
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from gsl.core.body import Shape
 
+Triple = tuple[float, float, float]
+
 _FOOT_HEIGHT = 0.04519
 _WHITE, _GREY, _DARK, _ORANGE, _BLUE = (
     (0.97, 0.97, 0.98),
@@ -17,15 +19,15 @@ _WHITE, _GREY, _DARK, _ORANGE, _BLUE = (
 )
 
 
-def _box(size: tuple, centre: tuple, colour: tuple = _WHITE) -> Shape:
+def _box(size: Triple, centre: Triple, colour: Triple = _WHITE) -> Shape:
     return Shape("box", size, centre, colour=colour)
 
 
-def _ball(radius: float, centre: tuple = (0.0, 0.0, 0.0), colour: tuple = _WHITE) -> Shape:
+def _ball(radius: float, centre: Triple = (0.0, 0.0, 0.0), colour: Triple = _WHITE) -> Shape:
     return Shape("sphere", (radius,), centre, colour=colour)
 
 
-def _rod(radius: float, length: float, along: str, centre: tuple = (0.0, 0.0, 0.0), colour: tuple = _WHITE) -> Shape:
+def _rod(radius: float, length: float, along: str, centre: Triple = (0.0, 0.0, 0.0), colour: Triple = _WHITE) -> Shape:
     return Shape("cylinder", (radius, length), centre, colour=colour, along=along)
 
 

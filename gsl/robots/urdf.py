@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from xml.etree import ElementTree as xml
 
 import numpy as np
@@ -76,7 +77,9 @@ def _add_joint(root: xml.Element, joint: Joint) -> None:
     xml.SubElement(node, "limit", {name: _text(value) for name, value in limit.items()})
 
 
-def _origin(node: xml.Element, xyz: np.ndarray | tuple, rpy: np.ndarray | tuple = (0.0, 0.0, 0.0)) -> None:
+def _origin(
+    node: xml.Element, xyz: Sequence[float] | np.ndarray, rpy: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)
+) -> None:
     xml.SubElement(node, "origin", xyz=_text(*xyz), rpy=_text(*rpy))
 
 

@@ -45,7 +45,9 @@ def records(policy: Policy, reference: str) -> tuple[PolicyRecord, ...]:
     path = resolve(reference)
     found = read_policies(path / FILE if path.is_dir() else path)
     if found.policy != described(policy):
-        raise ArtifactError(path, f"its policies are of {found.policy}, not of {described(policy)}; choose policy= accordingly")
+        raise ArtifactError(
+            path, f"its policies are of {found.policy}, not of {described(policy)}; choose policy= accordingly"
+        )
     return found.records
 
 

@@ -54,7 +54,9 @@ class Collect:
         with console.progress(len(jobs), f"collecting in the {self.role} world") as progress:
             episodes = trajectories(scenario, jobs, workers=self.workers, progress=progress)
         layout = self.world.layout
-        labels = [{"policy": name, "parameters": job.parameters.tolist()} for name, job in zip(names, jobs, strict=True)]
+        labels = [
+            {"policy": name, "parameters": job.parameters.tolist()} for name, job in zip(names, jobs, strict=True)
+        ]
         about = {
             "robot": self.world.robot,
             "role": self.role,
@@ -81,4 +83,6 @@ class Collect:
         near = [neighbour(self.policy, parameters, self.spread, rng) for _ in range(self.neighbours)]
         names = ["pi0"] * self.episodes + [f"neighbour_{index + 1:02d}" for index in range(self.neighbours)]
         chosen = [parameters] * self.episodes + near
-        return names, [Job(theta, derived_seed(self.seed, self.kind, self.role, index)) for index, theta in enumerate(chosen)]
+        return names, [
+            Job(theta, derived_seed(self.seed, self.kind, self.role, index)) for index, theta in enumerate(chosen)
+        ]

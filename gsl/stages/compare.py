@@ -1,4 +1,4 @@
-"""Groundings against each other: paired trials of one iteration each, in one or more real worlds (the paper's Table 2)."""
+"""Groundings against each other: paired trials of one iteration each, in several real worlds (the paper's Table 2)."""
 
 from __future__ import annotations
 

@@ -30,9 +30,9 @@ _CHOICE, _CONFIRMATION = "choice", "confirmation"  # their seeds never meet
 class Evaluate:
     """A policy that falls once is unstable and costs no further episode; the first policy of the file is the baseline.
 
-    The best stable policy is measured again on fresh episodes, and so is the baseline: the speeds that are reported did
-    not take part in the choice. If it falls there, it is unstable after all and the next best one is tried; every episode
-    counts.
+    The best stable policy is measured again on fresh episodes, and so is the baseline: the speeds that are reported
+    did not take part in the choice. If it falls there, it is unstable after all and the next best one is tried; every
+    episode counts.
     """
 
     kind: ClassVar[str] = "evaluate"
@@ -85,15 +85,21 @@ class Evaluate:
         fresh: dict[int, list[Episode]],
         progress: Any,
     ) -> int:
-        """Return the fastest stable policy that stays stable in fresh episodes, which go into `fresh`; else the baseline."""
-        better = [index for index in range(1, len(tried)) if not _falls(tried[index]) and _mean(tried[index]) > _mean(tried[0])]
+        """Return the fastest policy that is stable in the choice and in fresh episodes, which go into `fresh`."""
+        better = [
+            index
+            for index in range(1, len(tried))
+            if not _falls(tried[index]) and _mean(tried[index]) > _mean(tried[0])
+        ]
         for index in sorted(better, key=lambda index: -_mean(tried[index])):
             fresh[index] = self._measured(scenario, found[index], index, _CONFIRMATION, progress)
             if not _falls(fresh[index]):
                 return index
         return 0
 
-    def _measured(self, scenario: Scenario, theta: PolicyRecord, index: int, purpose: str, progress: Any) -> list[Episode]:
+    def _measured(
+        self, scenario: Scenario, theta: PolicyRecord, index: int, purpose: str, progress: Any
+    ) -> list[Episode]:
         """Run the episodes of one purpose; for the choice only up to and with the first fall."""
         count = self.episodes if purpose == _CHOICE else self.confirmation
         parameters = vector(self.policy, theta)
@@ -113,15 +119,30 @@ def _mean(done: list[Episode]) -> float:
 
 def _summary(done: list[Episode]) -> dict[str, Any]:
     interval = mean_interval([episode.value for episode in done])
-    return {"value": interval.mean, "interval": [interval.lower, interval.upper], "falls": _falls(done), "episodes": len(done)}
+    return {
+        "value": interval.mean,
+        "interval": [interval.lower, interval.upper],
+        "falls": _falls(done),
+        "episodes": len(done),
+    }
 
 
 def _row(theta: PolicyRecord, done: list[Episode]) -> dict[str, Any]:
     values = [episode.value for episode in done]
-    return {"name": theta.name, "generation": theta.generation, "value_sim": theta.value_sim, **_summary(done), "values": values}
+    return {
+        "name": theta.name,
+        "generation": theta.generation,
+        "value_sim": theta.value_sim,
+        **_summary(done),
+        "values": values,
+    }
 
 
 def _gain(after: list[Episode], before: list[Episode]) -> dict[str, Any]:
     values = [[episode.value for episode in done] for done in (after, before)]
     difference: Interval = difference_interval(np.array(values[0]), np.array(values[1]))
-    return {"value": difference.mean, "interval": [difference.lower, difference.upper], "share": difference.mean / _mean(before)}
+    return {
+        "value": difference.mean,
+        "interval": [difference.lower, difference.upper],
+        "share": difference.mean / _mean(before),
+    }

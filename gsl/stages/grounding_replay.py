@@ -69,7 +69,7 @@ def replayed(env: BulletEnv, grounding: Grounding, starts: Sequence[Place], seed
     ends: dict[int, list[np.ndarray]] = {1: [], TICKS: []}
     for index, place in enumerate(starts):
         rng = np.random.default_rng([seed, index])
-        for tick, observation in enumerate(_replay(env, grounding, place, rng), start=1):
+        for tick, observation in enumerate(replay(env, grounding, place, rng, TICKS), start=1):
             if tick in ends:
                 ends[tick].append(observation)
     return {tick: _deviations(env.layout, np.array(seen), starts, tick) for tick, seen in ends.items()}
@@ -81,14 +81,16 @@ def unmoved(layout: Layout, starts: Sequence[Place]) -> dict[int, Deviations]:
     return {tick: _deviations(layout, seen, starts, tick) for tick in (1, TICKS)}
 
 
-def _replay(env: BulletEnv, grounding: Grounding, place: Place, rng: np.random.Generator) -> Iterator[np.ndarray]:
+def replay(
+    env: BulletEnv, grounding: Grounding, place: Place, rng: np.random.Generator, ticks: int
+) -> Iterator[np.ndarray]:
     """Yield the observations after each tick; the simulator takes over from the real robot at `place.tick`."""
     run, tick = grounding.start(env.layout, rng), place.tick
     sent = [run.transform(place.seen[k], place.actions[k]) for k in range(tick - PAST, tick)]
     start = _start(env, place.seen[tick], np.array(sent[::-1]))
     observation, _ = env.reset(seed=int(rng.integers(2**31)), options={"start": start})
     observation[env.layout["foot_force"]] = place.seen[tick][env.layout["foot_force"]]  # no contact is solved yet
-    for k in range(tick, tick + TICKS):
+    for k in range(tick, tick + ticks):
         observation, *_ = env.step(run.transform(observation, place.actions[k]))
         yield observation
 

@@ -1,7 +1,8 @@
-"""Grounded simulation learning, the paper's Algorithm 1: ground, optimise, evaluate, until the real return stops rising."""
+"""Grounded simulation learning (the paper's Algorithm 1): ground, optimise, evaluate, until nothing is gained."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -18,15 +19,27 @@ from gsl.policies.policy import Policy
 from gsl.stages.choices import FILE
 from gsl.stages.collect import Collect
 from gsl.stages.evaluate import Evaluate
-from gsl.stages.iteration_report import write_report
+from gsl.stages.iteration_report import write_curve, write_table, write_trace
 from gsl.stages.optimize import Optimize
-from gsl.stages.train_forward import TrainForward
+from gsl.stages.train_forward import HELDOUT, TrainForward
 from gsl.stages.train_inverse import TrainInverse
+from gsl.stages.training import of_policy
 from gsl.storage.artifact import Artifact, Stage, build
+from gsl.storage.models import read_forward_model, read_inverse_model
+from gsl.storage.trajectories import read
 from gsl.tasks.task import REAL, SIM, Task
 from gsl.worlds.world import World
 
-COLUMNS = ("iteration", "policy", "in simulation", "in real", "95 % interval", "falls", "gain over the last", "real episodes")
+COLUMNS = (
+    "iteration",
+    "policy",
+    "in simulation",
+    "in real",
+    "95 % interval",
+    "falls",
+    "gain over the last",
+    "real episodes",
+)
 
 
 @component
@@ -74,23 +87,31 @@ class Iterate:
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run the iterations, write the policy they end with, the table and the plots."""
         done: list[Artifact] = []
-        unit = self.task.unit
-        with console.live_table(f"grounded simulation learning [{unit}]", COLUMNS) as table:
+        shown: list[tuple[str, ...]] = []
+        ungrounded = None
+        with console.live_table(f"grounded simulation learning [{self.task.unit}]", COLUMNS) as table:
+
+            def show(label: str, evaluation: Artifact, *, first: bool = False) -> None:
+                for row in self._rows(label, evaluation.metrics, first=first):
+                    shown.append(row)
+                    table.row(*row)
+
             for number in range(1, self.iterations + 1):
                 previous = str(done[-1].folder) if done else None
                 done.append(self._iteration(number, previous, console))
-                for row in self._rows(number, done[-1].metrics, first=number == 1):
-                    table.row(*row)
+                show(str(number), done[-1], first=number == 1)
                 if not _rose(done[-1]):
                     break
-            ungrounded = self._ungrounded(console) if self.beside else None
-            if ungrounded is not None:
-                for row in self._rows("no grounding", ungrounded.metrics, first=False):
-                    table.row(*row)
+            if self.beside:
+                ungrounded = self._ungrounded(console)
+                show("no grounding", ungrounded)
         best = done[-1] if _rose(done[-1]) or len(done) == 1 else done[-2]
         (folder / FILE).write_bytes((best.folder / FILE).read_bytes())
         spent = sum(self._real_episodes(artifact) for artifact in done)
-        write_report(folder, self, done, ungrounded, console)
+        write_table(folder, COLUMNS, shown)
+        write_curve(folder, self, done, ungrounded)
+        if self.learned:
+            self._trace(folder)
         return {
             "iterations": len(done),
             "returned_iteration": 1 + done.index(best),
@@ -157,7 +178,9 @@ class Iterate:
     def _collected(self, home: Path, previous: str | None, seed: int, console: Any) -> None:
         budget, common = self.budget, {"task": self.task, "policy": self.policy, "initial": previous, "seed": seed}
         common |= {"spread": budget.spread, "workers": self.workers}
-        real = Collect(world=self.real, role=REAL, episodes=budget.real_episodes, neighbours=budget.real_neighbours, **common)
+        real = Collect(
+            world=self.real, role=REAL, episodes=budget.real_episodes, neighbours=budget.real_neighbours, **common
+        )
         sim = Collect(
             world=self.sim,
             role=SIM,
@@ -173,6 +196,15 @@ class Iterate:
         home = Path(self.home) / "iteration_01"
         found = self.search(home / "optimize_none", NoGrounding(), None, self.seed, console)
         return self.measure(home / "evaluate_none", found, self.seed, console)
+
+    def _trace(self, folder: Path) -> None:
+        """Draw the first iteration's grounding on a real walk that its models have not seen."""
+        home = Path(self.home) / "iteration_01"
+        models = {"forward_model": str(home / "train_forward"), "inverse_model": str(home / "train_inverse")}
+        alpha = json.loads((home / "optimize" / "metrics.json").read_text(encoding="utf-8"))["alpha"]
+        grounding = replace(self.grounding, **models, alpha=alpha).load(read_forward_model, read_inverse_model)
+        walks = of_policy(read(home / "train_forward" / HELDOUT), pi0=True)
+        write_trace(folder, self.sim, grounding, max(walks, key=len))
 
     def _real_episodes(self, evaluation: Artifact) -> int:
         collected = (self.budget.real_episodes + self.budget.real_neighbours) if self.learned else 0
@@ -194,7 +226,9 @@ class Iterate:
 
 def _built(stage: Stage, out: Path, console: Any) -> Artifact:
     """Build one link of the chain; the iterations belong to this command, so what was built otherwise is replaced."""
-    return build(stage, config=described(stage), out=out, command=f"gsl iterate ({stage.kind})", force=True, console=console)
+    return build(
+        stage, config=described(stage), out=out, command=f"gsl iterate ({stage.kind})", force=True, console=console
+    )
 
 
 def _rose(evaluation: Artifact) -> bool:

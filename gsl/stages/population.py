@@ -56,7 +56,9 @@ def _in_parallel(function: Any, scenario: Scenario, jobs: Sequence[Job], workers
             progress.advance()
         if len(done) == len(jobs):
             return [done[index] for index in range(len(jobs))]
-    raise GslError(f"worker processes died {TRIES} times in one batch of rollouts; try workers=1 or look at free memory")
+    raise GslError(
+        f"worker processes died {TRIES} times in one batch of rollouts; try workers=1 or look at free memory"
+    )
 
 
 def _arriving(function: Any, frozen: bytes, jobs: Sequence[Job], missing: list[int], workers: int) -> Iterator[Any]:

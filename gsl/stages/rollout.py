@@ -60,7 +60,9 @@ def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed
     return trajectory if np.array_equal(grounded, actions) else replace(trajectory, grounded_action=grounded)
 
 
-def _recorded(layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, fell: bool) -> Trajectory:
+def _recorded(
+    layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, fell: bool
+) -> Trajectory:
     sensors = {
         column: states[:, layout[part].start + index]
         for part, columns in layout.columns.items()

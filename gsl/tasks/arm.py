@@ -19,7 +19,7 @@ HANGING = 0.5 * math.pi  # shoulder pitch of an arm that hangs down [rad]
 
 @component
 class Arm:
-    """Reward 1 / |x - x*|² with x in degrees of lift, capped within `cap` of the goal; the end is an arm above 45 degrees."""
+    """Reward 1 / |x - x*|² x in degrees of lift, capped within `cap` of the goal; an arm above 45 degrees ends it."""
 
     unit: ClassVar[str] = "sum of rewards"
     shown: ClassVar[float] = 1.0

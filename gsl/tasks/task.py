@@ -37,7 +37,10 @@ class Task(Protocol):
         shown: What a value is multiplied by to be in that unit.
     """
 
-    duration: float
+    @property
+    def duration(self) -> float:
+        """Planned length of an episode [s]."""
+
     unit: ClassVar[str]
     shown: ClassVar[float]
 

@@ -72,7 +72,7 @@ class BulletWorld:
 class BulletEnv(gymnasium.Env):
     """One robot in one Bullet client."""
 
-    metadata: Mapping[str, Any] = {"render_modes": []}  # noqa: RUF012  gymnasium's own name and type
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  gymnasium's own name and type
 
     def __init__(self, world: BulletWorld) -> None:
         self.world, self.layout = world, world.layout
@@ -85,7 +85,9 @@ class BulletEnv(gymnasium.Env):
         self._neutral = np.clip(np.zeros(self._n), low, high)
         self._engine: Engine | None = None
 
-    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[np.ndarray, dict]:
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, bool]]:
         """Start anew: at rest in a posture, or in a measured state.
 
         Args:
@@ -106,7 +108,7 @@ class BulletEnv(gymnasium.Env):
             reading = self._engine.read()
         return self._observe(reading), {"fell": False}
 
-    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, bool]]:
         """Hold desired joint positions [rad], shape (n_joints,), for one control period.
 
         Raises:

@@ -93,7 +93,8 @@ class Camera:
         image = np.where((seen == self._floor)[..., None], colours * shade[..., None], colours)
         down = np.linspace(0.0, 1.0, size[1])[:, None, None]
         image = np.where((seen < 0)[..., None], (1.0 - down) * _SKY_TOP + down * _SKY_LOW, image)
-        return image.reshape(height, finer, width, finer, 3).mean(axis=(1, 3)).round().astype(np.uint8)
+        averaged: np.ndarray = image.reshape(height, finer, width, finer, 3).mean(axis=(1, 3)).round().astype(np.uint8)
+        return averaged
 
     def _drawn(self, eye: Sequence[float], lens: Sequence[float], size: tuple[int, int]) -> tuple[np.ndarray, ...]:
         """Colours, depth and number of the body at every pixel."""
@@ -128,8 +129,9 @@ def _places(depth: np.ndarray, eye: Sequence[float], lens: Sequence[float]) -> n
     height, width = depth.shape
     x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2.0 - 1.0, 1.0 - (np.arange(height) + 0.5) / height * 2.0)
     flat = np.stack([x, y, 2.0 * depth - 1.0, np.ones_like(x)], axis=-1)
-    places = flat @ np.linalg.inv(_matrix(lens) @ _matrix(eye)).T
-    return places[..., :3] / places[..., 3:]
+    places: np.ndarray = flat @ np.linalg.inv(_matrix(lens) @ _matrix(eye)).T
+    places = places[..., :3] / places[..., 3:]
+    return places
 
 
 def _floor() -> str:

@@ -201,7 +201,8 @@ class Engine:
     def _force(self, foot: int) -> float:
         if not self.physics.floating:
             return 0.0
-        return sum(point[9] for point in self.bullet.getContactPoints(self.body, 0, foot, physicsClientId=self.client))
+        points = self.bullet.getContactPoints(self.body, 0, foot, physicsClientId=self.client)
+        return float(sum(point[9] for point in points))
 
     def _set_dynamics(self) -> None:
         """Find the links by name; set true inertia, sole friction, and no damping that nobody asked for."""

@@ -153,7 +153,7 @@ def compensation(
 def _turned(spin: np.ndarray, row: np.ndarray, k: int) -> float:
     """Component k of spin x axis: base axes turn with the base."""
     first, second = (k + 1) % 3, (k + 2) % 3
-    return spin[first] * row[9 + second] - spin[second] * row[9 + first]
+    return float(spin[first] * row[9 + second] - spin[second] * row[9 + first])
 
 
 @njit(cache=True)

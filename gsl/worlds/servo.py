@@ -120,9 +120,9 @@ def _delayed(commands: np.ndarray, i: int, start: float, length: float) -> float
     """
     index = min(max(int(np.ceil(-start - 1e-9)), 0), COMMANDS - 1)
     if index == 0:
-        return commands[0, i]
+        return float(commands[0, i])
     newer = min(1.0, max(0.0, (start + length + index - 1) / length))
-    return (1.0 - newer) * commands[index, i] + newer * commands[index - 1, i]
+    return float((1.0 - newer) * commands[index, i] + newer * commands[index - 1, i])
 
 
 @njit(cache=True)

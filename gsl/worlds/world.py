@@ -13,7 +13,9 @@ from gsl.core.layout import Layout
 class World(Protocol):
     """A body to act on; `make` builds it."""
 
-    layout: Layout
+    @property
+    def layout(self) -> Layout:
+        """What an observation holds."""
 
     def make(self) -> gymnasium.Env:
         """Build the environment."""

@@ -1,0 +1,104 @@
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test iterate check clean FORCE
+
+VENV ?= .venv
+GSL ?= $(VENV)/bin/gsl
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+INSTALLED := $(VENV)/.stamp
+
+# Compiled functions that call others of another file are not compiled anew when only that file changed: a cache of their own.
+export NUMBA_CACHE_DIR := $(CURDIR)/.cache/numba-$(shell grep -rl --include='*.py' njit gsl | sort | xargs cat | sha256sum | cut -c1-12)
+
+DEMO ?= name=demo preset=demo beside=true
+
+help: ## Show this.
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /make \1|/' | column -t -s '|'
+
+demo: $(INSTALLED) ## Improve a walk for a "real" robot that the optimiser never touches; some minutes.
+	$(GSL) iterate $(DEMO)
+	@echo "what there is to look at:"
+	@find runs/demo/iterate -maxdepth 1 -type f -not -name '.*' | sort
+
+test: $(INSTALLED) ## Check the style, run the tests.
+	$(VENV)/bin/ruff check
+	$(VENV)/bin/python -m pytest -q -n 2
+
+check: $(INSTALLED) ## Check style, format and types.
+	$(VENV)/bin/ruff check
+	$(VENV)/bin/ruff format --check
+	$(VENV)/bin/mypy
+
+clean: ## Remove caches and build files; runs/ and the virtual environment stay.
+	rm -rf .cache .mypy_cache .pytest_cache .ruff_cache build dist *.egg-info
+	find gsl tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(INSTALLED): pyproject.toml
+	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet 'torch>=2.4,<2.14'
+	$(VENV)/bin/python -m pip install --quiet -e '.[dev,sweep]'
+	touch $@
+
+# The chain of single commands. A stage runs when its configuration, the code or what it reads has changed, and a chain that
+# failed goes on where it stopped. NAME, SIM, REAL, PRESET, RECIPE, SEED and ITERATIONS choose; ARGS goes to every command,
+# COLLECT, TRAIN, OPTIMIZE and EVALUATE to one: make iterate NAME=mine PRESET=toy OPTIMIZE='grounding.alpha=0.5'
+
+NAME ?= chain
+SIM ?= nao_ideal
+REAL ?= nao_worn
+PRESET ?= quick
+RECIPE ?= default
+SEED ?= 1
+ITERATIONS ?= 1
+
+RUN := runs/$(NAME)
+CHOSEN := $(RUN)/.chosen
+export CHOICE := $(strip $(SIM) $(REAL) $(PRESET) $(RECIPE) $(SEED) $(ARGS) | $(COLLECT) | $(TRAIN) | $(OPTIMIZE) | $(EVALUATE))
+ALWAYS := $(shell find gsl -name '*.py') $(wildcard conf/*/*.yaml) $(CHOSEN)
+
+numbers := $(shell seq $(ITERATIONS))
+home = $(RUN)/iteration_$(shell printf %02d $(1))
+seed = $(shell echo $$(($(SEED) + 1000 * ($(1) - 1))))
+before = $(if $(filter 1,$(1)),,$(call home,$(shell echo $$(($(1) - 1))))/evaluate)
+initial = $(if $(call before,$(1)),initial=$(call before,$(1)))
+done_before = $(if $(call before,$(1)),$(call before,$(1))/manifest.json)
+force = $(if $(wildcard $@),force=true)
+command = $(GSL) $(1) preset=$(PRESET) out=$(@D) $(force)
+
+define iteration
+$(call home,$(1))/collect_real/manifest.json: conf/collect.yaml $(ALWAYS) $(call done_before,$(1)) | $(INSTALLED)
+	$$(call command,collect) recipe=$(RECIPE) role=real world=$(REAL) $(call initial,$(1)) seed=$(call seed,$(1)) $(ARGS) $(COLLECT)
+
+$(call home,$(1))/collect_sim/manifest.json: conf/collect.yaml $(ALWAYS) $(call done_before,$(1)) | $(INSTALLED)
+	$$(call command,collect) recipe=$(RECIPE) role=sim world=$(SIM) $(call initial,$(1)) seed=$(call seed,$(1)) $(ARGS) $(COLLECT)
+
+$(call home,$(1))/train_forward/manifest.json: conf/train_forward.yaml $(ALWAYS) $(call home,$(1))/collect_real/manifest.json
+	$$(call command,train-forward) recipe=$(RECIPE) data=$(call home,$(1))/collect_real seed=$(call seed,$(1)) $(ARGS) $(TRAIN)
+
+$(call home,$(1))/train_inverse/manifest.json: conf/train_inverse.yaml $(ALWAYS) $(call home,$(1))/collect_sim/manifest.json
+	$$(call command,train-inverse) recipe=$(RECIPE) data=$(call home,$(1))/collect_sim seed=$(call seed,$(1)) $(ARGS) $(TRAIN)
+
+$(call home,$(1))/optimize/manifest.json: conf/optimize.yaml $(ALWAYS) $(call done_before,$(1)) \
+		$(call home,$(1))/train_forward/manifest.json $(call home,$(1))/train_inverse/manifest.json
+	$$(call command,optimize) recipe=$(RECIPE) world=$(SIM) $(call initial,$(1)) seed=$(call seed,$(1)) \
+		grounding=gat grounding.forward_model=$(call home,$(1))/train_forward \
+		grounding.inverse_model=$(call home,$(1))/train_inverse $(ARGS) $(OPTIMIZE)
+
+$(call home,$(1))/evaluate/manifest.json: conf/evaluate.yaml $(ALWAYS) $(call home,$(1))/optimize/manifest.json
+	$$(call command,evaluate) world=$(REAL) policies=$(call home,$(1))/optimize seed=$(call seed,$(1)) $(ARGS) $(EVALUATE)
+endef
+
+$(foreach number,$(numbers),$(eval $(call iteration,$(number))))
+
+iterate: $(call home,$(lastword $(numbers)))/evaluate/manifest.json ## The chain of single commands, only what has changed; -j2 is safe.
+	@echo "$(<D)"
+
+$(CHOSEN):
+	@mkdir -p $(@D)
+	@echo "$$CHOICE" > $@
+
+ifneq ($(file <$(CHOSEN)),$(CHOICE))
+$(CHOSEN): FORCE
+endif

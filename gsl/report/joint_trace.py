@@ -1,0 +1,77 @@
+"""One joint over time: command, real robot, simulator, grounded simulator (the paper's figures 6 and 7)."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from gsl.report.style import COMMAND, GROUNDED, REAL, SIMULATION, figure, headline, label_ends, look, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Traces(NamedTuple):
+    """One joint over time, each of shape (T,).
+
+    Attributes:
+        time: [s].
+        command: Desired position [rad].
+        real, simulation: Position [rad].
+        grounded: Position in the grounded simulator [rad], if there is one.
+    """
+
+    time: np.ndarray
+    command: np.ndarray
+    real: np.ndarray
+    simulation: np.ndarray
+    grounded: np.ndarray | None = None
+
+
+def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = None) -> None:
+    """Write the figure of one joint as a PNG file; arguments as those of `joint_trace_figure`."""
+    save(joint_trace_figure(traces, joint, title=title), path)
+
+
+def joint_trace_figure(traces: Traces, joint: str, *, title: str | None = None) -> Figure:
+    """Return the figure of one joint in degrees; each simulator is labelled with its RMS distance from the real robot.
+
+    Args:
+        traces: What to draw.
+        joint: Its name.
+        title: By default what grounding does to that distance.
+    """
+    distances = [_rms_degrees(traces.simulation - traces.real)]
+    lines = [("command", traces.command, COMMAND, 1.3, (0, (5, 3))), ("real", traces.real, REAL, 3.2, "-")]
+    lines.append((f"simulation,\n{distances[0]:.1f}° from real", traces.simulation, SIMULATION, 1.8, "-"))
+    if traces.grounded is not None:
+        distances.append(_rms_degrees(traces.grounded - traces.real))
+        label = f"grounded simulation,\n{distances[1]:.1f}° from real"
+        lines.append((label, traces.grounded, GROUNDED, 1.8, "-"))
+    with look():
+        whole = figure(4.6)
+        axes = whole.subplots()
+        for label, angle, colour, width, style in lines:
+            axes.plot(traces.time, np.degrees(angle), linestyle=style, color=colour, linewidth=width, label=label)
+        axes.set_xlim(traces.time[0], traces.time[-1])
+        axes.margins(y=0.08)
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel(f"{joint} [°]")
+        ends = [(math.degrees(angle[-1]), label, colour) for label, angle, colour, _, _ in lines]
+        label_ends(axes, float(traces.time[-1]), ends, gap=0.13)
+        headline(whole, title or _finding(joint, distances))
+    return whole
+
+
+def _rms_degrees(difference: np.ndarray) -> float:
+    return math.degrees(float(np.sqrt(np.mean(difference**2))))
+
+
+def _finding(joint: str, distances: list[float]) -> str:
+    if len(distances) == 1:
+        return f"{joint}: the simulator is {distances[0]:.1f}° from the real robot (RMS)"
+    before, after = distances
+    return f"{joint}: with grounding {after:.1f}° from the real robot, without {before:.1f}° (RMS)"

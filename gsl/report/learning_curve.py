@@ -1,0 +1,198 @@
+"""The learning curve: what each generation's best is worth in simulation, and what in real."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from gsl.report.style import COMMAND, INK, REAL, SIMULATION, figure, headline, label_ends, look, save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+class Point(NamedTuple):
+    """One policy.
+
+    Attributes:
+        generation: 0 for the policy that a search starts from.
+        simulated: Value in simulation, if known.
+        real: Mean value in real.
+        lower, upper: 95 % interval of the real value, infinite where one episode is all there is.
+        falls: In real; a policy that falls once is unstable.
+    """
+
+    generation: int
+    simulated: float | None
+    real: float
+    lower: float
+    upper: float
+    falls: int
+
+
+class Search(NamedTuple):
+    """One search for a policy, drawn as one panel.
+
+    Attributes:
+        label: What it was, such as `iteration 1`.
+        points: Where it starts, then the best of each generation.
+        confirmed: The returned policy measured again on fresh episodes, if it was.
+        start: Name of the policy where it starts.
+    """
+
+    label: str
+    points: Sequence[Point]
+    confirmed: Point | None = None
+    start: str = "π0"
+
+
+def search(
+    label: str, evaluation: Mapping[str, Any], *, shown: float = 1.0, returned: str | None = None, start: str = "π0"
+) -> Search:
+    """Return what an `evaluation.json` holds.
+
+    Args:
+        label: Heading of its panel.
+        evaluation: The document.
+        shown: What values are multiplied by for people, `Task.shown`.
+        returned: Name of the policy that was chosen.
+        start: Name for people of the policy where the search starts.
+    """
+    fresh = [row for row in evaluation["confirmation"] if row["name"] == returned and row["generation"]]
+    confirmed = points(fresh, shown=shown)[0] if fresh else None
+    return Search(label, points(evaluation["policies"], shown=shown), confirmed, start)
+
+
+def points(rows: Sequence[Mapping[str, Any]], *, shown: float = 1.0) -> list[Point]:
+    """Return rows of an `evaluation.json`, values multiplied by `shown`."""
+    return [_point(row, shown) for row in rows]
+
+
+def learning_curve(path: Path, searches: Sequence[Search], *, unit: str, title: str | None = None) -> None:
+    """Write the figure of the searches as a PNG file; arguments as those of `learning_curve_figure`."""
+    save(learning_curve_figure(searches, unit=unit, title=title), path)
+
+
+def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str | None = None) -> Figure:
+    """Return the figure of the searches.
+
+    Args:
+        searches: Panels from left to right.
+        unit: Of all values.
+        title: By default how many of the generations' best stay on their feet in real, and beat their start.
+    """
+    with look():
+        whole = figure(4.6)
+        panels = whole.subplots(1, len(searches), sharey=True, squeeze=False)[0]
+        falls = any(point.falls for one in searches for point in one.points)
+        _scale(panels[0], *_limits(searches), strip=falls)
+        for axes, one in zip(panels, searches, strict=True):
+            _draw(axes, one)
+            axes.tick_params(labelleft=True)
+        panels[0].set_ylabel(f"value [{unit}]")
+        headline(whole, title or _finding(searches))
+    return whole
+
+
+def _point(row: Mapping[str, Any], shown: float) -> Point:
+    lower, upper = row["interval"]
+    return Point(
+        row["generation"] or 0,
+        None if row["value_sim"] is None else shown * row["value_sim"],
+        shown * row["value"],
+        -math.inf if lower is None else shown * lower,
+        math.inf if upper is None else shown * upper,
+        row["falls"],
+    )
+
+
+def _limits(searches: Sequence[Search]) -> tuple[float, float]:
+    """Least and greatest value that is drawn."""
+    drawn = [one for search in searches for one in (*search.points, *filter(None, [search.confirmed]))]
+    values = [one.simulated for one in drawn if one.simulated is not None]
+    values += [one.points[0].real for one in searches]
+    for one in drawn:
+        if not one.falls:
+            values += [bound for bound in (one.real, one.lower, one.upper) if math.isfinite(bound)]
+    return min(values), max(values)
+
+
+def _scale(axes: Axes, low: float, high: float, *, strip: bool) -> None:
+    """Make room for the values and, below them, for a strip without ticks that shows falls, if there are any."""
+    from matplotlib.ticker import MaxNLocator
+
+    room = (high - low) or abs(high) or 1.0
+    bottom, top = low - (0.25 if strip else 0.1) * room, high + 0.08 * room
+    ticks = MaxNLocator(nbins=7, steps=[1, 2, 5, 10]).tick_values(bottom, top)
+    axes.set_yticks([tick for tick in ticks if low - 0.08 * room <= tick <= top])
+    axes.set_ylim(bottom, top)
+
+
+def _draw(axes: Axes, one: Search) -> None:
+    start, last = one.points[0], one.points[-1].generation
+    simulated = [(point.generation, point.simulated) for point in one.points if point.simulated is not None]
+    stable = [point for point in one.points if not point.falls]
+    axes.axhline(start.real, color=COMMAND, linewidth=1.2, linestyle=(0, (5, 4)), zorder=1, label=one.start)
+    if simulated:
+        axes.plot(*zip(*simulated, strict=True), "-o", color=SIMULATION, markersize=4.5, label="simulation")
+    _draw_stable(axes, stable)
+    _draw_falls(axes, [point for point in one.points if point.falls])
+    if one.confirmed is not None and not one.confirmed.falls:
+        _draw_confirmed(axes, one.confirmed)
+    axes.set_title(one.label, loc="left", fontsize=10.5)
+    axes.set_xlabel("generation")
+    axes.set_xticks([point.generation for point in one.points])
+    axes.set_xlim(-0.4, max(1, last) + 0.4)
+    ends = [(start.real, f"{one.start} in real", COMMAND)]
+    ends += [(simulated[-1][1], "best in\nsimulation", SIMULATION)] if simulated else []
+    ends += [(stable[-1].real, "the same\nin real", REAL)] if stable and stable[-1].generation > 0 else []
+    label_ends(axes, axes.get_xlim()[1], ends, gap=0.12)
+
+
+def _draw_stable(axes: Axes, stable: Sequence[Point]) -> None:
+    generations, values = [point.generation for point in stable], [point.real for point in stable]
+    bounded = [point for point in stable if math.isfinite(point.lower) and math.isfinite(point.upper)]
+    axes.plot(generations, values, ":", color=REAL, linewidth=1.0, zorder=2)
+    axes.plot(generations, values, "o", color=REAL, markersize=7, label="real", zorder=4)
+    lower, upper = [point.lower for point in bounded], [point.upper for point in bounded]
+    axes.vlines([point.generation for point in bounded], lower, upper, color=REAL, linewidth=1.8, zorder=3)
+
+
+def _draw_falls(axes: Axes, fallen: Sequence[Point]) -> None:
+    if not fallen:
+        return
+    low, high = axes.get_ylim()
+    places, strip = [point.generation for point in fallen], low + 0.05 * (high - low)
+    axes.plot(places, [strip] * len(places), "x", color=REAL, markersize=8, markeredgewidth=2.0, label="fell")
+    _say(axes, "fell in real", sum(places) / len(places), strip, 9, REAL)
+
+
+def _draw_confirmed(axes: Axes, confirmed: Point) -> None:
+    place = confirmed.generation + 0.18
+    axes.vlines([place], [confirmed.lower], [confirmed.upper], color=INK, linewidth=1.8, zorder=5)
+    axes.plot([place], [confirmed.real], "D", color=INK, markersize=6, label="measured again", zorder=6)
+    _say(axes, "measured again", place, confirmed.lower, -14, INK)
+
+
+def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -> None:
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=3.0, foreground="white")]
+    place: dict[str, Any] = {
+        "path_effects": halo,
+        "xytext": (0, above),
+        "textcoords": "offset points",
+        "ha": "center",
+        "fontsize": 9.5,
+    }
+    axes.annotate(text, (x, y), color=colour, zorder=7, **place)
+
+
+def _finding(searches: Sequence[Search]) -> str:
+    winners = [(point, one.points[0]) for one in searches for point in one.points[1:]]
+    stable = sum(not point.falls for point, _ in winners)
+    better = sum(not point.falls and point.real > start.real for point, start in winners)
+    return f"Of {len(winners)} generation winners {stable} stay on their feet in real, {better} beat their start"

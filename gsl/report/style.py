@@ -1,0 +1,102 @@
+"""The look of our figures: white, few lines, direct labels, colours that colour-blind readers can tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+REAL, SIMULATION, GROUNDED = "#d55e00", "#0072b2", "#009e73"  # Okabe and Ito 2008
+COMMAND, QUIET, INK = "#8c8c8c", "#d0d0d0", "#222222"
+WIDTH, DPI = 10.0, 160  # [in], [1/in]: 1600 pixels
+
+_SETTINGS: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.5,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": "#777777",
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.unicode_minus": True,
+    "xtick.color": "#555555",
+    "ytick.color": "#555555",
+    "xtick.major.width": 0.8,
+    "ytick.major.width": 0.8,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+}
+
+
+@contextmanager
+def look() -> Iterator[None]:
+    """Apply our look to what is drawn inside, and to nothing else."""
+    import matplotlib
+
+    with matplotlib.rc_context(_SETTINGS):
+        yield
+
+
+def figure(height: float) -> Figure:
+    """Return an empty figure [in] that no global list knows of."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as a PNG file without a date in it: equal figures give equal bytes."""
+    with look():
+        figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def headline(figure: Figure, text: str) -> None:
+    """Write what there is to see above everything, at the left."""
+    figure.suptitle(text, x=0.012, ha="left", fontsize=13, fontweight="bold")
+
+
+def label_ends(axes: Axes, x: float, ends: Sequence[tuple[float, str, str]], *, gap: float) -> None:
+    """Write labels to the right of lines that end at `x`, moved apart where they would touch.
+
+    Args:
+        axes: With its final limits.
+        x: In data units.
+        ends: Height in data units, text and colour of each.
+        gap: Least distance of two labels, in shares of the axes' height.
+    """
+    low, high = axes.get_ylim()
+    order = sorted(range(len(ends)), key=lambda index: ends[index][0])
+    places = spread([(ends[index][0] - low) / (high - low) for index in order], gap)
+    for index, place in zip(order, places, strict=True):
+        height, text, colour = ends[index]
+        axes.annotate(
+            text,
+            xy=(x, height),
+            xytext=(x + 0.015 * np.ptp(axes.get_xlim()), low + place * (high - low)),
+            color=colour,
+            va="center",
+            ha="left",
+            annotation_clip=False,
+            linespacing=1.1,
+        )
+
+
+def spread(places: Sequence[float], gap: float) -> list[float]:
+    """Return ascending places moved as little as needed to be `gap` apart."""
+    moved = list(places)
+    for _ in range(100 * len(moved)):
+        for index in range(len(moved) - 1):
+            lack = gap - (moved[index + 1] - moved[index])
+            if lack > 1e-9:
+                moved[index] -= lack / 2
+                moved[index + 1] += lack / 2
+    return moved

@@ -1,0 +1,130 @@
+"""The figures of a report: what is drawn are the numbers that were given."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gsl.report.grounding_errors import grounding_errors, grounding_errors_figure
+from gsl.report.joint_trace import Traces, joint_trace, joint_trace_figure
+from gsl.report.learning_curve import Point, Search, learning_curve, learning_curve_figure, points, search
+from gsl.report.style import spread
+
+PI0 = {"name": "pi0", "generation": None, "value_sim": None, "value": 0.19, "interval": [0.18, 0.20], "falls": 0}
+STABLE = {
+    "name": "generation_01",
+    "generation": 1,
+    "value_sim": 0.25,
+    "value": 0.21,
+    "interval": [0.20, 0.22],
+    "falls": 0,
+}
+FALLEN = {
+    "name": "generation_02",
+    "generation": 2,
+    "value_sim": 0.30,
+    "value": 0.0,
+    "interval": [None, None],
+    "falls": 1,
+}
+AGAIN = {**STABLE, "value": 0.205, "interval": [0.195, 0.215]}
+EVALUATION = {"policies": [PI0, STABLE, FALLEN], "confirmation": [PI0, AGAIN]}
+SEARCH = search("iteration 1", EVALUATION, shown=100.0, returned="generation_01")
+TIME = np.arange(0.0, 1.5, 0.02)
+TRACES = Traces(TIME, np.sin(TIME), np.sin(TIME - 0.1), np.sin(TIME), np.sin(TIME - 0.1) + math.radians(2.0))
+ERRORS = {
+    "of π0": {"ungrounded": {"a": 3.0, "b": 4.0}, "grounded": {"a": 1.0, "b": 1.0}, "no_change": {"a": 9.0, "b": 5.0}},
+    "off π0": {"ungrounded": {"a": 2.0, "b": 2.0}, "grounded": {"a": 3.0, "b": 3.0}, "no_change": {"a": 8.0, "b": 4.0}},
+}
+
+
+def lines(axes: object) -> dict[str, tuple[list[float], list[float]]]:
+    """Labelled lines as they were drawn."""
+    return {line.get_label(): tuple(map(list, line.get_data())) for line in axes.get_lines()}  # type: ignore[attr-defined]
+
+
+def test_points_are_the_rows_of_an_evaluation_in_the_unit_that_is_shown() -> None:
+    start, stable, fallen = points(EVALUATION["policies"], shown=100.0)
+    assert start == Point(0, None, 19.0, 18.0, 20.0, 0)
+    assert stable == Point(1, 25.0, 21.0, 20.0, 22.0, 0)
+    assert fallen == Point(2, 30.0, 0.0, -math.inf, math.inf, 1)
+
+
+def test_the_returned_policy_is_shown_as_it_was_measured_again() -> None:
+    assert SEARCH.confirmed == pytest.approx(Point(1, 25.0, 20.5, 19.5, 21.5, 0))
+    assert search("iteration 1", EVALUATION, returned="pi0").confirmed is None
+
+
+def test_a_learning_curve_shows_values_and_falls() -> None:
+    axes = learning_curve_figure([SEARCH], unit="cm/s").axes[0]
+    drawn = lines(axes)
+    assert axes.get_ylabel() == "value [cm/s]"
+    assert drawn["simulation"] == ([1, 2], [25.0, 30.0])
+    assert drawn["real"] == ([0, 1], [19.0, 21.0])
+    assert drawn["fell"][0] == [2]
+    assert drawn["fell"][1][0] < 18.0  # below every value
+    assert drawn["π0"][1] == [19.0, 19.0]
+    assert drawn["measured again"][1] == [20.5]
+
+
+def test_a_learning_curve_tells_what_it_shows() -> None:
+    figure = learning_curve_figure([SEARCH, Search("no grounding", SEARCH.points)], unit="cm/s")
+    assert figure.get_suptitle() == "Of 4 generation winners 2 stay on their feet in real, 2 beat their start"
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["iteration 1", "no grounding"]
+    assert learning_curve_figure([SEARCH], unit="cm/s", title="mine").get_suptitle() == "mine"
+
+
+def test_nothing_that_is_stable_is_drawn_too() -> None:
+    fallen = [Point(generation, None, 0.0, -math.inf, math.inf, 1) for generation in range(3)]
+    learning_curve_figure([Search("bad", fallen)], unit="cm/s")
+
+
+def test_a_trace_is_in_degrees_and_says_how_far_off_the_simulators_are() -> None:
+    figure = joint_trace_figure(TRACES, "LKneePitch")
+    drawn = lines(figure.axes[0])
+    np.testing.assert_allclose(drawn["command"][1], np.degrees(TRACES.command))
+    np.testing.assert_allclose(drawn["real"][1], np.degrees(TRACES.real))
+    assert "grounded simulation,\n2.0° from real" in drawn
+    assert figure.axes[0].get_ylabel() == "LKneePitch [°]"
+    assert "with grounding 2.0° from the real robot" in figure.get_suptitle()
+
+
+def test_a_trace_does_without_grounding() -> None:
+    assert len(lines(joint_trace_figure(TRACES._replace(grounded=None), "LKneePitch").axes[0])) == 3
+
+
+def test_errors_are_bars_joint_by_joint() -> None:
+    figure = grounding_errors_figure(ERRORS)
+    bars = {bars.get_label(): [bar.get_height() for bar in bars] for bars in figure.axes[0].containers}
+    assert bars == {"no change at all": [9.0, 5.0], "simulator": [3.0, 4.0], "grounded simulator": [1.0, 1.0]}
+    assert [label.get_text() for label in figure.axes[1].get_xticklabels()] == ["a", "b"]
+    assert (
+        figure.get_suptitle() == "Grounding takes the joint error from 3.54° to 1.00° of π0, from 2.00° to 3.00° off π0"
+    )
+
+
+def test_files_are_written_1600_pixels_wide_and_leave_nothing_behind(tmp_path: Path) -> None:
+    import matplotlib
+    from PIL import Image
+
+    before = dict(matplotlib.rcParams)
+    learning_curve(tmp_path / "a.png", [SEARCH], unit="cm/s")
+    joint_trace(tmp_path / "b.png", TRACES, "LKneePitch")
+    grounding_errors(tmp_path / "c.png", ERRORS)
+    assert {Image.open(path).width for path in tmp_path.glob("*.png")} == {1600}
+    assert dict(matplotlib.rcParams) == before
+    assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
+
+
+def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        joint_trace(tmp_path / name, TRACES, "LKneePitch")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_labels_move_apart_as_little_as_needed() -> None:
+    assert spread([0.1, 0.5, 0.9], 0.1) == [0.1, 0.5, 0.9]
+    np.testing.assert_allclose(spread([0.5, 0.52], 0.1), [0.46, 0.56], atol=1e-6)
+    assert np.diff(spread([0.2, 0.21, 0.22, 0.23], 0.1)).min() > 0.0999
