@@ -9,10 +9,8 @@ GSL ?= $(VENV)/bin/gsl
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 INSTALLED := $(VENV)/.stamp
 
-# Compiled functions that call others of another file are not compiled anew when only that file changed: a cache of their own.
-export NUMBA_CACHE_DIR := $(CURDIR)/.cache/numba-$(shell grep -rl --include='*.py' njit gsl | sort | xargs cat | sha256sum | cut -c1-12)
 
-DEMO ?= name=demo preset=demo beside=true
+DEMO ?= name=demo beside=true
 
 help: ## Show this.
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /make \1|/' | column -t -s '|'
@@ -32,7 +30,7 @@ check: $(INSTALLED) ## Check style, format and types.
 	$(VENV)/bin/mypy
 
 clean: ## Remove caches and build files; runs/ and the virtual environment stay.
-	rm -rf .cache .mypy_cache .pytest_cache .ruff_cache build dist *.egg-info
+	rm -rf .mypy_cache .pytest_cache .ruff_cache build dist *.egg-info
 	find gsl tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(INSTALLED): pyproject.toml

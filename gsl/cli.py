@@ -81,6 +81,7 @@ stage("train-inverse", "Learn from simulated trajectories which action makes a m
 stage("optimize", "Improve a policy in the simulator, grounded or not.")
 stage("evaluate", "Measure policies in the real world.")
 stage("compare", "Set groundings against each other over paired trials.")
+stage("survey", "See how far real worlds are from the simulator.")
 stage("iterate", "The whole chain, again and again, until the real return stops improving.")
 
 

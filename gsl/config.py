@@ -105,7 +105,8 @@ def prepared(config: Mapping[str, Any]) -> tuple[Any, dict[str, Any], CommandSet
     """
     wanted = declared(dict(config))
     own = make(CommandSettings, {key: config[key] for key in COMMAND_KEYS if key in config})
-    settings = {key: value for key, value in config.items() if key not in {*COMMAND_KEYS, "preset", "recipe"} - wanted.keys()}
+    dropped = {*COMMAND_KEYS, "preset", "recipe"} - wanted.keys()
+    settings = {key: value for key, value in config.items() if key not in dropped}
     for path in _missing(settings, ""):
         raise missing(path)
     return _instantiated(settings), settings, own

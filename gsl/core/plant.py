@@ -1,4 +1,4 @@
-"""A plant is everything a world is made of, as data: robot, servos, contact, sensors. An effect maps a plant to a plant."""
+"""A plant is what a world is made of, as data: robot, servos, contact, sensors. An effect maps a plant to a plant."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def _draw(axes: Axes, one: Search) -> None:
     _draw_stable(axes, stable)
     _draw_falls(axes, [point for point in one.points if point.falls])
     if one.confirmed is not None and not one.confirmed.falls:
-        _draw_confirmed(axes, one.confirmed)
+        _draw_confirmed(axes, one.confirmed, stable)
     axes.set_title(one.label, loc="left", fontsize=10.5)
     axes.set_xlabel("generation")
     axes.set_xticks([point.generation for point in one.points])
@@ -170,11 +170,13 @@ def _draw_falls(axes: Axes, fallen: Sequence[Point]) -> None:
     _say(axes, "fell in real", sum(places) / len(places), strip, 9, REAL)
 
 
-def _draw_confirmed(axes: Axes, confirmed: Point) -> None:
+def _draw_confirmed(axes: Axes, confirmed: Point, stable: Sequence[Point]) -> None:
     place = confirmed.generation + 0.18
+    beside = [point.lower for point in stable if point.generation == confirmed.generation]
+    lowest = min(bound for bound in [confirmed.real, confirmed.lower, *beside] if math.isfinite(bound))
     axes.vlines([place], [confirmed.lower], [confirmed.upper], color=INK, linewidth=1.8, zorder=5)
     axes.plot([place], [confirmed.real], "D", color=INK, markersize=6, label="measured again", zorder=6)
-    _say(axes, "measured again", place, confirmed.lower, -14, INK)
+    _say(axes, "measured again", place, lowest, -14, INK)
 
 
 def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -> None:

@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from gsl.core.compiled import compiled
 from gsl.robots.nao import THIGH, TIBIA
 
 _DIAGONAL = 0.5**0.5
 
 
-@njit(cache=True)
+@compiled
 def leg_angles(ankle: np.ndarray, hip_yaw_pitch: float, side: float, angles: np.ndarray) -> None:
     """Fill `angles` with the five leg joints that put the ankle at a point with the sole parallel to the torso's xy.
 

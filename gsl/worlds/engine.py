@@ -16,12 +16,17 @@ from scipy.spatial.transform import Rotation
 from gsl.core.body import Robot, lumped
 from gsl.core.plant import Plant
 from gsl.robots.urdf import principal_axes, urdf
-from gsl.worlds.rotor import carried_inertia, compensation, rotors
-from gsl.worlds.servo import first_state, packed, servo_torque
+from gsl.worlds.base_frame import base_motion
+from gsl.worlds.bullet_c import NO_HANDLE, client_handle
+from gsl.worlds.control_period import Drive, first_memory, in_c, in_python, read_joints
+from gsl.worlds.rotor import carried_inertia, rotors
+from gsl.worlds.servo import first_state, packed
 
 GRAVITY = 9.81  # [m/s²]
+# The visual keeps Bullet from preparing to draw the plane at every load, which takes half a millisecond.
 _GROUND = """<robot name="ground"><link name="ground"><inertial><mass value="0"/>
 <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial>
+<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>
 <collision><geometry><plane normal="0 0 1"/></geometry></collision></link></robot>"""
 
 
@@ -78,6 +83,7 @@ class Engine:
 
     Attributes:
         bullet, client: The pybullet module and our client in it.
+        handle: The client in Bullet's C interface, or NO_HANDLE, which makes `run` step through pybullet.
         body: Bullet's number of the robot, once loaded.
         links: Bullet's number of each link, once loaded.
         joints: Bullet's numbers of the motors, once loaded.
@@ -93,13 +99,16 @@ class Engine:
 
             self.bullet, self.client = pybullet, pybullet.connect(pybullet.DIRECT)
         self.plant, self.physics, self.robot = plant, physics, lumped(plant.robot)
-        self._servo = packed(plant.servo)
-        armature = plant.servo.armature - self._servo[-1]  # what is beyond the play turns on its own
-        self._rotors = rotors(self.robot, armature, floating=physics.floating)
-        self._loaded = _heavier(self.robot, carried_inertia(self.robot, self._rotors.carried))
+        self.handle = client_handle(pybullet.__file__, self.client)
+        servo = packed(plant.servo)
+        armature = plant.servo.armature - servo[-1]  # what is beyond the play turns on its own
+        rotor = rotors(self.robot, armature, floating=physics.floating)
+        self._loaded = _heavier(self.robot, carried_inertia(self.robot, rotor.carried))
+        self._inertia = {name: principal_axes(link.inertia)[0].tolist() for name, link in self._loaded.links.items()}
         base = self._loaded.links[self.robot.base]
-        self._base_com, self._base_axes = base.com, principal_axes(base.inertia)[1]
-        self._link_from_inertial = Rotation.from_matrix(self._base_axes.T).as_quat().tolist()
+        axes = np.ascontiguousarray(principal_axes(base.inertia)[1])
+        self._drive, self._base_com = Drive.of(servo, rotor, axes), base.com
+        self._link_from_inertial = Rotation.from_matrix(axes.T).as_quat().tolist()
         self._folder = tempfile.TemporaryDirectory(prefix="gsl-")
         for name, text in (("robot", urdf(self._loaded, visuals=False)), ("ground", _GROUND)):
             Path(self._folder.name, f"{name}.urdf").write_text(text)
@@ -149,74 +158,57 @@ class Engine:
 
     def run(self, targets: np.ndarray) -> None:
         """Hold motor `targets` [rad], shape (n_motors,), for one control period."""
-        commands, rotor, physics = self._state.commands, self._rotors, self.physics
-        commands[1:] = commands[:-1].copy()
-        commands[0] = targets
-        b, body, client, joints = self.bullet, self.body, self.client, self.joints
-        motion, torque, spin, memory = self._motion, self._torque, self._spin, self._rotor_memory
-        states, act, mode = b.getJointStates, b.setJointMotorControlArray, b.TORQUE_CONTROL
-        turn, axes = self._base_turn, self._base_axes
-        for k in range(physics.substeps):
-            motion[0], motion[1], _, _ = zip(*states(body, joints, client), strict=True)
-            servo_torque(
-                self._servo,
-                commands,
-                self._state.memory,
-                motion,
-                k * physics.step,
-                physics.step,
-                physics.period,
-                torque,
-            )
-            if physics.floating:
-                spin[:] = b.getBaseVelocity(body, client)[1]
-                spin[:] = spin @ turn  # within a control period the base hardly turns
-            compensation(
-                rotor.parent, rotor.order, rotor.axis, rotor.carried, rotor.armature, rotor.gain,
-                motion, spin, physics.step, memory, self._work, torque,
-            )  # fmt: skip
-            act(body, joints, mode, forces=torque.tolist(), physicsClientId=client)
-            if physics.floating:
-                b.applyExternalTorque(body, -1, (memory[0, :3] @ axes).tolist(), b.LINK_FRAME, client)
-            b.stepSimulation(client)
+        physics, memory = self.physics, self._memory
+        memory.commands[1:] = memory.commands[:-1]
+        memory.commands[0] = targets
+        times = (physics.floating, physics.substeps, physics.step, physics.period)
+        if self.handle == NO_HANDLE:
+            in_python(self.bullet, self.client, self.body, self.joints, *times, self._drive, memory, self._base_turn)
+        else:
+            in_c(self.handle, self.body, self._places, *times, self._drive, memory, self._base_turn)
 
     def read(self) -> Reading:
         """Measure the robot now, and remember its orientation for the next control period."""
         b, body, client = self.bullet, self.body, self.client
         centre, quaternion = b.getBasePositionAndOrientation(body, client)
-        linear, angular = b.getBaseVelocity(body, client)
-        turn = np.array(b.getMatrixFromQuaternion(quaternion)).reshape(3, 3) @ self._base_axes.T
-        self._base_turn, lever = turn, turn @ self._base_com
-        positions, velocities, _, _ = zip(*b.getJointStates(body, self.joints, client), strict=True)
-        return Reading(
-            np.array((positions, velocities)),
-            np.array(centre) - lever,
-            b.multiplyTransforms((0, 0, 0), quaternion, (0, 0, 0), self._link_from_inertial)[1],
-            np.array(linear) - np.cross(angular, lever),
-            np.array(angular) @ turn,
-            turn[2, 2],
-            tuple(self._force(foot) for foot in self._feet),
-        )
+        velocities = b.getBaseVelocity(body, client)
+        base = base_motion(self._drive.base_axes, self._base_com, centre, quaternion, *velocities)
+        self._base_turn = base.turn
+        turned = b.multiplyTransforms((0, 0, 0), quaternion, (0, 0, 0), self._link_from_inertial)[1]
+        up = float(base.turn[2, 2])
+        return Reading(self._joint_motion(), base.place, turned, base.velocity, base.gyro, up, self._foot_force())
 
-    def _force(self, foot: int) -> float:
-        if not self.physics.floating:
-            return 0.0
-        points = self.bullet.getContactPoints(self.body, 0, foot, physicsClientId=self.client)
-        return float(sum(point[9] for point in points))
+    def _joint_motion(self) -> np.ndarray:
+        motion = np.empty((2, len(self.joints)))
+        if self.handle == NO_HANDLE:
+            states = self.bullet.getJointStates(self.body, self.joints, self.client)
+            motion[0], motion[1], _, _ = zip(*states, strict=True)
+        else:
+            read_joints(self.handle, self.body, self._places, motion, np.empty(3))
+        return motion
+
+    def _foot_force(self) -> tuple[float, ...]:
+        force = dict.fromkeys(self._feet, 0.0)
+        if self.physics.floating:
+            for contact in self.bullet.getContactPoints(self.body, 0, physicsClientId=self.client):
+                if contact[3] in force:
+                    force[contact[3]] += contact[9]
+        return tuple(force.values())
 
     def _set_dynamics(self) -> None:
         """Find the links by name; set true inertia, sole friction, and no damping that nobody asked for."""
         b, client = self.bullet, self.client
         info = [b.getJointInfo(self.body, i, client) for i in range(b.getNumJoints(self.body, client))]
         joints = {row[1].decode(): row[0] for row in info}
+        self._places = np.array([info[joints[name]][3:5] for name in self.robot.motors], dtype=np.int32).T.copy()
         self.links = {row[12].decode(): row[0] for row in info} | {self.robot.base: -1}
         self.joints = [joints[name] for name in self.robot.motors]
         self._feet = [self.links[name] for name in self.robot.feet.values()]
-        for name, link in self._loaded.links.items():
+        for name, inertia in self._inertia.items():
             b.changeDynamics(
                 self.body,
                 self.links[name],
-                localInertiaDiagonal=principal_axes(link.inertia)[0].tolist(),
+                localInertiaDiagonal=inertia,
                 lateralFriction=self.plant.contact.foot_friction,
                 linearDamping=0.0,
                 angularDamping=0.0,
@@ -230,9 +222,7 @@ class Engine:
         self.bullet.setJointMotorControlArray(
             self.body, self.joints, self.bullet.VELOCITY_CONTROL, forces=[0.0] * n, physicsClientId=self.client
         )
-        self._motion, self._torque, self._spin = np.zeros((2, n)), np.zeros(n), np.zeros(3)
-        self._rotor_memory, self._work = np.zeros((6, 3 + n)), np.zeros((n, 18))
-        self._state = first_state(commands, self.read().motion)
+        self._memory = first_memory(*first_state(commands, self.read().motion))
 
 
 def _heavier(robot: Robot, extra: Mapping[str, np.ndarray]) -> Robot:

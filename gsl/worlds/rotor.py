@@ -24,9 +24,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from gsl.core.body import Robot
+from gsl.core.compiled import compiled
 from gsl.core.dynamics import forward_kinematics, mass_matrix
 
 LINK_SHARE = 0.5  # of the rotor inertia that the link carries
@@ -80,7 +80,7 @@ def carried_inertia(robot: Robot, carried: np.ndarray) -> Mapping[str, np.ndarra
     return {joint.child: value * np.outer(joint.axis, joint.axis) for joint, value in zip(joints, carried, strict=True)}
 
 
-@njit(cache=True)
+@compiled
 def compensation(
     parent: np.ndarray,
     order: np.ndarray,
@@ -149,14 +149,14 @@ def compensation(
         torque[i] += memory[0, 3 + i]
 
 
-@njit(cache=True)
+@compiled
 def _turned(spin: np.ndarray, row: np.ndarray, k: int) -> float:
     """Component k of spin x axis: base axes turn with the base."""
     first, second = (k + 1) % 3, (k + 2) % 3
     return float(spin[first] * row[9 + second] - spin[second] * row[9 + first])
 
 
-@njit(cache=True)
+@compiled
 def _place(
     work: np.ndarray, above: int, i: int, axis: np.ndarray, angle: float, speed: float, spin: np.ndarray
 ) -> None:

@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from gsl.core.compiled import compiled
 from gsl.core.plant import Servo
 
 BRISTLE = 1e-3  # deflection at which dry friction slips [rad]: below an encoder's noise, stable at 2 ms with our rotors
@@ -68,7 +68,7 @@ def first_state(commands: np.ndarray, motion: np.ndarray) -> ServoState:
     return ServoState(np.vstack([commands, older])[:COMMANDS].copy(), np.vstack([np.zeros(motion.shape[1]), motion]))
 
 
-@njit(cache=True)
+@compiled
 def servo_torque(
     parameters: np.ndarray,
     commands: np.ndarray,
@@ -108,7 +108,7 @@ def servo_torque(
         torque[i] = through - friction
 
 
-@njit(cache=True)
+@compiled
 def _delayed(commands: np.ndarray, i: int, start: float, length: float) -> float:
     """Mean of a delayed, held command over one physics step: continuous in the delay.
 
@@ -125,14 +125,14 @@ def _delayed(commands: np.ndarray, i: int, start: float, length: float) -> float
     return float((1.0 - newer) * commands[index, i] + newer * commands[index - 1, i])
 
 
-@njit(cache=True)
+@compiled
 def _limited(u: float, v: float, bound: float, no_load: float) -> float:
     high = bound * min(1.0, max(0.0, 1.0 - v / no_load)) if v > 0.0 else bound
     low = bound * min(1.0, max(0.0, 1.0 + v / no_load)) if v < 0.0 else bound
     return min(high, max(-low, u))
 
 
-@njit(cache=True)
+@compiled
 def _through_teeth(
     parameters: np.ndarray, memory: np.ndarray, i: int, q: float, v: float, u: float, step: float
 ) -> float:

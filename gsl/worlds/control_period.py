@@ -1,0 +1,179 @@
+"""A control period: read the joints, ask the servos and the rotors for torques, step the physics, again and again.
+
+Written twice: compiled, calling Bullet's C interface, which makes a rollout a quarter shorter, and in Python, calling
+pybullet, for where there is no handle. Both do the same to the bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import carray  # type: ignore[attr-defined]
+
+from gsl.core.compiled import compiled
+from gsl.worlds import bullet_c as c
+from gsl.worlds.rotor import Rotors, compensation
+from gsl.worlds.servo import servo_torque
+
+
+class Drive(NamedTuple):
+    """What never changes.
+
+    Attributes:
+        servo: Parameters of the servos, from `servo.packed`.
+        base_axes: Of the base's inertial frame in its link axes, columns, shape (3, 3).
+        parent, order, axis, carried, armature, gain: See `rotor.Rotors`.
+    """
+
+    servo: np.ndarray
+    base_axes: np.ndarray
+    parent: np.ndarray
+    order: np.ndarray
+    axis: np.ndarray
+    carried: np.ndarray
+    armature: np.ndarray
+    gain: np.ndarray
+
+    @classmethod
+    def of(cls, servo: np.ndarray, rotor: Rotors, base_axes: np.ndarray) -> Drive:
+        """Put together what `torques` needs."""
+        return cls(servo, base_axes, rotor.parent, rotor.order, rotor.axis, rotor.carried, rotor.armature, rotor.gain)
+
+
+class Memory(NamedTuple):
+    """What changes in time, all of it in place, with n motors.
+
+    Attributes:
+        commands: Targets of the last control periods, newest first [rad], shape (COMMANDS, n).
+        servo: State rows of the servos, shape (3, n).
+        rotor: Memory of the compensation, shape (6, 3 + n).
+        motion: Joint positions [rad] and velocities [rad/s] at this physics step, shape (2, n).
+        spin: Angular velocity of the base in world axes, then in base axes [rad/s], shape (2, 3).
+        torque: Of the motors [N·m], shape (n,).
+        push: Torque on the base in its inertial axes [N·m], shape (3,).
+        work: Scratch, shape (n, 18).
+    """
+
+    commands: np.ndarray
+    servo: np.ndarray
+    rotor: np.ndarray
+    motion: np.ndarray
+    spin: np.ndarray
+    torque: np.ndarray
+    push: np.ndarray
+    work: np.ndarray
+
+
+def first_memory(commands: np.ndarray, servo: np.ndarray) -> Memory:
+    """Return the memory at the start, given that of the servos, see `servo.ServoState`."""
+    n = commands.shape[1]
+    return Memory(
+        commands,
+        servo,
+        rotor=np.zeros((6, 3 + n)),
+        motion=np.zeros((2, n)),
+        spin=np.zeros((2, 3)),
+        torque=np.zeros(n),
+        push=np.zeros(3),
+        work=np.zeros((n, 18)),
+    )
+
+
+@compiled
+def torques(drive: Drive, memory: Memory, turn: np.ndarray, elapsed: float, step: float, period: float) -> None:
+    """Fill in the torques of one physics step, given motion and spin (world axes).
+
+    Args:
+        drive: Parameters.
+        memory: Moved on by one step.
+        turn: From base to world axes, shape (3, 3); within a control period the base hardly turns.
+        elapsed: Time since the newest command was issued [s].
+        step: Physics period [s].
+        period: Control period [s].
+    """
+    servo_torque(drive.servo, memory.commands, memory.servo, memory.motion, elapsed, step, period, memory.torque)
+    world, base = memory.spin[0], memory.spin[1]
+    for k in range(3):
+        base[k] = world[0] * turn[0, k] + world[1] * turn[1, k] + world[2] * turn[2, k]
+    compensation(
+        drive.parent, drive.order, drive.axis, drive.carried, drive.armature, drive.gain,
+        memory.motion, base, step, memory.rotor, memory.work, memory.torque,
+    )  # fmt: skip
+    wanted, axes = memory.rotor[0], drive.base_axes
+    for k in range(3):
+        memory.push[k] = wanted[0] * axes[0, k] + wanted[1] * axes[1, k] + wanted[2] * axes[2, k]
+
+
+@compiled
+def in_c(
+    handle: int, body: int, places: np.ndarray, floating: bool, substeps: int, step: float, period: float,
+    drive: Drive, memory: Memory, turn: np.ndarray,
+) -> None:  # fmt: skip
+    """Step Bullet through a control period by its C interface.
+
+    Args:
+        handle: From `bullet_c.client_handle`.
+        body: Bullet's number of the robot.
+        places: Of each motor in Bullet's state and velocity vectors, shape (2, n_motors).
+        floating: Whether the base moves.
+        substeps: Physics steps.
+        step: Physics period [s].
+        period: Control period [s].
+        drive: Parameters.
+        memory: Moved on.
+        turn: From base to world axes, shape (3, 3).
+    """
+    for k in range(substeps):
+        read_joints(handle, body, places, memory.motion, memory.spin[0])
+        torques(drive, memory, turn, k * step, step, period)
+        command = c.joint_control(handle, body, c.TORQUE_CONTROL)
+        for i in range(places.shape[1]):
+            c.set_torque(command, places[1, i], memory.torque[i])
+        c.submit(handle, command)
+        if floating:
+            command = c.external_force(handle)
+            c.set_external_torque(command, body, c.BASE, memory.push.ctypes.data, c.LINK_FRAME)
+            c.submit(handle, command)
+        c.submit(handle, c.step_simulation(handle))
+
+
+@compiled
+def read_joints(handle: int, body: int, places: np.ndarray, motion: np.ndarray, spin: np.ndarray) -> None:
+    """Read the state by Bullet's C interface.
+
+    Args:
+        handle: From `bullet_c.client_handle`.
+        body: Bullet's number of the robot.
+        places: Of each motor in Bullet's state and velocity vectors, shape (2, n_motors).
+        motion: Result, joint positions [rad] and velocities [rad/s], shape (2, n_motors).
+        spin: Result, angular velocity of the base in world axes [rad/s], shape (3,).
+    """
+    n, addresses = places.shape[1], np.empty(2, dtype=np.intp)
+    status = c.submit(handle, c.request_state(handle, body))
+    first = addresses.ctypes.data
+    c.actual_state(status, 0, 0, 0, 0, first, first + addresses.itemsize, 0)
+    positions = carray(c.as_doubles(addresses[0]), (7 + n,))
+    velocities = carray(c.as_doubles(addresses[1]), (6 + n,))
+    for i in range(n):
+        motion[0, i], motion[1, i] = positions[places[0, i]], velocities[places[1, i]]
+    for k in range(3):
+        spin[k] = velocities[3 + k]
+
+
+def in_python(
+    bullet: Any, client: int, body: int, joints: Sequence[int],
+    floating: bool, substeps: int, step: float, period: float, drive: Drive, memory: Memory, turn: np.ndarray,
+) -> None:  # fmt: skip
+    """Do as `in_c` does, by pybullet; `joints` are Bullet's numbers of the motors."""
+    for k in range(substeps):
+        memory.motion[0], memory.motion[1], _, _ = zip(*bullet.getJointStates(body, joints, client), strict=True)
+        if floating:
+            memory.spin[0] = bullet.getBaseVelocity(body, client)[1]
+        torques(drive, memory, turn, k * step, step, period)
+        forces = memory.torque.tolist()
+        bullet.setJointMotorControlArray(body, joints, bullet.TORQUE_CONTROL, forces=forces, physicsClientId=client)
+        if floating:
+            bullet.applyExternalTorque(body, c.BASE, memory.push.tolist(), bullet.LINK_FRAME, client)
+        bullet.stepSimulation(client)
