@@ -39,7 +39,7 @@ class CommandSettings:
     def folder(self, command: str, level: str = "") -> Path:
         """Return the artifact's folder; `level` tells the jobs of a multirun apart."""
         place = Path(self.out) if self.out else RUNS / self.name / command.replace("-", "_")
-        return place / level if level else place
+        return place.parent / level / place.name if level else place
 
 
 def run(

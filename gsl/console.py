@@ -169,14 +169,18 @@ def _rich_table(
     title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None
 ) -> rich.table.Table:
     from rich import box
+    from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=title, caption=caption, box=box.SIMPLE_HEAD, title_justify="left", caption_justify="left")
+    caption = None if caption is None else escape(caption)
+    table = Table(
+        title=escape(title), caption=caption, box=box.SIMPLE_HEAD, title_justify="left", caption_justify="left"
+    )
     for index, column in enumerate(columns):
         numbers = bool(rows) and all(_is_number(row[index]) for row in rows)
-        table.add_column(column, justify="right" if numbers else "left")
+        table.add_column(escape(column), justify="right" if numbers else "left")
     for row in rows:
-        table.add_row(*map(str, row))
+        table.add_row(*(escape(str(cell)) for cell in row))
     return table
 
 

@@ -32,7 +32,7 @@ FALLING = _theta(com_offset=-0.09)
 def _evaluated(tmp_path: Path, found: dict[str, np.ndarray], **settings: object) -> tuple[dict, dict]:
     file = tmp_path / "candidates.json"
     write_policies(file, policies(WALK, TASK, [record(WALK, name, theta) for name, theta in found.items()]))
-    sizes = {"episodes": 2, "confirmation": 3, **settings}
+    sizes = {"episodes": 2, "check": 2, "confirmation": 3, **settings}
     metrics = Evaluate(GROUND, TASK, WALK, str(file), workers=1, **sizes).run(tmp_path, QUIET)
     return dict(metrics), json.loads((tmp_path / "evaluation.json").read_text())
 
@@ -56,12 +56,12 @@ def test_a_policy_that_falls_costs_no_further_episode_and_is_worth_nothing(three
     metrics, table, _ = three
     falling = table["policies"][1]
     assert falling["falls"] == 1 and falling["values"][-1] == 0.0
-    assert metrics["real_episodes"] == 2 + falling["episodes"] + 2 + 3 + 3
+    assert metrics["real_episodes"] == 2 + falling["episodes"] + 2 + 2 + 3 + 3
 
 
 def test_fresh_episodes_are_not_those_of_the_choice(three: tuple[dict, dict, Path]) -> None:
     _, table, _ = three
-    chosen = {value for row in table["policies"] for value in row["values"] if value}
+    chosen = {value for row in table["policies"] + table["check"] for value in row["values"] if value}
     assert chosen.isdisjoint(value for row in table["confirmation"] for value in row["values"] if value)
 
 
@@ -76,4 +76,4 @@ def test_policies_of_another_family_are_refused(tmp_path: Path) -> None:
     write_policies(file, policies(WALK, TASK, [record(WALK, "pi0", WALK.initial)]))
     other = Linear(start_at={})
     with pytest.raises(ArtifactError, match="policy="):
-        Evaluate(GROUND, TASK, other, str(file), episodes=1, confirmation=2, workers=1).run(tmp_path, QUIET)
+        Evaluate(GROUND, TASK, other, str(file), episodes=1, check=1, confirmation=2, workers=1).run(tmp_path, QUIET)

@@ -65,4 +65,4 @@ def test_the_episode_ends_when_one_arm_is_above_the_goal() -> None:
 def test_the_distance_reported_is_the_last_one() -> None:
     position = np.array([arm(0.0, 0.0)[LAYOUT["position"]], arm(41.0, 42.0)[LAYOUT["position"]]])
     trajectory = Trajectory(np.array([0.0, 0.02]), position[:1], position, 0.0 * position)
-    assert Arm().outcome(trajectory)["distance [deg]"] == pytest.approx(5.0)
+    assert Arm().outcome(LAYOUT, trajectory)["distance [deg]"] == pytest.approx(5.0)

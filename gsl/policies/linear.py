@@ -10,6 +10,8 @@ import numpy as np
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 
+WEIGHT_SCALE = 0.2
+
 
 @component
 class Linear:
@@ -36,8 +38,8 @@ class Linear:
 
     @property
     def scale(self) -> np.ndarray:
-        """Size of a step in each parameter that is as bold as in any other."""
-        return np.ones(len(self.names))
+        """Size of a step in each parameter that is as bold as in any other: weights act on angles of 1 to 2 rad."""
+        return np.array([1.0 if name.endswith("_offset") else WEIGHT_SCALE for name in self.names])
 
     def posture(self, parameters: np.ndarray, layout: Layout) -> np.ndarray:
         """Return where an episode starts [rad], shape (n_joints,)."""

@@ -30,10 +30,17 @@ class PolicyChoice:
         return {} if self.reference is None else {role: resolve(self.reference)}
 
     def parameters(self) -> np.ndarray:
-        """Return the parameters, shape (n_parameters,): those of the last record of the file."""
+        """Return the parameters, shape (n_parameters,).
+
+        Raises:
+            ArtifactError: if the reference holds several policies.
+        """
         if self.reference is None:
             return self.policy.initial
-        return vector(self.policy, records(self.policy, self.reference)[-1])
+        found = records(self.policy, self.reference)
+        if len(found) > 1:
+            raise ArtifactError(self.reference, f"holds {len(found)} policies; evaluate them and name that artifact")
+        return vector(self.policy, found[0])
 
 
 def records(policy: Policy, reference: str) -> tuple[PolicyRecord, ...]:

@@ -12,7 +12,6 @@ from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.stages.comparison import COLUMNS, Trial, markdown, rows, summaries
 from gsl.stages.iterate import Iterate
-from gsl.storage.artifact import Artifact
 from gsl.storage.documents import write_json
 from gsl.worlds.world import World
 
@@ -21,7 +20,9 @@ TABLE, DATA = "table.md", "trials.json"
 
 @component
 class Compare:
-    """Trial k of every method has the same seed; what one has built is not built again, so a stopped study goes on.
+    """Trial k of every method has the same seed; what is built is not built again, so a stopped study goes on.
+
+    A grounding that its check would refuse is gone on with, and the table says how often that was.
 
     A search in a simulator that knows nothing of the real world (no grounding, action noise) is done once a trial and
     measured in every world: columns of such a method are not independent of each other.
@@ -39,9 +40,9 @@ class Compare:
         return {}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
-        """Run all trials; write every trial's figures and the table."""
+        """Run all trials; write every trial's figures and the tables."""
         found = []
-        for trial in self._trials(console):
+        for trial in self._trials(folder.parent, console):
             found.append(trial)
             console.status(f"{trial.world}, {trial.method}, trial {trial.number}: {trial.told}")
         write_json(folder / DATA, [trial._asdict() for trial in found])
@@ -50,19 +51,22 @@ class Compare:
         console.table(f"{self.trials} trials of each method", COLUMNS, rows(summary))
         return {"trials": len(found), "summaries": [one._asdict() for one in summary]}
 
-    def _trials(self, console: Any) -> Iterator[Trial]:
+    def _trials(self, home: Path, console: Any) -> Iterator[Trial]:
         for number in range(1, self.trials + 1):
             for method in self.methods:
                 for world in self.worlds:
-                    yield Trial.of(world, method, number, self._measured(world, method, number, console).metrics)
+                    yield self._trial(home, world, method, number, console)
 
-    def _measured(self, world: str, method: str, number: int, console: Any) -> Artifact:
-        seed, runs = self.iterate.seed + number - 1, Path(self.iterate.home)
-        chain = replace(self.iterate, real=self.worlds[world], grounding=self.methods[method], seed=seed, accept=True)
-        home = runs / world / method / f"trial_{number:02d}"
-        if chain.learned:
-            found = chain.search(home / "optimize", chain.trained(home, None, seed, console), None, seed, console)
+    def _trial(self, home: Path, world: str, method: str, number: int, console: Any) -> Trial:
+        grounding, seed, name = self.methods[method], self.iterate.seed + number - 1, f"trial_{number:02d}"
+        chain = replace(self.iterate.chain, real=self.worlds[world], accept=True)
+        place = home / world / method / name
+        if isinstance(grounding, ActionTransformation):
+            ready = chain.trained(place, grounding, None, seed, console)
+            found = chain.search(place / "optimize", ready, None, seed, console)
+            collected = self.iterate.budget.real_episodes + self.iterate.budget.real_neighbours
         else:
-            shared = runs / "sim" / method / f"trial_{number:02d}"
-            found = chain.search(shared / "optimize", chain.grounding, None, seed, console)
-        return chain.measure(home / "evaluate", found, seed, console)
+            found = chain.search(home / "sim" / method / name / "optimize", grounding, None, seed, console)
+            collected = 0
+        measured = chain.measure(place / "evaluate", found, seed, console)
+        return Trial.of(world, method, number, found.metrics, measured.metrics, collected)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
-
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
-from gsl.core.statistics import Interval, difference_interval, mean_interval
 from gsl.grounding.none import NoGrounding
 from gsl.policies.policy import Policy
 from gsl.stages.choices import FILE, policies, records, vector
+from gsl.stages.measured import cells, columns, falls, gain, mean, row, summary
 from gsl.stages.population import Episode, Job, episodes
 from gsl.stages.rollout import Scenario
 from gsl.storage.documents import write_json
@@ -23,16 +21,17 @@ from gsl.tasks.task import REAL, Task
 from gsl.worlds.world import World
 
 TABLE = "evaluation.json"
-_CHOICE, _CONFIRMATION = "choice", "confirmation"  # their seeds never meet
+_CHOICE, _CHECK, _REPORT = "choice", "check", "report"  # their seeds never meet
 
 
 @component
 class Evaluate:
-    """A policy that falls once is unstable and costs no further episode; the first policy of the file is the baseline.
+    """Choice, check, report: each in real episodes of its own, all of them counted.
 
-    The best stable policy is measured again on fresh episodes, and so is the baseline: the speeds that are reported
-    did not take part in the choice. If it falls there, it is unstable after all and the next best one is tried; every
-    episode counts.
+    Choice: `episodes` of each policy; one that falls is unstable, and what would have followed is thrown away. Check:
+    the fastest stable policy walks `check` episodes more; if it falls, the next best one does. Report: the policy that
+    is left, or the baseline (the first of the file) if none is, is measured on `confirmation` fresh episodes beside the
+    baseline, and these figures, falls and all, are what is reported: they took no part in the choice.
     """
 
     kind: ClassVar[str] = "evaluate"
@@ -42,6 +41,7 @@ class Evaluate:
     policy: Annotated[Policy, setting("family of the policies")]
     policies: Annotated[str, setting("policies file or optimize artifact")]
     episodes: Annotated[int, setting("episodes of each policy for the choice", ge=1)]
+    check: Annotated[int, setting("episodes the fastest stable policy has to walk without a fall", ge=1)]
     confirmation: Annotated[int, setting("fresh episodes of the chosen policy and of the baseline", ge=2)]
     workers: Annotated[int, setting("processes; -1 for one a core")] = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
@@ -53,96 +53,50 @@ class Evaluate:
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the table of all policies and the chosen one."""
         found = records(self.policy, self.policies)
-        scenario = Scenario(self.world, self.task, self.policy, REAL, NoGrounding())
-        total = self.episodes * len(found) + 2 * self.confirmation
+        total = self.episodes * len(found) + self.check + 2 * self.confirmation
         with console.progress(total, "measuring in the real world") as progress:
-            tried = [self._measured(scenario, theta, index, _CHOICE, progress) for index, theta in enumerate(found)]
-            fresh = {0: self._measured(scenario, found[0], 0, _CONFIRMATION, progress)}
-            best = self._confirmed(scenario, found, tried, fresh, progress)
-        rows = [_row(theta, done) for theta, done in zip(found, tried, strict=True)]
-        confirmed = [_row(found[index], done) for index, done in fresh.items()]
-        write_json(folder / TABLE, {"unit": "value of the task", "policies": rows, "confirmation": confirmed})
+            tried = [self._measured(theta, _CHOICE, self.episodes, progress) for theta in found]
+            checked = dict(self._checked(found, tried, progress))
+            best = next((index for index, done in checked.items() if not falls(done)), 0)
+            fresh = {i: self._measured(found[i], _REPORT, self.confirmation, progress) for i in sorted({0, best})}
+        rows = [row(theta, done) for theta, done in zip(found, tried, strict=True)]
+        again = [[row(found[index], done) for index, done in phase.items()] for phase in (checked, fresh)]
+        write_json(folder / TABLE, {"policies": rows, "check": again[0], "confirmation": again[1]})
         write_policies(folder / FILE, policies(self.policy, self.task, [found[best]]))
+        shown = [cells(one, one["name"], self.task.shown) for one in rows]
+        shown += [cells(one, f"{one['name']}, fresh", self.task.shown) for one in again[1]]
+        console.table("policies in the real world", columns(rows[0], self.task.unit), shown)
+        stable = [done for done in tried[1:] if not falls(done)]
         return {
             "best": found[best].name,
             "best_generation": found[best].generation or 0,
             "returned_value_sim": found[best].value_sim,
-            "baseline": _summary(fresh[0]),
-            "returned": _summary(fresh[best]),
-            "gain": _gain(fresh[best], fresh[0]),
-            "unconfirmed": [found[index].name for index, done in fresh.items() if index and _falls(done)],
-            "stable_policies": sum(1 for done in tried[1:] if not _falls(done)),
-            "improving_policies": sum(1 for done in tried[1:] if not _falls(done) and _mean(done) > _mean(tried[0])),
+            "baseline": summary(fresh[0]),
+            "returned": summary(fresh[best]),
+            "gain": gain(fresh[best], fresh[0]),
+            "failed_check": [found[index].name for index, done in checked.items() if falls(done)],
+            "stable_policies": len(stable),
+            "improving_policies": sum(mean(done) > mean(tried[0]) for done in stable),
             "policies": len(found) - 1,
-            "real_episodes": sum(map(len, tried)) + sum(map(len, fresh.values())),
+            "real_episodes": sum(map(len, [*tried, *checked.values(), *fresh.values()])),
         }
 
-    def _confirmed(
-        self,
-        scenario: Scenario,
-        found: tuple[PolicyRecord, ...],
-        tried: list[list[Episode]],
-        fresh: dict[int, list[Episode]],
-        progress: Any,
-    ) -> int:
-        """Return the fastest policy that is stable in the choice and in fresh episodes, which go into `fresh`."""
-        better = [
-            index
-            for index in range(1, len(tried))
-            if not _falls(tried[index]) and _mean(tried[index]) > _mean(tried[0])
-        ]
-        for index in sorted(better, key=lambda index: -_mean(tried[index])):
-            fresh[index] = self._measured(scenario, found[index], index, _CONFIRMATION, progress)
-            if not _falls(fresh[index]):
-                return index
-        return 0
+    def _checked(
+        self, found: Sequence[PolicyRecord], tried: Sequence[list[Episode]], progress: Any
+    ) -> Iterator[tuple[int, list[Episode]]]:
+        """Yield the checks of stable policies that beat the baseline, fastest first, up to the first without a fall."""
+        better = [index for index, done in enumerate(tried) if not falls(done) and mean(done) > mean(tried[0])]
+        for index in sorted(better, key=lambda index: -mean(tried[index])):
+            done = self._measured(found[index], _CHECK, self.check, progress)
+            yield index, done
+            if not falls(done):
+                return
 
-    def _measured(
-        self, scenario: Scenario, theta: PolicyRecord, index: int, purpose: str, progress: Any
-    ) -> list[Episode]:
-        """Run the episodes of one purpose; for the choice only up to and with the first fall."""
-        count = self.episodes if purpose == _CHOICE else self.confirmation
+    def _measured(self, theta: PolicyRecord, purpose: str, count: int, progress: Any) -> list[Episode]:
+        """Run the episodes of one purpose; those of a report all, others up to and with the first fall."""
+        scenario = Scenario(self.world, self.task, self.policy, REAL, NoGrounding())
         parameters = vector(self.policy, theta)
-        jobs = [Job(parameters, derived_seed(self.seed, self.kind, purpose, index, number)) for number in range(count)]
+        jobs = [Job(parameters, derived_seed(self.seed, self.kind, purpose, theta.name, n)) for n in range(count)]
         done = episodes(scenario, jobs, workers=self.workers, progress=progress)
         first_fall = next((number for number, episode in enumerate(done) if episode.fell), count)
-        return done[: first_fall + 1] if purpose == _CHOICE else done
-
-
-def _falls(done: list[Episode]) -> int:
-    return sum(episode.fell for episode in done)
-
-
-def _mean(done: list[Episode]) -> float:
-    return float(np.mean([episode.value for episode in done]))
-
-
-def _summary(done: list[Episode]) -> dict[str, Any]:
-    interval = mean_interval([episode.value for episode in done])
-    return {
-        "value": interval.mean,
-        "interval": [interval.lower, interval.upper],
-        "falls": _falls(done),
-        "episodes": len(done),
-    }
-
-
-def _row(theta: PolicyRecord, done: list[Episode]) -> dict[str, Any]:
-    values = [episode.value for episode in done]
-    return {
-        "name": theta.name,
-        "generation": theta.generation,
-        "value_sim": theta.value_sim,
-        **_summary(done),
-        "values": values,
-    }
-
-
-def _gain(after: list[Episode], before: list[Episode]) -> dict[str, Any]:
-    values = [[episode.value for episode in done] for done in (after, before)]
-    difference: Interval = difference_interval(np.array(values[0]), np.array(values[1]))
-    return {
-        "value": difference.mean,
-        "interval": [difference.lower, difference.upper],
-        "share": difference.mean / _mean(before),
-    }
+        return done if purpose == _REPORT else done[: first_fall + 1]

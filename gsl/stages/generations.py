@@ -25,7 +25,8 @@ class GenerationLog:
         self._path = folder / FILE
         lines = self._path.read_text(encoding="utf-8").split("\n")[:-1] if self._path.exists() else []
         self._done = [Generation(**json.loads(line)) for line in lines]
-        self._path.write_text("".join(line + "\n" for line in lines), encoding="utf-8")
+        if self._path.exists():
+            os.truncate(self._path, sum(len(line.encode()) + 1 for line in lines))
 
     def read(self, index: int) -> Generation | None:
         """Return a generation that is done, to the bit as it was."""

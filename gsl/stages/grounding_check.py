@@ -49,7 +49,7 @@ class GroundingReport:
         """Why nothing should be optimised in this grounding, in words."""
         group = OFF if OFF in self.deviations else PI0
         errors = {name: degrees(self.deviations[group][name][TICKS].joints) for name in (GROUNDED, BARE)}
-        found = []
+        found = [] if group == OFF else ["off π0 nothing was held out to measure it on (collect neighbours)"]
         if errors[GROUNDED] > errors[BARE]:
             against = f"{errors[GROUNDED]:.2f}°, without grounding {errors[BARE]:.2f}°"
             found.append(f"after {TICKS} ticks the joints {_named(group)} are farther from the real ones: {against}")
@@ -78,6 +78,15 @@ class GroundingReport:
             "pi0": pi0,
             "acceptable": self.acceptable,
             "problems": self.problems,
+        }
+
+    def by_joint(self) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+        """Return the error of each joint after `TICKS` ticks [deg], by group and simulator."""
+        return {
+            _named(group): {
+                name: degrees_by_joint(by_ticks[TICKS].joints, self.joints) for name, by_ticks in sims.items()
+            }
+            for group, sims in self.deviations.items()
         }
 
     def rows(self) -> list[tuple[str, ...]]:

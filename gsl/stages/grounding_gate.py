@@ -12,6 +12,7 @@ import numpy as np
 from gsl.core.seeds import derived_seed
 from gsl.errors import GslError
 from gsl.grounding.gat import ActionTransformation
+from gsl.report.grounding_errors import grounding_errors
 from gsl.stages.grounding_check import TITLES, check, largest_stable_alpha
 from gsl.stages.rollout import Scenario
 from gsl.stages.train_forward import HELDOUT
@@ -20,7 +21,7 @@ from gsl.storage.models import model_file, read_forward_model, read_inverse_mode
 from gsl.storage.references import resolve
 from gsl.storage.trajectories import read
 
-REPORT = "grounding.json"
+REPORT, FIGURE = "grounding.json", "grounding.png"
 
 
 def grounding_parents(grounding: Any) -> Mapping[str, Path]:
@@ -55,6 +56,7 @@ def grounded(
     heldout = model_file(settings.forward_model, "forward_model").with_name(HELDOUT)
     report = check(ready, parameters, read(heldout), derived_seed(seed, "check"))
     write_json(folder / REPORT, report.metrics())
+    grounding_errors(folder / FIGURE, report.by_joint())
     console.table("grounded simulator against held-out real trajectories", TITLES, report.rows())
     if not report.acceptable:
         problem = "; ".join(report.problems)

@@ -1,11 +1,11 @@
-"""What a person looks at after `iterate`: table, learning curve and one joint's traces (the paper's figure 6)."""
+"""What a person looks at after `iterate`: table, verdict, learning curve, one joint's traces (the paper's figure 6)."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,24 +14,124 @@ from gsl.core.trajectory import Trajectory
 from gsl.grounding.none import NoGrounding
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.learning_curve import Search, learning_curve, search
+from gsl.report.markdown import table
 from gsl.stages.evaluate import TABLE
-from gsl.stages.grounding_replay import Place, replay
+from gsl.stages.grounding_replay import PAST, Place, replay
 from gsl.storage.artifact import Artifact
+from gsl.tasks.task import Task
 from gsl.worlds.bullet import BulletWorld
 
-if TYPE_CHECKING:
-    from gsl.stages.iterate import Iterate
-
 CURVE, TRACE, MARKDOWN = "learning_curve.png", "joint_trace.png", "table.md"
+COLUMNS = (
+    "iteration",
+    "policy",
+    "in simulation",
+    "in real",
+    "95 % interval",
+    "falls",
+    "gain over the last",
+    "real episodes",
+)
 TAKEN_OVER, SHOWN = 2.0, 0.8  # when the simulators take over from the real robot, and for how long [s]
 
 
-def write_curve(folder: Path, iterate: Iterate, done: Sequence[Artifact], ungrounded: Artifact | None) -> None:
-    """Write the learning curve of all iterations, with the search without grounding beside them if there was one."""
-    searches = [_search(f"iteration {k + 1}", one, iterate, f"π{k}") for k, one in enumerate(done)]
-    if ungrounded is not None:
-        searches.append(_search("without grounding", ungrounded, iterate, "π0"))
-    learning_curve(folder / CURVE, searches, unit=iterate.task.unit)
+class Rounds:
+    """The iterations so far: which policy is the best, what it cost, and what to tell."""
+
+    def __init__(self, task: Task) -> None:
+        self._task = task
+        self._done: list[Artifact] = []
+        self._beside: Artifact | None = None
+        self._spent = 0
+        self.rows: list[tuple[str, ...]] = []
+        self.best: Artifact | None = None
+
+    @property
+    def rising(self) -> bool:
+        """The paper's stop rule, with the interval: is v(pi_i) - v(pi_i-1) surely above 0?"""
+        return bool(self._done[-1].metrics["gain"]["interval"][0] > 0.0)
+
+    def add(self, evaluation: Artifact, collected: int) -> list[tuple[str, ...]]:
+        """Take in an iteration that has collected some real episodes, and return its rows."""
+        self._done.append(evaluation)
+        cost = collected + evaluation.metrics["real_episodes"]
+        self._spent += cost
+        first = len(self._done) == 1
+        if self.rising or (first and evaluation.metrics["gain"]["value"] > 0.0):
+            self.best = evaluation
+        return self._added(str(len(self._done)), evaluation.metrics, cost, first=first)
+
+    def add_beside(self, evaluation: Artifact) -> list[tuple[str, ...]]:
+        """Take in what is shown for comparison, and return its rows."""
+        self._beside = evaluation
+        return self._added("no grounding", evaluation.metrics, evaluation.metrics["real_episodes"], first=False)
+
+    @property
+    def verdict(self) -> str:
+        """The result in a sentence or two, with what it cost."""
+        cost = f"{self._spent} real episodes were spent."
+        if self.best is None:
+            return f"No improvement over π0 was found: π0 is returned. {cost}"
+        after, before = self.best.metrics["returned"], self._done[0].metrics["baseline"]
+        low, high = (100.0 * bound / before["value"] for bound in self.best.metrics["gain"]["interval"])
+        values = [self._task.shown * one["value"] for one in (before, after)]
+        falls = f"{after['falls']} falls in {after['episodes']} fresh episodes"
+        last = f"gain of the last step {low:+.0f} to {high:+.0f} % of π0 (95 %)" if before["value"] else ""
+        return f"In real: π0 {values[0]:.1f}, returned {values[1]:.1f} {self._task.unit}, {last}, {falls}. {cost}"
+
+    def metrics(self) -> Mapping[str, Any]:
+        """Return the figures of all rounds."""
+        best = self._done[0] if self.best is None else self.best
+        return {
+            "iterations": len(self._done),
+            "returned_iteration": 0 if self.best is None else 1 + self._done.index(self.best),
+            "returned": best.metrics["baseline" if self.best is None else "returned"],
+            "baseline": self._done[0].metrics["baseline"],
+            "gain": best.metrics["gain"],
+            "real_episodes": self._spent,
+            "stopped_by_itself": not self.rising,
+            "verdict": self.verdict,
+            "ungrounded": None if self._beside is None else self._beside.metrics,
+        }
+
+    def searches(self) -> list[Search]:
+        """Return the panels of the learning curve."""
+        named = [(f"iteration {k + 1}", one, f"π{k}") for k, one in enumerate(self._done)]
+        named += [] if self._beside is None else [("without grounding", self._beside, "π0")]
+        return [self._search(*one) for one in named]
+
+    @property
+    def unit(self) -> str:
+        """Of what people are shown."""
+        return self._task.unit
+
+    def _search(self, label: str, evaluation: Artifact, start: str) -> Search:
+        document = json.loads((evaluation.folder / TABLE).read_text(encoding="utf-8"))
+        return search(label, document, shown=self._task.shown, returned=evaluation.metrics["best"], start=start)
+
+    def _added(self, label: str, metrics: Mapping[str, Any], cost: int, *, first: bool) -> list[tuple[str, ...]]:
+        simulated, share = metrics["returned_value_sim"], metrics["gain"]["share"]
+        expected = "" if simulated is None else f"{self._task.shown * simulated:.1f}"
+        gained = "" if share is None else f"{100 * share:+.1f} %"
+        rows = [("0", "π0", "", *self._measured(metrics["baseline"]), "", "")] if first else []
+        rows.append((label, metrics["best"], expected, *self._measured(metrics["returned"]), gained, str(cost)))
+        self.rows += rows
+        return rows
+
+    def _measured(self, summary: Mapping[str, Any]) -> tuple[str, str, str]:
+        low, high = (self._task.shown * bound for bound in summary["interval"])
+        value = f"{self._task.shown * summary['value']:.1f}"
+        return value, f"{low:.1f} to {high:.1f}", f"{summary['falls']} of {summary['episodes']}"
+
+
+def write_table(folder: Path, rounds: Rounds) -> None:
+    """Write the table and the verdict as markdown."""
+    (folder / MARKDOWN).write_text(f"{table(COLUMNS, rounds.rows)}\n{rounds.verdict}\n", encoding="utf-8")
+
+
+def write_curve(folder: Path, rounds: Rounds) -> None:
+    """Write the learning curve of all iterations, and of the search without grounding if there was one."""
+    learning_curve(folder / CURVE, rounds.searches(), unit=rounds.unit)
 
 
 def write_trace(folder: Path, world: BulletWorld, grounding: Any, walk: Trajectory) -> None:
@@ -44,28 +144,15 @@ def write_trace(folder: Path, world: BulletWorld, grounding: Any, walk: Trajecto
         walk: A real trajectory that no model has seen.
     """
     env = world.make()
-    place = Place(observations(walk, world.layout), walk.action, min(round(TAKEN_OVER / world.period), len(walk) // 2))
-    ticks = min(round(SHOWN / world.period), len(walk) - place.tick)
+    tick = max(PAST, min(round(TAKEN_OVER / world.period), len(walk) // 2))
+    place = Place(observations(walk, world.layout), walk.action, tick)
+    ticks = min(round(SHOWN / world.period), len(walk) - tick)
     rng = np.random.default_rng(0)
     simulated = [np.array(list(replay(env, way, place, rng, ticks))) for way in (NoGrounding(), grounding)]
     env.close()
-    shown = slice(place.tick + 1, place.tick + 1 + ticks)
+    shown = slice(tick + 1, tick + 1 + ticks)
     joint = int(np.argmax(np.ptp(walk.position[shown], axis=0)))
-    traces = Traces(
-        walk.time[shown],
-        walk.action[place.tick : place.tick + ticks, joint],
-        walk.position[shown, joint],
-        *(seen[:, joint] for seen in simulated),
-    )
+    command = walk.action[tick : tick + ticks, joint]
+    positions = (seen[:, joint] for seen in simulated)
+    traces = Traces(walk.time[shown], command, walk.position[shown, joint], *positions)
     joint_trace(folder / TRACE, traces, world.layout.joints[joint])
-
-
-def write_table(folder: Path, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Write the table that was shown as markdown."""
-    lines = [columns, ["---"] * len(columns), *rows]
-    (folder / MARKDOWN).write_text("".join(f"| {' | '.join(line)} |\n" for line in lines), encoding="utf-8")
-
-
-def _search(label: str, evaluation: Artifact, iterate: Iterate, start: str) -> Search:
-    document = json.loads((evaluation.folder / TABLE).read_text(encoding="utf-8"))
-    return search(label, document, shown=iterate.task.shown, returned=evaluation.metrics["best"], start=start)

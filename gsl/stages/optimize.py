@@ -53,7 +53,7 @@ class Optimize:
         scenario, checked = grounded(bare, first, folder, console, accept=self.accept, seed=self.seed)
         log = GenerationLog(folder)
         search = self.optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
-        found = [record(self.policy, "pi0", first)]
+        found = [record(self.policy, "pi0" if self.initial is None else "start", first)]
         total = self.optimizer.generations * self.optimizer.candidates * self.rollouts
         with console.progress(total, "optimising in simulation") as progress:
             for index in range(self.optimizer.generations):

@@ -6,10 +6,8 @@ dies, what has arrived is kept and only the missing jobs are tried again.
 
 from __future__ import annotations
 
-import hashlib
 import pickle
-from collections.abc import Iterator, Sequence
-from functools import lru_cache
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,11 +27,12 @@ class Job(NamedTuple):
 
 
 class Episode(NamedTuple):
-    """What a search needs of a rollout."""
+    """What a search needs of a rollout; `outcome` is what the task reports of it, by name with unit."""
 
     value: float
     fell: bool
     steps: int
+    outcome: Mapping[str, float]
 
 
 def trajectories(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Any) -> list[Trajectory]:
@@ -81,17 +80,25 @@ def _numbered(function: Any, frozen: bytes, job: Job, index: int) -> tuple[int, 
 
 
 def _trajectory(frozen: bytes, job: Job) -> Trajectory:
-    scenario, env = _standing_by(hashlib.sha256(frozen).digest(), frozen)
+    scenario, env = _standing_by(frozen)
     return rollout(scenario, env, job.parameters, job.seed)
 
 
 def _episode(frozen: bytes, job: Job) -> Episode:
-    trajectory = _trajectory(frozen, job)
-    return Episode(trajectory.value, trajectory.ended_in_a_fall, len(trajectory))
+    scenario, env = _standing_by(frozen)
+    done = rollout(scenario, env, job.parameters, job.seed)
+    return Episode(done.value, done.ended_in_a_fall, len(done), scenario.task.outcome(scenario.world.layout, done))
 
 
-@lru_cache(maxsize=1)
-def _standing_by(digest: bytes, frozen: bytes) -> tuple[Scenario, Any]:
+_STANDING: dict[bytes, tuple[Scenario, Any]] = {}  # what this process has ready, one at most
+
+
+def _standing_by(frozen: bytes) -> tuple[Scenario, Any]:
     """Return this process' scenario with its environment, kept from one job to the next."""
-    scenario = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
-    return scenario, scenario.make()
+    if frozen not in _STANDING:
+        for _, env in _STANDING.values():
+            env.close()
+        _STANDING.clear()
+        scenario = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
+        _STANDING[frozen] = scenario, scenario.make()
+    return _STANDING[frozen]

@@ -14,6 +14,7 @@ from gsl.core.statistics import rank_correlation
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
 from gsl.policies.policy import Policy, neighbour
+from gsl.report.markdown import table
 from gsl.stages.choices import FILE, vector
 from gsl.stages.optimize import Optimize
 from gsl.stages.population import Episode, Job, episodes
@@ -61,7 +62,7 @@ class Survey:
         optimal = [theta for number in range(self.searches) for theta in self._search(number, folder, console)]
         rng = np.random.default_rng(self.seed)
         random = [neighbour(self.policy, self.policy.initial, self.spread, rng) for _ in range(self.random)]
-        reference = _values(self._episodes(self.sim, random, "random", console))
+        reference = _values(self._episodes(self.sim, random, "reference", console))
         rows, found = [], {}
         for name, world in self.worlds.items():
             start = self._episodes(world, [self.policy.initial] * self.repeats, "start", console)
@@ -76,8 +77,7 @@ class Survey:
                 "rank": rank[0],
                 "ceiling": rank[1],
             }
-        lines = [COLUMNS, ["---"] * len(COLUMNS), *rows]
-        (folder / TABLE).write_text("".join(f"| {' | '.join(line)} |\n" for line in lines), encoding="utf-8")
+        (folder / TABLE).write_text(table(COLUMNS, rows), encoding="utf-8")
         console.table(f"speeds in {self.task.unit}", COLUMNS, rows)
         return found
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 from gsl.core.angles import encode
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.core.transitions import Transitions, transitions
+from gsl.core.transitions import Transitions, transitions, usable
 from gsl.errors import TrajectoryError
 from gsl.models.choice import best, fit_network
 from gsl.models.config import ModelConfig
@@ -37,8 +37,9 @@ HELDOUT = "heldout.parquet"
 class TrainForward:
     """Fits f to a part of the real trajectories and measures it on the rest, which it stores beside the model.
 
-    `auto` takes the family whose own prediction, fed back to it for 0.2 s, is nearest to the held-out trajectories,
-    those off pi0 if there are any: the error of one tick says little, for in a gait all joints move together.
+    `auto` takes the family whose own prediction, fed back to it for 0.2 s, is nearest to the validation trajectories,
+    those off pi0 if there are any: the error of one tick says little, for in a gait all joints move together. A model
+    with body sensors is fed the recorded ones.
     """
 
     kind: ClassVar[str] = "train_forward"
@@ -59,22 +60,29 @@ class TrainForward:
         data = parts(path, share=self.heldout, seed=self.seed)
         self._check(path, data)
         console.status(f"fitting a forward model to {len(data.training)} trajectories")
-        judges = of_policy(data.heldout, pi0=False) or data.heldout.episodes
+        judges = self._long(of_policy(data.validation, pi0=False)) or self._long(data.validation.episodes)
         model, choice = best(
             self.model, lambda family: self._fitted(family, data), lambda model: self._score(model, judges)
         )
         write_model(folder, model)
         write(folder / HELDOUT, data.heldout)
         groups = {"pi0": of_policy(data.heldout, pi0=True), "off_pi0": of_policy(data.heldout, pi0=False)}
-        measured = {name: measures(model, episodes) for name, episodes in groups.items() if episodes}
+        measured = {name: measures(model, long) for name, part in groups.items() if (long := self._long(part))}
         show(console, measured)
         return {**summary(choice), "trajectories": len(data.training) + len(data.validation), "heldout": measured}
 
+    @property
+    def _needed(self) -> int:
+        """Ticks an episode has to have before it can be predicted."""
+        return self.model.of_body.span + TICKS + self.model.horizon
+
+    def _long(self, episodes: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
+        return tuple(one for one in episodes if usable(one) >= self._needed)
+
     def _check(self, path: Path, data: Parts) -> None:
-        needed = self.model.of_body.span + TICKS + self.model.horizon
         try:
             for part in data:
-                long = checked(path, part.episodes, needed)
+                long = checked(path, part.episodes, self._needed)
                 self._transitions(long)
         except KeyError as error:
             raise TrajectoryError(

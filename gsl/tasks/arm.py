@@ -33,9 +33,10 @@ class Arm:
         first = layout["position"].start
         return ArmRun(self, [first + layout.joints.index(name) for name in JOINTS])
 
-    def outcome(self, trajectory: Trajectory) -> Mapping[str, float]:
+    def outcome(self, layout: Layout, trajectory: Trajectory) -> Mapping[str, float]:
         """Return the final distance to the goal, the last one held after an early end."""
-        return {"distance [deg]": math.degrees(self.distance(trajectory.position[-1, -4::2]))}
+        shoulders = [layout.joints.index(name) for name in JOINTS]
+        return {"distance [deg]": math.degrees(self.distance(trajectory.position[-1, shoulders]))}
 
     def distance(self, shoulders: np.ndarray) -> float:
         """Return |x - x*| of two shoulder pitches [rad]."""

@@ -47,5 +47,5 @@ class Task(Protocol):
     def start(self, layout: Layout, observation: np.ndarray, role: str) -> TaskRun:
         """Return the task at the beginning of an episode, in the `real` or in the `sim` world."""
 
-    def outcome(self, trajectory: Trajectory) -> Mapping[str, float]:
+    def outcome(self, layout: Layout, trajectory: Trajectory) -> Mapping[str, float]:
         """Return what is reported of an episode, by name with unit."""

@@ -12,6 +12,8 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
 from gsl.tasks.task import REAL, Step
 
+EXACT = 2.0**40  # rewards are multiples of its inverse, so that taking all of them back leaves exactly 0
+
 
 @component
 class Walk:
@@ -30,7 +32,7 @@ class Walk:
         """Return the task at the beginning of an episode."""
         return WalkRun(self, layout["base.position"].start, real=role == REAL)
 
-    def outcome(self, trajectory: Trajectory) -> Mapping[str, float]:
+    def outcome(self, layout: Layout, trajectory: Trajectory) -> Mapping[str, float]:
         """Return the mean forward speed over the planned time, the fall notwithstanding."""
         x = trajectory.sensors["base.position.x"]
         return {"speed [cm/s]": 100.0 * float(x[-1] - x[0]) / self.duration}
@@ -44,7 +46,7 @@ class WalkRun:
 
     def step(self, before: np.ndarray, after: np.ndarray, fell: bool) -> Step:
         """Pay the distance of the step; at a fall take back everything (real) or the fall cost (simulation)."""
-        reward = float(after[self._forward] - before[self._forward]) / self._task.duration
+        reward = round(float(after[self._forward] - before[self._forward]) / self._task.duration * EXACT) / EXACT
         if fell:
             reward = -self._so_far if self._real else reward - self._task.fall_cost
         self._so_far += reward

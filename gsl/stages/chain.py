@@ -1,0 +1,127 @@
+"""One round of grounded simulation learning as links: collect and train, search, measure; each an artifact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from gsl.core.described import described
+from gsl.core.setting import component, setting
+from gsl.errors import ArtifactError
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.grounding import Grounding
+from gsl.models.config import ModelConfig
+from gsl.optimizers.cma_es import CmaEs
+from gsl.policies.policy import Policy
+from gsl.stages.collect import Collect
+from gsl.stages.evaluate import Evaluate
+from gsl.stages.optimize import Optimize
+from gsl.stages.train_forward import TrainForward
+from gsl.stages.train_inverse import TrainInverse
+from gsl.storage import manifest
+from gsl.storage.artifact import Artifact, Stage, build
+from gsl.tasks.task import REAL, SIM, Task
+from gsl.worlds.world import World
+
+COMMAND = "gsl iterate"
+
+
+@component
+class Budget:
+    """How many episodes each part of an iteration gets."""
+
+    real_episodes: Annotated[int, setting("real episodes of the policy, for the forward model", ge=1)]
+    real_neighbours: Annotated[int, setting("real episodes of perturbed policies", ge=0)]
+    sim_episodes: Annotated[int, setting("simulated episodes of the policy, for the inverse model", ge=1)]
+    sim_neighbours: Annotated[int, setting("simulated episodes of perturbed policies", ge=0)]
+    spread: Annotated[float, setting("size of the perturbations, in units of a parameter's scale", ge=0)]
+    sim_action_noise: Annotated[float, setting("noise on simulated actions", unit="rad", ge=0)]
+    rollouts: Annotated[int, setting("simulated episodes of each candidate", ge=1)]
+    episodes: Annotated[int, setting("real episodes of each generation's best", ge=1)]
+    check: Annotated[int, setting("real episodes the fastest stable policy has to walk without a fall", ge=1)]
+    confirmation: Annotated[int, setting("fresh real episodes of the chosen policy", ge=2)]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """What the links of a round have in common."""
+
+    sim: World
+    real: World
+    task: Task
+    policy: Policy
+    forward_model: ModelConfig
+    inverse_model: ModelConfig
+    inverse_method: Literal["regression", "solve"]
+    optimizer: CmaEs
+    budget: Budget
+    accept: bool
+    workers: int
+
+    def trained(
+        self, home: Path, grounding: ActionTransformation, previous: str | None, seed: int, console: Any
+    ) -> ActionTransformation:
+        """Collect in both worlds, train both models below `home`, and return the grounding that they make."""
+        self._collected(home, previous, seed, console)
+        forward = TrainForward(str(home / "collect_real"), self.forward_model, seed=seed)
+        inverse = TrainInverse(str(home / "collect_sim"), self.inverse_model, method=self.inverse_method, seed=seed)
+        models = {"forward_model": forward, "inverse_model": inverse}
+        made = {role: built(stage, home / stage.kind, console) for role, stage in models.items()}
+        return replace(grounding, **{role: str(artifact.folder) for role, artifact in made.items()})
+
+    def search(
+        self, out: Path, grounding: Grounding | ActionTransformation, previous: str | None, seed: int, console: Any
+    ) -> Artifact:
+        """Optimise in the simulator with a grounding that is ready."""
+        stage = Optimize(
+            world=self.sim,
+            task=self.task,
+            policy=self.policy,
+            grounding=grounding,
+            optimizer=self.optimizer,
+            rollouts=self.budget.rollouts,
+            initial=previous,
+            accept=self.accept,
+            workers=self.workers,
+            seed=seed,
+        )
+        return built(stage, out, console)
+
+    def measure(self, out: Path, found: Artifact, seed: int, console: Any) -> Artifact:
+        """Measure what a search found in the real world."""
+        stage = Evaluate(
+            world=self.real,
+            task=self.task,
+            policy=self.policy,
+            policies=str(found.folder),
+            episodes=self.budget.episodes,
+            check=self.budget.check,
+            confirmation=self.budget.confirmation,
+            workers=self.workers,
+            seed=seed,
+        )
+        return built(stage, out, console)
+
+    def _collected(self, home: Path, previous: str | None, seed: int, console: Any) -> None:
+        budget, common = self.budget, {"task": self.task, "policy": self.policy, "initial": previous, "seed": seed}
+        common |= {"spread": budget.spread, "workers": self.workers}
+        real = {"world": self.real, "episodes": budget.real_episodes, "neighbours": budget.real_neighbours}
+        sim = {"world": self.sim, "episodes": budget.sim_episodes, "neighbours": budget.sim_neighbours}
+        built(Collect(role=REAL, **real, **common), home / "collect_real", console)
+        noisy = {"action_noise": budget.sim_action_noise}
+        built(Collect(role=SIM, **sim, **noisy, **common), home / "collect_sim", console)
+
+
+def built(stage: Stage, out: Path, console: Any) -> Artifact:
+    """Build one link; what an earlier chain built otherwise in its place is replaced, what anyone else built is not."""
+    return build(
+        stage, config=described(stage), out=out, command=f"{COMMAND} ({stage.kind})", force=_ours(out), console=console
+    )
+
+
+def _ours(out: Path) -> bool:
+    try:
+        return manifest.read(out).command.startswith(COMMAND)
+    except ArtifactError:
+        return False

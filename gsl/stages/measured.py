@@ -1,0 +1,60 @@
+"""What measured episodes come to: means with intervals, falls, gains, and the rows that people see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from gsl.core.statistics import difference_interval, mean_interval
+from gsl.stages.population import Episode
+from gsl.storage.policies import PolicyRecord
+
+
+def falls(done: Sequence[Episode]) -> int:
+    """Return how many episodes ended in a fall."""
+    return sum(episode.fell for episode in done)
+
+
+def mean(done: Sequence[Episode]) -> float:
+    """Return the mean value."""
+    return float(np.mean([episode.value for episode in done]))
+
+
+def summary(done: Sequence[Episode]) -> dict[str, Any]:
+    """Return mean value with its 95 % interval, falls, number of episodes, and the mean outcome."""
+    interval = mean_interval([episode.value for episode in done])
+    outcome = {name: float(np.mean([episode.outcome[name] for episode in done])) for name in done[0].outcome}
+    bounds = [interval.lower, interval.upper]
+    return {"value": interval.mean, "interval": bounds, "falls": falls(done), "episodes": len(done), "outcome": outcome}
+
+
+def row(theta: PolicyRecord, done: Sequence[Episode]) -> dict[str, Any]:
+    """Return what an evaluation says of a policy."""
+    about = {"name": theta.name, "generation": theta.generation, "value_sim": theta.value_sim}
+    return {**about, **summary(done), "values": [episode.value for episode in done]}
+
+
+def gain(after: Sequence[Episode], before: Sequence[Episode]) -> dict[str, Any]:
+    """Return mean(after) - mean(before) with Welch's 95 % interval, and its share of the latter, None if that is 0."""
+    values = [np.array([episode.value for episode in done]) for done in (after, before)]
+    if after is before:
+        return {"value": 0.0, "interval": [0.0, 0.0], "share": 0.0}
+    difference = difference_interval(*values)
+    share = difference.mean / mean(before) if mean(before) else None
+    return {"value": difference.mean, "interval": [difference.lower, difference.upper], "share": share}
+
+
+def columns(first: Mapping[str, Any], unit: str) -> list[str]:
+    """Return the titles of `cells`."""
+    return ["policy", f"in simulation [{unit}]", f"in real [{unit}]", "95 % interval", "falls", *first["outcome"]]
+
+
+def cells(one: Mapping[str, Any], name: str, shown: float) -> list[str]:
+    """Return a row for people, values multiplied by `shown`; a policy that stopped at its fall has no interval."""
+    low, high = (shown * bound for bound in one["interval"])
+    interval = f"{low:.1f} to {high:.1f}" if np.isfinite(high) and not one["falls"] else ""
+    simulated = "" if one["value_sim"] is None else f"{shown * one['value_sim']:.1f}"
+    outcome = [f"{value:.1f}" for value in one["outcome"].values()]
+    return [name, simulated, f"{shown * one['value']:.1f}", interval, f"{one['falls']} of {one['episodes']}", *outcome]
