@@ -10,7 +10,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 INSTALLED := $(VENV)/.stamp
 
 
-DEMO ?= name=demo beside=true
+DEMO ?= name=demo beside=true force=true
 
 help: ## Show this.
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /make \1|/' | column -t -s '|'
@@ -18,7 +18,7 @@ help: ## Show this.
 demo: $(INSTALLED) ## Improve a walk for a "real" robot that the optimiser never touches; some minutes.
 	$(GSL) iterate $(DEMO)
 	@echo "what there is to look at:"
-	@find runs/demo/iterate -maxdepth 1 -type f -not -name '.*' | sort
+	@find runs/demo -type f \( -name '*.png' -o -name '*.md' -o -name '*.parquet' -o -name 'policies.json' \) | sort
 
 test: $(INSTALLED) ## Check the style, run the tests.
 	$(VENV)/bin/ruff check

@@ -77,7 +77,10 @@ def _effect(name: str, entry: Any) -> Effect:
 def applied(plant: Plant, effects: Iterable[Effect]) -> Plant:
     """Return the plant with all effects in it."""
     for effect in effects:
-        plant = effect.apply(plant)
+        try:
+            plant = effect.apply(plant)
+        except ConfigError as error:
+            raise error.under(f"effects.{type(effect).__module__.rpartition('.')[2]}") from error
     return plant
 
 

@@ -34,14 +34,10 @@ class LinkMass:
         links = dict(plant.robot.links)
         if self.link not in links:
             near = difflib.get_close_matches(self.link, links, 1) or [", ".join(links)]
-            raise ConfigError(
-                "link_mass.link", f"the {plant.robot.name} has no link '{self.link}'; did you mean {near[0]}?"
-            )
+            raise ConfigError("link", f"the {plant.robot.name} has no link '{self.link}'; did you mean {near[0]}?")
         link = links[self.link]
         factor = 1.0 + self.mass / link.mass
         if factor <= 0.0:
-            raise ConfigError(
-                "link_mass.mass", f"{self.link} weighs {link.mass} kg: {self.mass} kg more leaves nothing"
-            )
+            raise ConfigError("mass", f"{self.link} weighs {link.mass} kg: {self.mass} kg more leaves nothing")
         links[self.link] = replace(link, mass=factor * link.mass, inertia=factor * link.inertia)
         return replace(plant, robot=replace(plant.robot, links=links))

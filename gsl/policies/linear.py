@@ -9,6 +9,8 @@ import numpy as np
 
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
+from gsl.core.validation import did_you_mean
+from gsl.errors import ConfigError
 
 WEIGHT_SCALE = 0.2
 
@@ -42,7 +44,16 @@ class Linear:
         return np.array([1.0 if name.endswith("_offset") else WEIGHT_SCALE for name in self.names])
 
     def posture(self, parameters: np.ndarray, layout: Layout) -> np.ndarray:
-        """Return where an episode starts [rad], shape (n_joints,)."""
+        """Return where an episode starts [rad], shape (n_joints,).
+
+        Raises:
+            ConfigError: if the world has no joint of a name.
+        """
+        for joint in (*self.joints, *self.start_at):
+            if joint not in layout.joints:
+                raise ConfigError(
+                    "policy", f"no joint called '{joint}'{did_you_mean(joint, layout.joints, listed=True)}"
+                )
         return np.array([self.start_at.get(joint, 0.0) for joint in layout.joints])
 
     def start(self, parameters: np.ndarray, layout: Layout) -> LinearRun:

@@ -130,6 +130,9 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         raise InputError(
             f"the held-out trajectories are of {', '.join(heldout.joints)}, not of {', '.join(layout.joints)}"
         )
+    if abs(heldout.control_period - layout.control_period) > 1e-9:
+        periods = f"{heldout.control_period} s, the simulator's is {layout.control_period} s"
+        raise InputError(f"the models were trained on trajectories with a control period of {periods}")
     env = scenario.world.make()
     try:
         deviations = {

@@ -47,6 +47,9 @@ class Identity:
         return {name: value for name, value in named.items() if isinstance(value, int)}
 
 
+WITHOUT_EFFECT = ("workers",)  # settings on which no result depends
+
+
 def identify(kind: str, config: Mapping[str, Any], parents: Mapping[str, Path]) -> Identity:
     """Return the identity of a stage; parents enter by role and contents, so that folders can move.
 
@@ -56,7 +59,8 @@ def identify(kind: str, config: Mapping[str, Any], parents: Mapping[str, Path]) 
     settings = {
         name: value
         for name, value in flat(documents.plain(config)).items()
-        if not (isinstance(value, str) and (name in parents or os.path.abspath(value) in places))
+        if name.rpartition(".")[2] not in WITHOUT_EFFECT
+        and not (isinstance(value, str) and (name in parents or os.path.abspath(value) in places))
     }
     hashes = {role: content_hash(path) for role, path in parents.items()}
     return Identity(kind, settings, hashes, sources_hash())

@@ -150,7 +150,7 @@ def read_joints(handle: int, body: int, places: np.ndarray, motion: np.ndarray, 
         motion: Result, joint positions [rad] and velocities [rad/s], shape (2, n_motors).
         spin: Result, angular velocity of the base in world axes [rad/s], shape (3,).
     """
-    n, addresses = places.shape[1], np.empty(2, dtype=np.intp)
+    n, addresses = places.shape[1], np.zeros(2, dtype=np.intp)
     status = c.submit(handle, c.request_state(handle, body))
     first = addresses.ctypes.data
     c.actual_state(status, 0, 0, 0, 0, first, first + addresses.itemsize, 0)
