@@ -14,8 +14,9 @@ from typer.core import TyperCommand
 
 from gsl import __version__
 from gsl.commandline.completion import CONFIG_DIR, complete, user_folder
-from gsl.commandline.failure import INTERRUPTED, leave_quietly, report, stop_like_ctrl_c
+from gsl.commandline.failure import INTERRUPTED, leave_quietly, report
 from gsl.console import Console
+from gsl.core.interruption import listen
 
 
 class StageCommand(TyperCommand):
@@ -138,9 +139,11 @@ def root(
 
 def main() -> None:
     """Run the command line of this process."""
-    stop_like_ctrl_c()
+    listen()
     sys.path.append(os.getcwd())
-    sys.exit(call(sys.argv[1:]))
+    code = call(sys.argv[1:])
+    exec("")  # else Python, if it was interrupted in a library's exec(), ends by the signal and not with our exit code
+    sys.exit(code)
 
 
 def call(arguments: Sequence[str]) -> int:

@@ -13,6 +13,7 @@ from hydra.errors import InstantiationException
 from hydra.utils import get_object, instantiate
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
+from pydantic import AfterValidator
 
 from gsl.commandline.composer import Composition, compose, opened
 from gsl.commandline.config_errors import instantiation_error, missing, resolution_error
@@ -27,12 +28,19 @@ RUNS = Path("runs")
 _OURS = re.compile(r"gsl(\.[A-Za-z_]\w*)+")
 
 
+def _inside(name: str) -> str:
+    """Return the name of a run that stays below the folder of the runs."""
+    if any(part in ("", ".", "..") for part in name.split("/")):
+        raise ValueError("must be a name in runs/, without an empty part or ..; a folder elsewhere is out=")
+    return name
+
+
 @component
 class CommandSettings:
     """What a command does with its stage, as opposed to what the stage does."""
 
-    name: Annotated[str, setting("name of the run", min_length=1)] = "unnamed"
-    out: Annotated[str | None, setting("folder of the artifact")] = None
+    name: Annotated[str, setting("name of the run", min_length=1), AfterValidator(_inside)] = "unnamed"
+    out: Annotated[str | None, setting("folder of the artifact", min_length=1)] = None
     force: Annotated[bool, setting("replace an artifact that was built otherwise")] = False
     trust: Annotated[bool, setting("let files of a run name classes that are not gsl's")] = False
 
@@ -84,11 +92,14 @@ def run(
 
 def execute(command: str, line: str, config: Mapping[str, Any], console: Console, *, level: str = "") -> dict[str, Any]:
     """Build the artifact that a resolved configuration describes and return what there is to say about it."""
+    from gsl.stages.account import account
     from gsl.storage.artifact import build as build_artifact
 
     stage, settings, own = prepared(config)
     out = own.folder(command, level)
     artifact = build_artifact(stage, config=settings, out=out, command=line, force=own.force, console=console)
+    for told in account(artifact):
+        console.table(*told)
     return {"folder": out.as_posix(), "unchanged": artifact.unchanged, "metrics": artifact.metrics}
 
 

@@ -11,14 +11,16 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
+from gsl.commandline.tables import LineTable, RichLiveTable, drawn
+from gsl.core.interruption import checkpoint
+
 if TYPE_CHECKING:
     import rich.console
-    import rich.table
 
 _log = logging.getLogger("gsl")
 
 SECONDS_BETWEEN_LINES = 10.0
-WIDTH_WITHOUT_TERMINAL = 120
+WIDTH_WITHOUT_TERMINAL = 200
 
 
 class Progress(Protocol):
@@ -40,11 +42,15 @@ class Console:
 
     def __init__(self, *, json: bool = False) -> None:
         self.json = json
-        self._live: _RichLiveTable | None = None
+        self._live: RichLiveTable | None = None
+        self._lines: LineTable | None = None
 
     def status(self, text: str) -> None:
         """Say what is going on, on stderr."""
+        checkpoint()
         _log.info("%s", text)
+        if self._lines is not None:
+            self._lines.interrupted = True
         self._stderr.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def table(
@@ -52,8 +58,14 @@ class Console:
     ) -> None:
         """Print a table of results on stdout; with JSON it is left to `result`."""
         _log.info("%s", "\n".join([title, *("\t".join(map(str, row)) for row in [columns, *rows]), caption or ""]))
-        if not self.json:
-            self._stdout.print(_rich_table(title, columns, rows, caption))
+        if self.json:
+            return
+        above_live_table = self._live is not None and self._stdout.is_terminal
+        place = self._stderr if above_live_table else self._stdout
+        place.print(title, style="bold", markup=False, highlight=False, soft_wrap=True)
+        place.print(drawn(columns, rows))
+        if caption:
+            place.print(caption + "\n", markup=False, highlight=False, soft_wrap=True)
 
     def result(self, document: Mapping[str, Any], *, text: str = "") -> None:
         """Print the outcome: the document as JSON, or `text` for a person."""
@@ -94,13 +106,17 @@ class Console:
     def live_table(self, title: str, columns: Sequence[str]) -> Iterator[LiveTable]:
         """Show a growing table on a terminal, else each row as a line; the final table is for `table`."""
         if not self._stderr.is_terminal or self._live is not None:
-            yield _LineTable(columns, self.status)
+            self._lines = LineTable(title, columns, self.status)
+            try:
+                yield self._lines
+            finally:
+                self._lines = None
             return
         from rich.live import Live
 
-        table = _rich_table(title, columns, [], None)
+        table = drawn(columns, [], title)
         with Live(table, console=self._stderr, transient=True) as live:
-            self._live = _RichLiveTable(table, live.refresh)
+            self._live = RichLiveTable(table, live.refresh)
             try:
                 yield self._live
             finally:
@@ -120,6 +136,7 @@ class _Bar:
         self.draw = draw
 
     def advance(self, steps: int = 1) -> None:
+        checkpoint()
         self.draw(steps)
 
 
@@ -131,31 +148,11 @@ class _Lines:
         self.done, self.said = 0, time.monotonic()
 
     def advance(self, steps: int = 1) -> None:
+        checkpoint()
         self.done += steps
         if time.monotonic() - self.said >= self.seconds:
             self.said = time.monotonic()
             self.say(f"{self.description}: {self.done} of {self.total}")
-
-
-class _LineTable:
-    def __init__(self, columns: Sequence[str], say: Callable[[str], None]) -> None:
-        self.columns, self.say = columns, say
-
-    def row(self, *cells: object) -> None:
-        self.say("  ".join(f"{column}: {cell}" for column, cell in zip(self.columns, cells, strict=True)))
-
-
-class _RichLiveTable:
-    def __init__(self, table: rich.table.Table, refresh: Callable[[], None]) -> None:
-        self.table, self.refresh = table, refresh
-
-    def row(self, *cells: object) -> None:
-        self.table.add_row(*map(str, cells))
-        self.refresh()
-
-    def caption(self, text: str) -> None:
-        self.table.caption = text
-        self.refresh()
 
 
 def _rich_console(is_terminal: bool, *, stderr: bool) -> rich.console.Console:
@@ -163,26 +160,3 @@ def _rich_console(is_terminal: bool, *, stderr: bool) -> rich.console.Console:
 
     width = None if is_terminal else int(os.environ.get("COLUMNS") or WIDTH_WITHOUT_TERMINAL)
     return RichConsole(stderr=stderr, width=width)
-
-
-def _rich_table(
-    title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None
-) -> rich.table.Table:
-    from rich import box
-    from rich.markup import escape
-    from rich.table import Table
-
-    caption = None if caption is None else escape(caption)
-    table = Table(
-        title=escape(title), caption=caption, box=box.SIMPLE_HEAD, title_justify="left", caption_justify="left"
-    )
-    for index, column in enumerate(columns):
-        numbers = bool(rows) and all(_is_number(row[index]) for row in rows)
-        table.add_column(escape(column), justify="right" if numbers else "left")
-    for row in rows:
-        table.add_row(*(escape(str(cell)) for cell in row))
-    return table
-
-
-def _is_number(cell: object) -> bool:
-    return str(cell).lstrip("+-")[:1].isdigit() and not any(letter in str(cell) for letter in ":/=")

@@ -66,7 +66,7 @@ class Compare:
     kind: ClassVar[str] = "evaluate"
     sim: ExampleWorld
     real: ExampleWorld
-    policy: str
+    subject: str
     episodes: Annotated[int, setting("episodes in each", gt=0)]
     trust: Annotated[bool, setting("let files name foreign classes")] = False
 

@@ -46,7 +46,7 @@ class Doubling:
 class Resumable(Doubling):
     """The same, going on where it was killed."""
 
-    resumable: ClassVar[bool] = True
+    progress: ClassVar[str] = "progress"
 
 
 def built(stage: Doubling, out: Path, *, force: bool = False, **settings: Any) -> Artifact:
@@ -247,12 +247,21 @@ def test_resumable_work_finds_what_it_left(out: Path) -> None:
     assert not hidden(out.parent)
 
 
+def test_resumable_work_that_fails_before_it_has_begun_leaves_nothing(out: Path) -> None:
+    with pytest.raises(GslError):
+        built(Resumable(ending=raising(GslError("refused"))), out)
+    assert not hidden(out.parent)
+
+
 def test_a_partial_of_other_work_is_discarded(out: Path) -> None:
+    def ending(folder: Path) -> None:
+        (folder / "progress").write_text("1")
+        raise RuntimeError
+
     with pytest.raises(RuntimeError):
-        built(
-            Resumable(1, ending=lambda folder: raising(RuntimeError())((folder / "old").write_text("") or folder)), out
-        )
-    assert "old" not in built(Resumable(2), out).manifest.files
+        built(Resumable(1, ending=ending), out)
+    assert hidden(out.parent) == [".doubling.partial"]
+    assert "progress" not in built(Resumable(2), out).manifest.files
 
 
 KILLED = """
@@ -260,7 +269,7 @@ import sys, time
 from pathlib import Path
 from gsl.storage.artifact import build
 class Slow:
-    kind, resumable = "slow", sys.argv[2] == "resumable"
+    kind, progress = "slow", "half" if sys.argv[2] == "resumable" else ""
     def parents(self): return {}
     def run(self, folder, console):
         (folder / "half").write_text("half")

@@ -1,15 +1,18 @@
 """Configurations are composed, checked and built; whatever is wrong is one line."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 from example_stage import ExampleWorld
 
 from gsl.cli import call
-from gsl.commandline.composer import configuration_folder
+from gsl.commandline.composer import compose, configuration_folder, opened
 from gsl.commandline.multirun import job_level
-from gsl.config import build
+from gsl.config import build, prepared, resolved
+from gsl.core.described import described
 from gsl.errors import ConfigError
 
 CONF = Path(__file__).parent / "conf_example"
@@ -30,7 +33,7 @@ def test_a_stage_leaves_its_artifact_where_the_configuration_says(
     assert (elsewhere / "runs/example/collect/count.txt").read_text() == "2\n"
     assert (elsewhere / "runs/example/collect/manifest.json").is_file()
     assert call(["collect", "episodes=2"]) == 0
-    assert capsys.readouterr().out == "runs/example/collect (unchanged)\n"
+    assert capsys.readouterr().out.splitlines()[-1] == "runs/example/collect (unchanged)"
     assert call(["collect", "episodes=2", "out=elsewhere/mine"]) == 0
     assert (elsewhere / "elsewhere/mine/manifest.json").is_file()
 
@@ -44,7 +47,7 @@ def test_json_is_exactly_one_document(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_the_composed_configuration_can_be_looked_at(elsewhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(["evaluate", "--cfg", "job", "--json", "policy=p", "sim=worn", "real=ideal", "preset=toy"]) == 0
+    assert call(["evaluate", "--cfg", "job", "--json", "subject=s", "sim=worn", "real=ideal", "preset=toy"]) == 0
     composed = json.loads(capsys.readouterr().out)
     assert composed["episodes"] == 1
     assert "mine" in composed["sim"]["effects"]
@@ -58,7 +61,7 @@ def test_an_experiment_is_a_whole_scenario(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) -> None:
-    assert call(["evaluate", "policy=p", "trust=true"]) == 0
+    assert call(["evaluate", "subject=s", "trust=true"]) == 0
     assert (elsewhere / "runs/example/compared/trust.txt").read_text() == "True"
 
 
@@ -70,8 +73,11 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
         (["control_period=1"], "control_period: no such setting; did you mean world.control_period?"),
         (["+world.foo=1"], "world.foo: no such setting; there is control_period, effects, iterations"),
         (["sim=ideal"], "sim: no such setting"),
-        (["world=wrn"], "no world called wrn; did you mean worn? There is ideal, plain, worn"),
-        (["experiment=lng"], "no experiment called lng; did you mean long? There is long"),
+        (
+            ["world=wrn"],
+            "no world called wrn; did you mean worn? There is ideal, nao_ideal, nao_weak, nao_worn, plain, worn",
+        ),
+        (["experiment=lng"], "no experiment called lng; did you mean long? There is arm, long"),
         (["episodes=four"], "episodes = four: must be a whole number"),
         (["episodes=-1"], "episodes = -1: must be above 0"),
         (["episodes"], "episodes: has no value; write key=value"),
@@ -102,9 +108,9 @@ def test_what_is_wrong_is_one_line(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["evaluate"], "gsl evaluate: policy: has no value yet; say policy=...\n"),
-        (["evaluate", "world=worn", "policy=p"], "gsl evaluate: world: here a world has a role; say "),
-        (["evaluate", "real=wrn", "policy=p"], "gsl evaluate: no world called wrn; did you mean worn?"),
+        (["evaluate"], "gsl evaluate: subject: has no value yet; say subject=...\n"),
+        (["evaluate", "world=worn", "subject=s"], "gsl evaluate: world: here a world has a role; say "),
+        (["evaluate", "real=wrn", "subject=s"], "gsl evaluate: no world called wrn; did you mean worn?"),
         (["colect"], "gsl colect: No such command 'colect'. Did you mean 'collect'?\n"),
         (["collect", "--jsn"], "gsl collect: No such option: --jsn"),
         (["collect", "--config-dir", "nowhere"], "gsl collect: --config-dir nowhere: there is no such folder\n"),
@@ -145,7 +151,7 @@ def test_each_job_of_a_multirun_has_its_own_artifact(elsewhere: Path, capsys: py
     jobs = json.loads(capsys.readouterr().out)["jobs"]
     assert [job["metrics"]["seed"] for job in jobs] == [1, 1, 2, 2]
     assert all((elsewhere / job["folder"] / "manifest.json").is_file() for job in jobs)
-    assert jobs[1]["folder"] == "runs/example/collect/seed=1,world=worn"
+    assert jobs[1]["folder"] == "runs/example/seed=1,world=worn/collect"
     assert {path.name for path in (elsewhere / "runs").iterdir()} == {"example"}
 
 
@@ -181,16 +187,36 @@ def test_a_file_of_the_user_wins_over_ours(elsewhere: Path, capsys: pytest.Captu
 def test_help_shows_groups_settings_and_effects(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["evaluate", "--help"]) == 0
     text = capsys.readouterr().out
-    assert "  real        ideal plain worn*\n" in text
+    assert "  real        ideal nao_ideal nao_weak nao_worn plain worn*\n" in text
     assert "  control_period  0.02 s" in text
     assert "episodes in each" in text
     assert "backlash.width" in text
 
 
-@pytest.mark.parametrize("command", sorted(path.stem for path in configuration_folder().glob("*.yaml")))
-def test_our_own_configurations_compose(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("GSL_CONFIG_DIR")
-    assert call([command.replace("_", "-"), "--cfg", "job"]) == 0
+def _choices() -> Iterator[tuple[str, ...]]:
+    """Commands with choices as they are typed: in a command's n-th line every group takes its n-th option."""
+    conf = configuration_folder()
+    for command in sorted(conf.glob("*.yaml")):
+        groups = [entry for entry in yaml.safe_load(command.read_text())["defaults"] if isinstance(entry, dict)]
+        found = [_typed(next(iter(entry)).lstrip("/"), conf) for entry in groups]
+        for number in range(max(map(len, found))):
+            yield command.stem.replace("_", "-"), *(typed[min(number, len(typed) - 1)] for typed in found)
+    yield from [("iterate", f"experiment={option.stem}") for option in sorted((conf / "experiment").glob("*.yaml"))]
+
+
+def _typed(group: str, conf: Path) -> list[str]:
+    folder, _, role = group.partition("@")
+    return [f"{role or folder}={option.stem}" for option in sorted((conf / folder).glob("*.yaml"))]
+
+
+@pytest.mark.parametrize("line", list(_choices()), ids=" ".join)
+def test_every_option_of_ours_composes_and_builds(line: tuple[str, ...]) -> None:
+    command, *choices = line
+    with opened(None):
+        stage, settings, _ = prepared(resolved(compose(command, choices)))
+    assert stage.kind == command.replace("-", "_")
+    assert build(described(stage)) == stage
+    assert not {"preset", "recipe", "name", "out"} & settings.keys()
 
 
 def test_a_saved_component_is_built_again() -> None:

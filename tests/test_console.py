@@ -29,9 +29,31 @@ def test_with_json_stdout_holds_one_document_without_nan(capsys: pytest.CaptureF
 
 
 def test_rows_of_a_live_table_are_lines_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with Console().live_table("rounds", ["round", "value"]) as table:
-        table.row(1, 0.5)
-    assert capsys.readouterr().err == "round: 1  value: 0.5\n"
+    console = Console()
+    with console.live_table("rounds [m/s]", ["round", "value", "what it is made of"]) as table:
+        table.row(1, "", "air")
+        table.row("a very long round", 0.5, "")
+        console.status("walking")
+        table.row(3, 0.25, "water")
+    printed = capsys.readouterr()
+    assert printed.err.splitlines() == [
+        "rounds [m/s]",
+        "  round          value          what it is made of",
+        "  1                             air",
+        "  a very long round  0.5",
+        "walking",
+        "rounds [m/s]",
+        "  round              value          what it is made of",
+        "  3                  0.25           water",
+    ]
+    assert printed.out == ""
+
+
+def test_brackets_are_text_and_long_tables_are_not_cut(capsys: pytest.CaptureFixture[str]) -> None:
+    Console().table("speed [cm/s]", ["policy", "way [mm]"], [("[red]", "x" * 150)], caption="[bold] is no style")
+    printed = capsys.readouterr().out
+    for text in ("speed [cm/s]\n", "way [mm]", "[red]", "x" * 150, "[bold] is no style"):
+        assert text in printed
 
 
 def test_a_terminal_gets_a_bar_and_a_growing_table(

@@ -75,5 +75,5 @@ def test_trajectories_without_the_body_cannot_be_replayed() -> None:
 
 
 def test_trajectories_of_another_robot_are_refused() -> None:
-    with pytest.raises(InputError, match="not of"):
+    with pytest.raises(InputError, match="differ in joints: their order"):
         check(SCENARIO, POLICY.initial, replace(heldout(), joints=JOINTS[::-1]), 1)

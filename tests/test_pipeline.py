@@ -3,142 +3,156 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
+from commands import SMALL, Said, done, gsl, started
 
-SMALL = ["preset=toy", "task.duration=1.6", "name=chain", "workers=1"]
-
-
-def gsl(*arguments: str, folder: Path, code: int = 0) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "gsl", *arguments]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
-    assert done.returncode == code, f"{arguments} ended with {done.returncode}: {done.stderr[-2000:]}"
-    assert "Traceback" not in done.stderr
-    return done
-
-
-@pytest.fixture(scope="module")
-def chain(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("chain")
-    for role in ("real", "sim"):
-        gsl("collect", f"role={role}", *SMALL, folder=folder)
-    gsl("train-forward", "preset=toy", "name=chain", "model=linear", folder=folder)
-    gsl("train-inverse", "preset=toy", "name=chain", folder=folder)
-    gsl("optimize", *SMALL, "grounding=gat", "accept=true", folder=folder)
-    gsl("evaluate", *SMALL, folder=folder)
-    return folder
+NAMED = (*SMALL, "name=chain")
+STAGES = ("collect_real", "collect_sim", "train_forward", "train_inverse", "optimize", "evaluate")
 
 
 def test_every_stage_leaves_a_complete_artifact(chain: Path) -> None:
-    for stage in ("collect_real", "collect_sim", "train_forward", "train_inverse", "optimize", "evaluate"):
+    for stage in STAGES:
         folder = chain / "runs/chain" / stage
-        manifest = json.loads((folder / "manifest.json").read_text())
-        assert set(manifest["files"]) <= {path.name for path in folder.iterdir()}
-        assert {"config.yaml", "metrics.json", "log.txt"} <= {path.name for path in folder.iterdir()}
-    parents = {
-        parent["role"] for parent in json.loads((chain / "runs/chain/optimize/manifest.json").read_text())["parents"]
-    }
-    assert parents == {"grounding.forward_model", "grounding.inverse_model"}
+        there = {path.name for path in folder.iterdir()}
+        files = set(json.loads((folder / "manifest.json").read_text())["files"])
+        assert {"config.yaml", "metrics.json", "log.txt"} < files
+        assert there == files | {"manifest.json"}
+    stored = json.loads((chain / "runs/chain/optimize/manifest.json").read_text())
+    assert {one["role"] for one in stored["parents"]} == {"grounding.forward_model", "grounding.inverse_model"}
 
 
 def test_nothing_half_written_is_left_behind(chain: Path) -> None:
-    assert not [path for path in (chain / "runs/chain").iterdir() if path.name.startswith(".")]
+    assert sorted(path.name for path in (chain / "runs/chain").iterdir()) == sorted(STAGES)
 
 
-def test_the_same_command_again_does_nothing(chain: Path) -> None:
+def test_the_same_command_again_does_nothing_however_many_workers_it_has(chain: Path) -> None:
     before = (chain / "runs/chain/collect_real/trajectories.parquet").stat().st_mtime_ns
-    assert "unchanged" in gsl("collect", *SMALL, folder=chain).stdout
+    again = done("collect", *NAMED, "workers=2", folder=chain)
+    assert again.out.splitlines()[-1] == "runs/chain/collect_real (unchanged)"
     assert (chain / "runs/chain/collect_real/trajectories.parquet").stat().st_mtime_ns == before
 
 
 def test_another_setting_is_refused_and_named(chain: Path) -> None:
-    done = gsl("collect", *SMALL, "seed=2", folder=chain, code=2)
-    assert "seed" in done.stderr and "force=true" in done.stderr
+    said = gsl("collect", *NAMED, "seed=2", folder=chain)
+    assert said.code == 2
+    assert said.lines == [
+        "gsl collect: runs/chain/collect_real: was built otherwise (changed: seed 1 -> 2); "
+        "force=true rebuilds it, out= keeps both"
+    ]
 
 
 def test_results_are_the_only_thing_on_stdout(chain: Path) -> None:
-    document = json.loads(gsl("evaluate", *SMALL, "--json", folder=chain).stdout)
+    document = json.loads(done("evaluate", *NAMED, "--json", folder=chain).out)
     assert document["metrics"]["real_episodes"] > 0 and document["unchanged"] is True
 
 
-def test_a_stage_says_what_it_is_made_of(chain: Path) -> None:
-    assert "collect" in gsl("runs", folder=chain).stdout
-    shown = json.loads(gsl("show", "chain/evaluate", "--json", folder=chain).stdout)
+def test_runs_lists_every_artifact_with_what_came_out(chain: Path) -> None:
+    text = done("runs", folder=chain).out
+    for stage, result in {
+        "collect_real": "6 episodes, no falls, π0 ",
+        "train_forward": "linear, held out: ",
+        "train_inverse": "° of action",
+        "optimize": "2 generations, best ",
+        "evaluate": " cm/s, no falls in 3",
+    }.items():
+        line = next(line for line in text.splitlines() if f" chain/{stage} " in line)
+        assert result in line
+
+
+def test_show_tells_where_an_artifact_comes_from_and_what_it_holds(chain: Path) -> None:
+    text = done("show", "chain/evaluate", folder=chain).out
+    parent = json.loads((chain / "runs/chain/evaluate/manifest.json").read_text())["parents"][0]
+    metrics = json.loads((chain / "runs/chain/evaluate/metrics.json").read_text())
+    for told in (
+        "runs/chain/evaluate: evaluate",
+        "gsl evaluate name=chain preset=toy",
+        f"runs/chain/optimize   {parent['hash'][:12]}   the same",
+        "policies in the real world",
+        "in real [cm/s]",
+        "pi0, fresh",
+        f"{metrics['real_episodes']} real episodes",
+        "evaluation.json",
+        "all files are as they were made",
+    ):
+        assert told in text
+    shown = json.loads(done("show", "chain/evaluate", "--json", folder=chain).out)
     assert shown["manifest"]["kind"] == "evaluate"
 
 
-def test_a_grounding_that_fails_its_check_is_refused_with_the_reason(chain: Path) -> None:
-    settings = ["grounding=gat", "grounding.alpha=1.0", "grounding.noise=0.3", "out=runs/refused"]
-    done = gsl("optimize", *SMALL, *settings, folder=chain, code=1)
-    assert "refused" in done.stderr and "accept=true" in done.stderr
-    assert not (chain / "runs/refused").exists()
+@pytest.mark.parametrize("stage", STAGES)
+def test_every_artifact_can_be_shown(chain: Path, stage: str) -> None:
+    text = done("show", f"chain/{stage}", folder=chain).out
+    assert "metrics" not in [line.strip() for line in text.splitlines()]  # the fallback for what nobody can read
+    assert "_target_" not in text
 
 
-def test_a_truncated_file_is_one_clear_line(chain: Path) -> None:
-    whole = (chain / "runs/chain/collect_real/trajectories.parquet").read_bytes()
-    (chain / "half.parquet").write_bytes(whole[: len(whole) // 2])
-    done = gsl("train-forward", "data=half.parquet", "out=runs/half", folder=chain, code=2)
-    assert "half.parquet" in done.stderr and len(done.stderr.strip().splitlines()) == 1
-
-
-def test_a_damaged_artifact_is_named(chain: Path) -> None:
-    checkpoint = chain / "runs/chain/train_forward/forward_model.safetensors"
-    whole = checkpoint.read_bytes()
-    checkpoint.write_bytes(whole[:-40])
+def test_show_notices_what_was_changed_since(chain: Path) -> None:
+    table = chain / "runs/chain/evaluate/evaluation.json"
+    whole = table.read_text()
+    table.write_text(whole + " ")
     try:
-        done = gsl("optimize", *SMALL, "grounding=gat", "out=runs/damaged", folder=chain, code=2)
+        assert "changed since it was made: evaluation.json" in done("show", "chain/evaluate", folder=chain).out
     finally:
-        checkpoint.write_bytes(whole)
-    assert "forward_model.safetensors" in done.stderr
+        table.write_text(whole)
 
 
-def test_an_artifact_of_the_wrong_kind_is_named(chain: Path) -> None:
-    done = gsl("evaluate", "policies=chain/collect_real", "out=runs/wrong", folder=chain, code=2)
-    assert "collect" in done.stderr
+def test_a_grounding_that_fails_its_check_is_refused_with_the_reason(chain: Path) -> None:
+    settings = ("grounding=gat", "grounding.alpha=1.0", "grounding.noise=0.3", "out=runs/chain/refused")
+    said = gsl("optimize", *NAMED, *settings, folder=chain)
+    assert said.code == 1
+    assert "this grounding is refused: " in said.err and "accept=true" in said.err
+    assert "forward 0.2 s [mm]" in said.out
+    test_nothing_half_written_is_left_behind(chain)
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("stage", ["collect", "optimize"])
-def test_an_interrupt_leaves_nothing_half_written(tmp_path: Path, stage: str, stop: signal.Signals) -> None:
-    settings = ["grounding=none"] if stage == "optimize" else ["episodes=500"]
-    command = [sys.executable, "-m", "gsl", stage, *settings, "name=stopped"]
-    running = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                               start_new_session=True)  # fmt: skip
-    deadline = time.monotonic() + 60.0
-    while not list(tmp_path.glob("runs/stopped/.*")) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    time.sleep(2.0)
-    os.killpg(running.pid, stop) if stop == signal.SIGINT else running.send_signal(stop)
-    _, said = running.communicate(timeout=60)
-    assert running.returncode == 130 and "interrupted" in said and "Traceback" not in said
-    assert not (tmp_path / "runs/stopped" / stage).exists()
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Said]:
+    """One iteration as a process."""
+    folder = tmp_path_factory.mktemp("whole")
+    with started("iterate", *SMALL, "name=whole", "accept=true", "beside=true", folder=folder) as process:
+        out, err = process.communicate(timeout=200)
+    assert process.returncode == 0, err
+    return folder, Said(0, out, err)
 
 
-def test_a_run_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
-    (tmp_path / "runs").write_text("a file where the folder should be")
-    done = gsl("collect", *SMALL, folder=tmp_path, code=1)
-    assert "runs" in done.stderr and len(done.stderr.strip().splitlines()) == 1
+def test_iterate_runs_the_whole_chain_and_says_what_it_cost(whole: tuple[Path, Said]) -> None:
+    folder, _ = whole
+    metrics = json.loads((folder / "runs/whole/iterate/metrics.json").read_text())
+    first = folder / "runs/whole/iteration_01"
+    assert {path.name for path in first.iterdir()} == {*STAGES, "optimize_none", "evaluate_none"}
+    measured, collected = (
+        json.loads((first / stage / "metrics.json").read_text()) for stage in ("evaluate", "collect_real")
+    )
+    assert metrics["learned_from"] == collected["real_episodes"]
+    assert metrics["real_episodes"] == measured["real_episodes"] + collected["real_episodes"]
+    made = {path.name for path in (folder / "runs/whole/iterate").iterdir()}
+    assert {"policies.json", "learning_curve.png", "joint_trace.png", "table.md"} < made
 
 
-def test_iterate_runs_the_whole_chain_and_says_what_it_cost(tmp_path: Path) -> None:
-    settings = ["iterate", "preset=toy", "name=whole", "task.duration=1.6", "accept=true", "beside=true", "--json"]
-    document = json.loads(gsl(*settings, folder=tmp_path).stdout)
-    home = tmp_path / "runs/whole"
-    assert {path.name for path in (home / "iteration_01").iterdir()} >= {
-        "collect_real",
-        "optimize",
-        "evaluate",
-        "evaluate_none",
-    }
-    measured = json.loads((home / "iteration_01/evaluate/metrics.json").read_text())
-    collected = json.loads((home / "iteration_01/collect_real/metrics.json").read_text())
-    assert document["metrics"]["real_episodes"] == measured["real_episodes"] + collected["real_episodes"]
-    assert {"policies.json", "learning_curve.png", "joint_trace.png", "table.md"} <= {
-        p.name for p in (home / "iterate").iterdir()
-    }
+def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr(whole: tuple[Path, Said]) -> None:
+    folder, said = whole
+    table = said.out[said.out.index("grounded simulation learning [cm/s]") :]
+    rows = [line.split()[:2] for line in table.splitlines() if line.startswith("  ") and line.strip()][1:4]
+    metrics = json.loads((folder / "runs/whole/iterate/metrics.json").read_text())
+    assert [row[0] for row in rows] == ["0", "1", "no"]
+    assert rows[0][1] == "π0"
+    assert said.out.count("grounded simulation learning") == 1
+    spent, learned = metrics["real_episodes"], metrics["learned_from"]
+    assert f"real data: {learned} episodes to learn from, {spent - learned} to measure, {spent} in all\n" in table
+    assert metrics["verdict"] in table
+    assert "plots: runs/whole/iterate/ (joint_trace.png, learning_curve.png)\n" in table
+    assert table.splitlines()[-1] == "runs/whole/iterate"
+    grown = [line for line in said.lines if line.startswith("  ")]
+    assert grown[0].split()[:2] == ["iteration", "policy"]
+    assert grown[1].index("π0") == grown[2].index(rows[1][1]) == grown[0].index("policy")
+    for stage in STAGES:
+        assert any(line.startswith(f"runs/whole/iteration_01/{stage}: ") for line in said.lines)
+
+
+def test_an_unchanged_iteration_shows_its_table_again(whole: tuple[Path, Said]) -> None:
+    folder, said = whole
+    again = done("iterate", *SMALL, "name=whole", "accept=true", "beside=true", folder=folder)
+    start = said.out.index("grounded simulation learning [cm/s]")
+    assert again.out == said.out[start:].replace("runs/whole/iterate\n", "runs/whole/iterate (unchanged)\n")

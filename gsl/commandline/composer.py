@@ -20,9 +20,9 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
-from gsl.commandline.config_errors import Vocabulary, translated, unknown_key
+from gsl.commandline.config_errors import Vocabulary, translated, unfit, unknown_key
 from gsl.commandline.known_settings import declared, known_keys, plain
-from gsl.commandline.overrides import effect_path, key_of, rewrite
+from gsl.commandline.overrides import COMMAND_KEYS, effect_path, key_of, rewrite
 from gsl.core.validation import did_you_mean
 from gsl.effects import __path__ as effects_path
 from gsl.errors import ConfigError, InputError
@@ -92,8 +92,12 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
         _check_grammar(overrides)
         composition = _added_where_declared(command, overrides, multirun)
     except (CompactHydraException, OmegaConfBaseException, YAMLError) as error:
-        raise translated(error, vocabulary) from error
+        raise unfit(command, arguments, unknown_key(error)) or translated(error, vocabulary) from error
     _check_effects(composition)
+    config = plain(composition.config)
+    strangers = config.keys() - declared(config).keys() - plain(base).keys() - {*COMMAND_KEYS}
+    if misfit := unfit(command, arguments, min(strangers, default=None)):
+        raise misfit
     return composition
 
 
@@ -179,10 +183,8 @@ def _first_value(override: Any) -> str:
 def _composed(command: str, overrides: Sequence[str]) -> DictConfig:
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None
-    return hydra.compose_config(
-        config_name=command.replace("-", "_"), overrides=list(overrides), run_mode=RunMode.RUN, from_shell=False,
-        with_log_configuration=False,
-    )  # fmt: skip
+    name, how = command.replace("-", "_"), {"from_shell": False, "with_log_configuration": False}
+    return hydra.compose_config(config_name=name, overrides=list(overrides), run_mode=RunMode.RUN, **how)
 
 
 def _without_hydra(config: DictConfig) -> DictConfig:

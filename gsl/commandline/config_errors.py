@@ -17,7 +17,7 @@ from gsl.core.validation import config_error, did_you_mean
 from gsl.errors import ConfigError, InputError
 
 _UNKNOWN = re.compile(r"Could not override '([^']+)'")
-_NO_OPTION = re.compile(r"Could not find '([^']+)/([^'/]+)'")
+_NO_OPTION = re.compile(r"Could not find '([^']+)/([^'/]*)'")
 _NO_PRIMARY = re.compile(r"Cannot find primary config '([^']+)'")
 _AMBIGUOUS = re.compile(r"Ambiguous value for argument '([^'=]+)=([^']*)'")
 _UNEXPECTED = re.compile(r"unexpected keyword argument '(\w+)'")
@@ -45,12 +45,22 @@ def unknown_key(error: Exception) -> str | None:
     return match.group(1) if match else None
 
 
+def unfit(command: str, arguments: Sequence[str], unknown: str | None) -> ConfigError | None:
+    """Return the error for an experiment that sets what a command does not have, if that is the matter."""
+    typed = dict(one.lstrip("+").partition("=")[::2] for one in arguments)
+    if unknown is None or unknown in typed or "experiment" not in typed:
+        return None
+    return ConfigError("experiment", f"is not for gsl {command}, which has no {unknown}", given=typed["experiment"])
+
+
 def translated(error: Exception, words: Vocabulary) -> Exception:
     """Return what composition complains about as a `ConfigError`."""
     text = str(error)
     if option := _NO_OPTION.search(text):
         group, name = option.groups()
-        return InputError(f"no {group} called {name}{did_you_mean(name, words.options(group), listed=True)}")
+        return InputError(
+            f"no {group} called {name or '(nothing)'}{did_you_mean(name, words.options(group), listed=True)}"
+        )
     if key := unknown_key(error):
         return _no_such_setting(key, words)
     if ambiguous := _AMBIGUOUS.search(text):

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-from typing import Any
 
 from gsl.console import Console
+from gsl.core.interruption import asked
 from gsl.errors import GslError
 
 INTERRUPTED = 130
@@ -15,7 +14,7 @@ INTERRUPTED = 130
 
 def report(failure: BaseException, console: Console, *, command: str = "gsl") -> int:
     """Say what ended a command and return its exit code: 2 usage and input, 1 a stage failed, 130 interrupted."""
-    if isinstance(failure, KeyboardInterrupt):
+    if isinstance(failure, KeyboardInterrupt) or asked():
         return console.error("interrupted", INTERRUPTED, command=command)
     if os.environ.get("GSL_TRACEBACK") == "1":
         raise failure
@@ -33,17 +32,7 @@ def described(failure: BaseException) -> tuple[str, int]:
     return f"internal error: {type(failure).__name__}: {text}; GSL_TRACEBACK=1 shows where", 1
 
 
-def stop_like_ctrl_c() -> None:
-    """Let SIGTERM, and SIGINT in a background job, end this process as Ctrl-C does, so that it can tidy up."""
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, _interrupt)
-
-
 def leave_quietly() -> int:
     """Return the exit code for a reader of our output that went away, and keep Python from complaining at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 1
-
-
-def _interrupt(number: int, frame: Any) -> None:
-    raise KeyboardInterrupt

@@ -3,32 +3,53 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+from collections.abc import Iterator, Mapping
+from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 from gsl.console import Console
+from gsl.errors import ArtifactError
+from gsl.stages.account import account, flat, plain
+from gsl.stages.headline import headline
 from gsl.storage.artifact import Artifact
-from gsl.storage.manifest import read
-from gsl.storage.references import find_all, resolve
+from gsl.storage.identity import content_hash
+from gsl.storage.manifest import Manifest, Parent, damaged_file, read
+from gsl.storage.references import RUNS, find_all, resolve
+
+SHORT = 12
+"""Characters of a hash that are shown."""
 
 
 def list_runs(console: Console) -> None:
     """List the complete artifacts below runs/."""
     found = find_all()
     rows = [
-        (one.folder.as_posix(), one.manifest.kind, one.manifest.created, f"{one.manifest.duration:.1f} s")
+        (_named(one.folder), one.manifest.kind, _local(one.manifest.created), _span(one.manifest), headline(one))
         for one in found
     ]
     if rows:
-        console.table("artifacts", ["folder", "kind", "made", "took"], rows)
+        console.table(f"artifacts below {RUNS}/", ["reference", "kind", "made", "took", "result"], rows)
     documents = [
-        {"folder": one.folder, "kind": one.manifest.kind, "created": one.manifest.created, "key": one.manifest.key}
+        {
+            "folder": one.folder,
+            "kind": one.manifest.kind,
+            "created": one.manifest.created,
+            "key": one.manifest.key,
+            "headline": headline(one),
+        }
         for one in found
     ]
     console.result({"artifacts": documents}, text="" if rows else "no artifacts below runs/")
 
 
+def _named(folder: Path) -> str:
+    return (folder.relative_to(RUNS) if folder.is_relative_to(RUNS) else folder).as_posix()
+
+
 def show_artifact(reference: str, console: Console) -> None:
-    """Show the manifest, settings and metrics of one artifact.
+    """Show how an artifact came about, its results, settings and files.
 
     Raises:
         ArtifactError: There is no such artifact.
@@ -37,22 +58,74 @@ def show_artifact(reference: str, console: Console) -> None:
     artifact = Artifact(folder, read(folder))
     made = dataclasses.asdict(artifact.manifest)
     console.result({"folder": folder, "manifest": made, "config": artifact.config, "metrics": artifact.metrics})
-    parents = {parent.role: parent.path for parent in artifact.manifest.parents}
-    about = {
-        "command": artifact.manifest.command,
-        "made": artifact.manifest.created,
-        "git": artifact.manifest.git,
-        **parents,
-    }
-    console.table(f"{folder}: {artifact.manifest.kind}", ["", "value"], _rows(about))
-    console.table("settings", ["setting", "value"], _rows(artifact.config))
-    console.table("metrics", ["metric", "value"], _rows(artifact.metrics))
-    files = [(name, f"{file.bytes:,}") for name, file in artifact.manifest.files.items()]
-    console.table("files", ["file", "bytes"], files)
+    title = f"{folder.as_posix()}: {artifact.manifest.kind}"
+    console.table(title, ["", ""], list(_origin(artifact.manifest)), headline(artifact) or None)
+    if artifact.manifest.parents:
+        parents = [_parent(folder, parent) for parent in artifact.manifest.parents]
+        console.table("made from", ["role", "what", "contents", "now"], parents)
+    for told in account(artifact):
+        console.table(*told)
+    console.table("settings", ["setting", "value"], _settings(artifact.config))
+    damaged = damaged_file(folder, artifact.manifest)
+    files = [(name, _size(file.bytes), file.sha256[:SHORT]) for name, file in artifact.manifest.files.items()]
+    state = f"changed since it was made: {damaged}" if damaged else "all files are as they were made"
+    console.table("files", ["file", "size", "sha256"], files, state)
 
 
-def _rows(values: Any, path: str = "") -> list[tuple[str, str]]:
-    """Return one row a value, with its dotted name."""
-    if isinstance(values, dict) and values:
-        return [row for key, value in values.items() for row in _rows(value, f"{path}.{key}".lstrip("."))]
-    return [(path, f"{values:.6g}" if isinstance(values, float) else str(values))]
+def _origin(manifest: Manifest) -> Iterator[tuple[str, str]]:
+    git = manifest.git or {}
+    dirty = " with changes" if git.get("dirty") else ""
+    commit = f", commit {str(git['commit'])[:SHORT]}{dirty}" if git.get("commit") else ""
+    yield "command", manifest.command
+    yield "made", f"{_local(manifest.created)}, in {_span(manifest)}"
+    yield "by", f"gsl {manifest.versions.get('gsl')}{commit}, Python {manifest.versions.get('python')}"
+    if manifest.seeds:
+        yield "seeds", ", ".join(f"{name} {seed}" for name, seed in manifest.seeds.items())
+    yield "key", manifest.key[:SHORT]
+    yield "contents", manifest.contents[:SHORT]
+
+
+def _parent(folder: Path, parent: Parent) -> tuple[str, str, str, str]:
+    place = Path(os.path.relpath(folder / parent.path))
+    return parent.role, place.as_posix(), parent.hash[:SHORT], _state(place, parent.hash)
+
+
+def _state(place: Path, expected: str) -> str:
+    try:
+        return "the same" if content_hash(place) == expected else "built anew since"
+    except ArtifactError:
+        return "gone or damaged"
+
+
+def _settings(config: Mapping[str, Any]) -> list[tuple[str, str]]:
+    return [_setting(name, value) for name, value in config.items() if not name.startswith("_")]
+
+
+def _setting(name: str, value: Any) -> tuple[str, str]:
+    """Return one row a setting; a component is told by its class and its settings."""
+    if not isinstance(value, Mapping):
+        return name, plain(value)
+    kind = str(value.get("_target_", "")).rpartition(".")[2]
+    inner = [f"{key}={text}" for key, text in flat({k: v for k, v in value.items() if k != "_target_"}) if key]
+    return name, " ".join([kind, *inner]).strip()
+
+
+def _local(created: str) -> str:
+    """Return a moment in coordinated universal time as one of this place."""
+    try:
+        return datetime.fromisoformat(created).astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    except ValueError:
+        return created
+
+
+def _span(manifest: Manifest) -> str:
+    seconds = manifest.duration
+    if seconds < 100.0:
+        return f"{seconds:.1f} s"
+    return f"{seconds / 60:.1f} min" if seconds < 6000.0 else f"{seconds / 3600:.1f} h"
+
+
+def _size(count: int) -> str:
+    if count < 10_000:
+        return f"{count:,} B"
+    return f"{count / 1e3:,.0f} kB" if count < 10_000_000 else f"{count / 1e6:,.0f} MB"

@@ -50,9 +50,11 @@ def effect_path(key: str) -> str:
 def _rewritten(argument: str, roles: Mapping[str, str], chosen: Collection[str]) -> str:
     if argument.startswith("~"):
         return argument
-    if "=" not in argument:
+    key, equals, value = argument.partition("=")
+    if not key.lstrip("+"):
+        raise ConfigError(f"'{argument}'", "names no setting; write key=value")
+    if not equals:
         raise ConfigError(argument, "has no value; write key=value")
-    key, _, value = argument.partition("=")
     if key.startswith("+"):
         return argument
     if key in roles:

@@ -130,7 +130,7 @@ def with_mass(link: Link, mass: float, com: np.ndarray, inertia: np.ndarray) -> 
     total = link.mass + mass
     joint_com = (link.mass * link.com + mass * com) / total
     moved = [_moved(i, m, c - joint_com) for i, m, c in ((link.inertia, link.mass, link.com), (inertia, mass, com))]
-    return replace(link, mass=total, com=joint_com, inertia=sum(moved))
+    return replace(link, mass=total, com=joint_com, inertia=np.sum(moved, axis=0))
 
 
 def lumped(robot: Robot) -> Robot:

@@ -20,9 +20,8 @@ F = TypeVar("F", bound=Callable[..., object])
 def compiled(function: F) -> F:
     """Compile a function when it is first called, or take it from the cache."""
     if "NUMBA_CACHE_DIR" not in os.environ:
-        numba.config.CACHE_DIR = _folder()
-    result: F = numba.njit(cache=True)(function)
-    return result
+        numba.config.CACHE_DIR = _folder()  # type: ignore[attr-defined]
+    return numba.njit(cache=True)(function)  # type: ignore[return-value]
 
 
 @cache

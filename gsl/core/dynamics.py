@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.body import Robot, rotation
+from gsl.core.body import Joint, Robot, rotation
 
 
 class Frames(NamedTuple):
@@ -61,7 +61,7 @@ def jacobian(robot: Robot, frames: Frames, link: str, point: np.ndarray) -> tupl
     return angular, linear
 
 
-def _ancestors(robot: Robot, link: str) -> list:
+def _ancestors(robot: Robot, link: str) -> list[Joint]:
     """Joints between a link and the base."""
     above = {joint.child: joint for joint in robot.joints}
     found = []

@@ -14,9 +14,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, dataclass_transform, get_type_hints
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass as validated_dataclass
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
 
 REQUIRED: Any = "???"
 """Default of a setting that has none; yaml files write it the same way."""
@@ -53,7 +54,15 @@ def component(cls: type) -> Any:
     Fields may have any type; one that is a `Protocol` has to be `runtime_checkable`.
     """
     config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, allow_inf_nan=False)
+    cls._no_truth_value = field_validator("*", mode="before")(_no_truth_value)  # type: ignore[attr-defined]
     return validated_dataclass(frozen=True, config=config)(cls)
+
+
+def _no_truth_value(cls: Any, value: Any, about: ValidationInfo) -> Any:
+    """Refuse true and false where a number is due: Python would take them for 1 and 0."""
+    if isinstance(value, bool) and cls.__pydantic_fields__[about.field_name].annotation in (int, float):
+        raise PydanticCustomError("truth_value", "Input should be a number")
+    return value
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -23,6 +23,7 @@ _RULES = {
     "literal_error": "must be one of {expected}",
     "is_instance_of": "must be a {class}",
     "string_too_short": "must not be empty",
+    "truth_value": "must be a number",
     "missing": "has no value",
     "missing_argument": "has no value",
 }
@@ -48,14 +49,16 @@ def make(target: Callable[..., T], values: Mapping[str, Any], *, where: str = ""
 
 def config_error(error: ValidationError, target: Callable[..., Any], *, where: str = "") -> ConfigError:
     """Return the most telling of pydantic's complaints about building `target` at the dotted path `where`."""
-    details = sorted(error.errors(), key=lambda detail: detail["type"] != "unexpected_keyword_argument")[0]
-    location = [str(part) for part in details["loc"]]
+    found = sorted(error.errors(), key=lambda detail: detail["type"] != "unexpected_keyword_argument")
+    details = found[0]
+    location = [str(part) for part in details["loc"][:1]]
+    location += [str(part) for part in details["loc"][1:] if isinstance(part, int)]
     path = ".".join([*filter(None, [where]), *location])
     if details["type"] == "unexpected_keyword_argument":
         return ConfigError(path, f"no such setting{did_you_mean(location[-1], settings_of(target))}")
     known = settings_of(target).get(location[0]) if location else None
     unit = f" ({known.unit})" if known is not None and known.unit else ""
-    return ConfigError(path or target.__name__, f"{_problem(details)}{unit}", given=_given(details["input"]))
+    return ConfigError(path or target.__name__, f"{_problems(found)}{unit}", given=_given(details["input"]))
 
 
 def did_you_mean(word: str, known: Iterable[str], *, listed: bool = False) -> str:
@@ -66,6 +69,14 @@ def did_you_mean(word: str, known: Iterable[str], *, listed: bool = False) -> st
     if near and not listed or not names:
         return question
     return f"{question}{' T' if near else '; t'}here is {', '.join(names)}"
+
+
+def _problems(found: Sequence[ErrorDetails]) -> str:
+    """Return what is wrong with the first setting; one that may be of several types breaks the rules of each."""
+    first = found[0]["loc"]
+    ways = [one for one in found if one["loc"][:1] == first[:1] and isinstance([*one["loc"], 0][1], str)]
+    words = dict.fromkeys(_problem(one) for one in (ways or found[:1]))
+    return ", or ".join(word if index == 0 else word.removeprefix("must be ") for index, word in enumerate(words))
 
 
 def _problem(details: ErrorDetails) -> str:
@@ -81,5 +92,7 @@ def _problem(details: ErrorDetails) -> str:
 def _given(value: object) -> str:
     if isinstance(value, ArgsKwargs):
         return ""
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
     text = value if isinstance(value, str) else repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."

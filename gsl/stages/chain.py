@@ -16,6 +16,7 @@ from gsl.optimizers.cma_es import CmaEs
 from gsl.policies.policy import Policy
 from gsl.stages.collect import Collect
 from gsl.stages.evaluate import Evaluate
+from gsl.stages.headline import headline
 from gsl.stages.optimize import Optimize
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import TrainInverse
@@ -63,12 +64,30 @@ class Chain:
         self, home: Path, grounding: ActionTransformation, previous: str | None, seed: int, console: Any
     ) -> ActionTransformation:
         """Collect in both worlds, train both models below `home`, and return the grounding that they make."""
-        self._collected(home, previous, seed, console)
+        budget = self.budget
+        counts: dict[Literal["real", "sim"], tuple[int, int]] = {
+            REAL: (budget.real_episodes, budget.real_neighbours),
+            SIM: (budget.sim_episodes, budget.sim_neighbours),
+        }
+        for role, (episodes, neighbours) in counts.items():
+            stage = Collect(
+                world=self.real if role == REAL else self.sim,
+                task=self.task,
+                policy=self.policy,
+                role=role,
+                episodes=episodes,
+                neighbours=neighbours,
+                spread=budget.spread,
+                action_noise=0.0 if role == REAL else budget.sim_action_noise,
+                initial=previous,
+                workers=self.workers,
+                seed=seed,
+            )
+            built(stage, home / f"collect_{role}", console)
         forward = TrainForward(str(home / "collect_real"), self.forward_model, seed=seed)
         inverse = TrainInverse(str(home / "collect_sim"), self.inverse_model, method=self.inverse_method, seed=seed)
-        models = {"forward_model": forward, "inverse_model": inverse}
-        made = {role: built(stage, home / stage.kind, console) for role, stage in models.items()}
-        return replace(grounding, **{role: str(artifact.folder) for role, artifact in made.items()})
+        f, f_inverse = (built(stage, home / stage.kind, console) for stage in (forward, inverse))
+        return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))
 
     def search(
         self, out: Path, grounding: Grounding | ActionTransformation, previous: str | None, seed: int, console: Any
@@ -103,21 +122,13 @@ class Chain:
         )
         return built(stage, out, console)
 
-    def _collected(self, home: Path, previous: str | None, seed: int, console: Any) -> None:
-        budget, common = self.budget, {"task": self.task, "policy": self.policy, "initial": previous, "seed": seed}
-        common |= {"spread": budget.spread, "workers": self.workers}
-        real = {"world": self.real, "episodes": budget.real_episodes, "neighbours": budget.real_neighbours}
-        sim = {"world": self.sim, "episodes": budget.sim_episodes, "neighbours": budget.sim_neighbours}
-        built(Collect(role=REAL, **real, **common), home / "collect_real", console)
-        noisy = {"action_noise": budget.sim_action_noise}
-        built(Collect(role=SIM, **sim, **noisy, **common), home / "collect_sim", console)
-
 
 def built(stage: Stage, out: Path, console: Any) -> Artifact:
     """Build one link; what an earlier chain built otherwise in its place is replaced, what anyone else built is not."""
-    return build(
-        stage, config=described(stage), out=out, command=f"{COMMAND} ({stage.kind})", force=_ours(out), console=console
-    )
+    command = f"{COMMAND} ({stage.kind})"
+    made = build(stage, config=described(stage), out=out, command=command, force=_ours(out), console=console)
+    console.status(f"{out.as_posix()}: {headline(made)}{' (unchanged)' if made.unchanged else ''}")
+    return made
 
 
 def _ours(out: Path) -> bool:

@@ -12,6 +12,8 @@ import numpy as np
 from gsl.core.described import described
 from gsl.errors import ArtifactError
 from gsl.policies.policy import Policy
+from gsl.storage import manifest
+from gsl.storage.identity import flat
 from gsl.storage.policies import Policies, PolicyRecord, read_policies
 from gsl.storage.references import resolve
 
@@ -50,12 +52,27 @@ def records(policy: Policy, reference: str) -> tuple[PolicyRecord, ...]:
         ArtifactError: if they are of another family.
     """
     path = resolve(reference)
-    found = read_policies(path / FILE if path.is_dir() else path)
+    found = read_policies(_file(path))
     if found.policy != described(policy):
-        raise ArtifactError(
-            path, f"its policies are of {found.policy}, not of {described(policy)}; choose policy= accordingly"
-        )
+        raise ArtifactError(path, f"its policies are others: {_difference(found.policy, described(policy))}")
+    for name in found.records[0].parameters.keys() ^ set(policy.names):
+        raise ArtifactError(path, f"parameter {name}: not both the file and the policy know it; choose another policy=")
     return found.records
+
+
+def _file(path: Path) -> Path:
+    if path.is_dir() and not (path / FILE).is_file():
+        kind = manifest.read(path).kind
+        raise ArtifactError(path, f"holds {kind}, which has no policies; name an artifact of optimize or evaluate")
+    return path / FILE if path.is_dir() else path
+
+
+def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str:
+    """Return the first setting in which two policies differ."""
+    left, right = flat(theirs), flat(ours)
+    name = next(name for name in [*left, *right] if left.get(name) != right.get(name))
+    told = "their class" if name == "_target_" else name
+    return f"{told} is {left.get(name)}, but policy= here says {right.get(name)}"
 
 
 def vector(policy: Policy, record: PolicyRecord) -> np.ndarray:

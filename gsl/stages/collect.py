@@ -15,7 +15,7 @@ from gsl.core.trajectory import Batch
 from gsl.grounding.ane import ActionNoise
 from gsl.policies.policy import Policy, neighbour
 from gsl.stages.choices import PolicyChoice
-from gsl.stages.population import Job, trajectories
+from gsl.stages.population import Job, Workers, trajectories
 from gsl.stages.rollout import Scenario
 from gsl.storage.trajectories import write
 from gsl.tasks.task import Task
@@ -39,7 +39,7 @@ class Collect:
     spread: Annotated[float, setting("size of the perturbation, in units of a parameter's scale", ge=0)] = 0.07
     action_noise: Annotated[float, setting("Gaussian noise on every action", unit="rad", ge=0)] = 0.0
     initial: Annotated[str | None, setting("policies file or artifact of the policy; none for its start values")] = None
-    workers: Annotated[int, setting("processes; -1 for one a core")] = -1
+    workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def parents(self) -> Mapping[str, Path]:
@@ -58,7 +58,7 @@ class Collect:
             {"policy": name, "parameters": job.parameters.tolist()} for name, job in zip(names, jobs, strict=True)
         ]
         about = {
-            "robot": self.world.robot,
+            "robot": getattr(self.world, "robot", ""),
             "role": self.role,
             "source": "gsl collect",
             "seed": self.seed,

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 from gsl.core.setting import component, setting
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
-from gsl.stages.comparison import COLUMNS, Trial, markdown, rows, summaries
+from gsl.stages.comparison import Trial, markdown, summaries
 from gsl.stages.iterate import Iterate
 from gsl.storage.documents import write_json
 from gsl.worlds.world import World
@@ -48,7 +48,6 @@ class Compare:
         write_json(folder / DATA, [trial._asdict() for trial in found])
         summary = summaries(found)
         (folder / TABLE).write_text(markdown(summary, found), encoding="utf-8")
-        console.table(f"{self.trials} trials of each method", COLUMNS, rows(summary))
         return {"trials": len(found), "summaries": [one._asdict() for one in summary]}
 
     def _trials(self, home: Path, console: Any) -> Iterator[Trial]:

@@ -11,8 +11,8 @@ from gsl.core.setting import component, setting
 from gsl.grounding.none import NoGrounding
 from gsl.policies.policy import Policy
 from gsl.stages.choices import FILE, policies, records, vector
-from gsl.stages.measured import cells, columns, falls, gain, mean, row, summary
-from gsl.stages.population import Episode, Job, episodes
+from gsl.stages.measured import falls, gain, mean, row, summary
+from gsl.stages.population import Episode, Job, Workers, episodes
 from gsl.stages.rollout import Scenario
 from gsl.storage.documents import write_json
 from gsl.storage.policies import PolicyRecord, write_policies
@@ -43,7 +43,7 @@ class Evaluate:
     episodes: Annotated[int, setting("episodes of each policy for the choice", ge=1)]
     check: Annotated[int, setting("episodes the fastest stable policy has to walk without a fall", ge=1)]
     confirmation: Annotated[int, setting("fresh episodes of the chosen policy and of the baseline", ge=2)]
-    workers: Annotated[int, setting("processes; -1 for one a core")] = -1
+    workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def parents(self) -> Mapping[str, Path]:
@@ -63,9 +63,6 @@ class Evaluate:
         again = [[row(found[index], done) for index, done in phase.items()] for phase in (checked, fresh)]
         write_json(folder / TABLE, {"policies": rows, "check": again[0], "confirmation": again[1]})
         write_policies(folder / FILE, policies(self.policy, self.task, [found[best]]))
-        shown = [cells(one, one["name"], self.task.shown) for one in rows]
-        shown += [cells(one, f"{one['name']}, fresh", self.task.shown) for one in again[1]]
-        console.table("policies in the real world", columns(rows[0], self.task.unit), shown)
         stable = [done for done in tried[1:] if not falls(done)]
         return {
             "best": found[best].name,

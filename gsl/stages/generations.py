@@ -13,7 +13,7 @@ FILE = "generations.jsonl"
 class Generation(NamedTuple):
     """Values and falls of all candidates of a generation, in the order in which they were asked for."""
 
-    index: int
+    number: int
     values: list[float]
     falls: list[int]
 
@@ -34,7 +34,7 @@ class GenerationLog:
 
     def append(self, generation: Generation) -> None:
         """Add the next generation, on disk before anything goes on."""
-        assert generation.index == len(self._done), "generations come in order"
+        assert generation.number == len(self._done), "generations come in order"
         with self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(generation._asdict()) + "\n")
             file.flush()

@@ -127,12 +127,11 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
     """
     layout = scenario.world.layout
     if heldout.joints != layout.joints:
-        raise InputError(
-            f"the held-out trajectories are of {', '.join(heldout.joints)}, not of {', '.join(layout.joints)}"
-        )
-    if abs(heldout.control_period - layout.control_period) > 1e-9:
-        periods = f"{heldout.control_period} s, the simulator's is {layout.control_period} s"
-        raise InputError(f"the models were trained on trajectories with a control period of {periods}")
+        different = sorted(set(heldout.joints) ^ set(layout.joints)) or ["their order"]
+        raise InputError(f"the held-out trajectories and the world differ in joints: {', '.join(different)}")
+    if not np.isclose(heldout.control_period, layout.control_period):
+        periods = f"{heldout.control_period:g} s, not the world's {layout.control_period:g} s"
+        raise InputError(f"the held-out trajectories have a control period of {periods}")
     env = scenario.world.make()
     try:
         deviations = {

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gsl.core.seeds import derived_seed
-from gsl.errors import GslError
+from gsl.errors import GslError, InputError, TrajectoryError
 from gsl.grounding.gat import ActionTransformation
 from gsl.report.grounding_errors import grounding_errors
 from gsl.stages.grounding_check import TITLES, check, largest_stable_alpha
@@ -49,12 +49,16 @@ def grounded(
     if not isinstance(settings, ActionTransformation):
         return scenario, {}
     console.status("checking the grounded simulator against held-out real trajectories")
-    ready = replace(scenario, grounding=settings.load(read_forward_model, read_inverse_model))
+    loaded = settings.load(read_forward_model, read_inverse_model)
+    ready = replace(scenario, grounding=loaded)
     if settings.alpha == "auto":
         alpha = largest_stable_alpha(ready, parameters, derived_seed(seed, "alpha"))
-        ready = replace(ready, grounding=replace(ready.grounding, alpha=alpha))
+        ready = replace(scenario, grounding=replace(loaded, alpha=alpha))
     heldout = model_file(settings.forward_model, "forward_model").with_name(HELDOUT)
-    report = check(ready, parameters, read(heldout), derived_seed(seed, "check"))
+    try:
+        report = check(ready, parameters, read(heldout), derived_seed(seed, "check"))
+    except InputError as error:
+        raise error if isinstance(error, TrajectoryError) else TrajectoryError(heldout, str(error)) from error
     write_json(folder / REPORT, report.metrics())
     grounding_errors(folder / FIGURE, report.by_joint())
     console.table("grounded simulator against held-out real trajectories", TITLES, report.rows())

@@ -18,6 +18,7 @@ from gsl.policies.policy import Policy
 from gsl.stages.chain import Budget, Chain
 from gsl.stages.choices import FILE, policies, record
 from gsl.stages.iteration_report import COLUMNS, Rounds, write_curve, write_table, write_trace
+from gsl.stages.population import Workers
 from gsl.stages.train_forward import HELDOUT
 from gsl.stages.training import of_policy
 from gsl.storage.artifact import Artifact
@@ -25,6 +26,7 @@ from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.storage.policies import write_policies
 from gsl.storage.trajectories import read
 from gsl.tasks.task import Task
+from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.world import World
 
 
@@ -47,7 +49,7 @@ class Iterate:
     iterations: Annotated[int, setting("most iterations", ge=1)] = 1
     beside: Annotated[bool, setting("show the result without grounding beside it")] = False
     accept: Annotated[bool, setting("go on with a grounding that fails its check")] = False
-    workers: Annotated[int, setting("processes; -1 for one a core")] = -1
+    workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def parents(self) -> Mapping[str, Path]:
@@ -77,7 +79,6 @@ class Iterate:
         write_curve(folder, rounds)
         if self.learned:
             self._trace(folder, home)
-        console.table(f"grounded simulation learning [{self.task.unit}]", COLUMNS, rounds.rows, rounds.verdict)
         return rounds.metrics()
 
     @property
@@ -124,9 +125,12 @@ class Iterate:
     def _trace(self, folder: Path, home: Path) -> None:
         """Draw the first iteration's grounding on a real walk that its models have not seen."""
         place = home / "iteration_01"
-        models = {"forward_model": str(place / "train_forward"), "inverse_model": str(place / "train_inverse")}
         alpha = json.loads((place / "optimize" / "metrics.json").read_text(encoding="utf-8"))["alpha"]
-        grounding = replace(self.grounding, **models, alpha=alpha).load(read_forward_model, read_inverse_model)
+        assert isinstance(self.grounding, ActionTransformation), "only learned groundings are traced"
+        forward, inverse = str(place / "train_forward"), str(place / "train_inverse")
+        settings = replace(self.grounding, alpha=alpha, forward_model=forward, inverse_model=inverse)
+        grounding = settings.load(read_forward_model, read_inverse_model)
         heldout = read(place / "train_forward" / HELDOUT)
         walks = of_policy(heldout, pi0=True) or heldout.episodes
+        assert isinstance(self.sim, BulletWorld), "the check of the grounding has replayed in it"
         write_trace(folder, self.sim, grounding, max(walks, key=len))

@@ -43,6 +43,7 @@ class Rounds:
         self._done: list[Artifact] = []
         self._beside: Artifact | None = None
         self._spent = 0
+        self._collected = 0
         self.rows: list[tuple[str, ...]] = []
         self.best: Artifact | None = None
 
@@ -56,6 +57,7 @@ class Rounds:
         self._done.append(evaluation)
         cost = collected + evaluation.metrics["real_episodes"]
         self._spent += cost
+        self._collected += collected
         first = len(self._done) == 1
         if self.rising or (first and evaluation.metrics["gain"]["value"] > 0.0):
             self.best = evaluation
@@ -89,6 +91,7 @@ class Rounds:
             "baseline": self._done[0].metrics["baseline"],
             "gain": best.metrics["gain"],
             "real_episodes": self._spent,
+            "learned_from": self._collected,
             "stopped_by_itself": not self.rising,
             "verdict": self.verdict,
             "ungrounded": None if self._beside is None else self._beside.metrics,
@@ -113,7 +116,8 @@ class Rounds:
         simulated, share = metrics["returned_value_sim"], metrics["gain"]["share"]
         expected = "" if simulated is None else f"{self._task.shown * simulated:.1f}"
         gained = "" if share is None else f"{100 * share:+.1f} %"
-        rows = [("0", "π0", "", *self._measured(metrics["baseline"]), "", "")] if first else []
+        zero: tuple[str, ...] = ("0", "π0", "", *self._measured(metrics["baseline"]), "", "")
+        rows = [zero] if first else []
         rows.append((label, metrics["best"], expected, *self._measured(metrics["returned"]), gained, str(cost)))
         self.rows += rows
         return rows

@@ -15,9 +15,10 @@ from gsl.grounding.grounding import Grounding
 from gsl.optimizers.cma_es import CmaEs
 from gsl.policies.policy import Policy
 from gsl.stages.choices import FILE, PolicyChoice, policies, record
+from gsl.stages.generations import FILE as PROGRESS
 from gsl.stages.generations import Generation, GenerationLog
 from gsl.stages.grounding_gate import grounded, grounding_parents
-from gsl.stages.population import Job, episodes
+from gsl.stages.population import Job, Workers, episodes
 from gsl.stages.rollout import Scenario
 from gsl.storage.policies import write_policies
 from gsl.tasks.task import SIM, Task
@@ -29,7 +30,7 @@ class Optimize:
     """Candidates are judged by the mean value of `rollouts` episodes each; a killed search goes on where it was."""
 
     kind: ClassVar[str] = "optimize"
-    resumable: ClassVar[bool] = True
+    progress: ClassVar[str] = PROGRESS
 
     world: Annotated[World, setting("the simulator")]
     task: Annotated[Task, setting("what is to be maximised")]
@@ -39,7 +40,7 @@ class Optimize:
     rollouts: Annotated[int, setting("episodes of each candidate", ge=1)]
     initial: Annotated[str | None, setting("policies file or artifact to start from; none for the start values")] = None
     accept: Annotated[bool, setting("go on with a grounding that fails its check")] = False
-    workers: Annotated[int, setting("processes; -1 for one a core")] = -1
+    workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def parents(self) -> Mapping[str, Path]:

@@ -6,17 +6,36 @@ dies, what has arrived is kept and only the missing jobs are tried again.
 
 from __future__ import annotations
 
+import os
 import pickle
+import signal
+import threading
+import time
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from pydantic import AfterValidator
 
+from gsl.core.setting import setting
 from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
 from gsl.stages.rollout import Scenario, rollout
 
 TRIES = 3
+
+
+def _some(workers: int) -> int:
+    if workers == 0:
+        raise ValueError("must not be 0; -1 is one process a core")
+    return workers
+
+
+Workers = Annotated[
+    int, setting("processes; -1 for one a core, 1 for none beside this one", ge=-64, le=1024), AfterValidator(_some)
+]
 
 
 class Job(NamedTuple):
@@ -70,13 +89,44 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Job], missing: list[i
         return
     parallel = joblib.Parallel(n_jobs=workers, batch_size=1, return_as="generator_unordered")
     try:
-        yield from parallel(joblib.delayed(_numbered)(function, frozen, jobs[index], index) for index in missing)
+        with _deaf_to_ctrl_c():
+            found = parallel(joblib.delayed(_numbered)(function, frozen, jobs[index], index) for index in missing)
+        yield from found
     except TerminatedWorkerError:
         return
 
 
+@contextmanager
+def _deaf_to_ctrl_c() -> Iterator[None]:
+    """Let processes that start in the block leave Ctrl-C to this one, which hears it afterwards and ends them."""
+    from multiprocessing import resource_tracker
+
+    from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
+
+    resource_tracker.ensure_running()  # both would let Ctrl-C through again when they start in the block
+    loky_resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _numbered(function: Any, frozen: bytes, job: Job, index: int) -> tuple[int, Any]:
+    _end_with_parent()
     return index, function(frozen, job)
+
+
+@lru_cache(maxsize=1)
+def _end_with_parent() -> None:
+    """Let this worker end soon after the process that started it, which cannot see to it after a kill -9."""
+
+    def watch(parent: int) -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, args=(os.getppid(),), daemon=True).start()
 
 
 def _trajectory(frozen: bytes, job: Job) -> Trajectory:

@@ -8,6 +8,7 @@ from typing import Any
 from gsl.report.render import portrait
 from gsl.robots.catalogue import robot
 from gsl.robots.urdf import urdf
+from gsl.storage.whole import explained
 
 
 def write_robot(name: str, folder: Path, console: Any) -> None:
@@ -22,10 +23,11 @@ def write_robot(name: str, folder: Path, console: Any) -> None:
         ConfigError: if there is no such robot.
     """
     body = robot(name)
-    folder.mkdir(parents=True, exist_ok=True)
     model, picture = folder / f"{body.name}.urdf", folder / f"{body.name}.png"
-    model.write_text(urdf(body), encoding="utf-8")
-    portrait(body, picture)
+    with explained(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        model.write_text(urdf(body), encoding="utf-8")
+        portrait(body, picture)
     about = f"{body.name}: {len(body.controlled)} controlled joints, {len(body.links)} links, {body.mass:.3f} kg"
     document = {
         "robot": body.name,

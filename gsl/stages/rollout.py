@@ -9,6 +9,7 @@ import numpy as np
 
 from gsl.core.layout import Layout
 from gsl.core.trajectory import Trajectory
+from gsl.errors import ConfigError
 from gsl.grounding.grounding import Grounding
 from gsl.policies.policy import Policy
 from gsl.tasks.task import Task
@@ -25,6 +26,18 @@ class Scenario:
     policy: Policy
     role: str
     grounding: Grounding
+
+    def __post_init__(self) -> None:
+        """Refuse an episode without a step."""
+        if self.ticks < 1:
+            period = self.world.layout.control_period
+            given = f"{self.task.duration:g}"
+            raise ConfigError("task.duration", f"must be at least one control period ({period:g} s)", given=given)
+
+    @property
+    def ticks(self) -> int:
+        """Control steps of an episode that does not end early."""
+        return round(self.task.duration / self.world.layout.control_period)
 
     def make(self) -> gymnasium.Env:
         """Build the environment that `rollout` acts in."""
@@ -45,7 +58,7 @@ def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed
     policy = scenario.policy.start(parameters, layout)
     task = scenario.task.start(layout, observation, scenario.role)
     observations, actions, sent, rewards, fell = [observation], [], [], [], False
-    for _ in range(round(scenario.task.duration / layout.control_period)):
+    for _ in range(scenario.ticks):
         action = policy.act(observation)
         before, (observation, _, fell, _, info) = observation, env.step(action)
         judged = task.step(before, observation, fell)

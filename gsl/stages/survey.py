@@ -17,7 +17,7 @@ from gsl.policies.policy import Policy, neighbour
 from gsl.report.markdown import table
 from gsl.stages.choices import FILE, vector
 from gsl.stages.optimize import Optimize
-from gsl.stages.population import Episode, Job, episodes
+from gsl.stages.population import Episode, Job, Workers, episodes
 from gsl.stages.rollout import Scenario
 from gsl.storage.policies import read_policies
 from gsl.tasks.task import REAL, Task
@@ -50,7 +50,7 @@ class Survey:
     repeats: Annotated[int, setting("episodes of π0", ge=2)] = 10
     random: Annotated[int, setting("random policies", ge=3)] = 40
     spread: Annotated[float, setting("of the random policies, in units of a parameter's scale", gt=0)] = 0.12
-    workers: Annotated[int, setting("processes; -1 for one a core")] = -1
+    workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def parents(self) -> Mapping[str, Path]:
@@ -78,7 +78,6 @@ class Survey:
                 "ceiling": rank[1],
             }
         (folder / TABLE).write_text(table(COLUMNS, rows), encoding="utf-8")
-        console.table(f"speeds in {self.task.unit}", COLUMNS, rows)
         return found
 
     def _search(self, number: int, folder: Path, console: Any) -> list[np.ndarray]:

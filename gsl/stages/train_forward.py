@@ -68,7 +68,6 @@ class TrainForward:
         write(folder / HELDOUT, data.heldout)
         groups = {"pi0": of_policy(data.heldout, pi0=True), "off_pi0": of_policy(data.heldout, pi0=False)}
         measured = {name: measures(model, long) for name, part in groups.items() if (long := self._long(part))}
-        show(console, measured)
         return {**summary(choice), "trajectories": len(data.training) + len(data.validation), "heldout": measured}
 
     @property
@@ -124,14 +123,3 @@ def measures(model: ForwardModel, episodes: Sequence[Trajectory]) -> dict[str, A
         ahead = predicted_error(model, pieces)
         measured |= {"free_run_deg": degrees(ahead), "free_run_by_joint_deg": degrees_by_joint(ahead, model.joints)}
     return measured
-
-
-def show(console: Any, measured: Mapping[str, Mapping[str, Any]]) -> None:
-    """Show the errors on held-out trajectories."""
-    names = ["one_step_deg", "one_step_no_change_deg", "r2", "free_run_deg", "free_run_no_change_deg"]
-    titles = ["policy", "one tick [°]", "no change [°]", "R²", "0.2 s [°]", "no change [°]"]
-    rows = [
-        (group, *(f"{values[name]:.3f}" if name in values else "-" for name in names))
-        for group, values in measured.items()
-    ]
-    console.table("forward model on held-out real trajectories", titles, rows)

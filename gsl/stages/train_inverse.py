@@ -64,9 +64,6 @@ class TrainInverse:
         )
         write_model(folder, model)
         errors = recovered_error(model, pieces)
-        console.table(
-            "inverse model on held-out simulated trajectories", ["action error [°]"], [(f"{degrees(errors):.3f}",)]
-        )
         by_joint = degrees_by_joint(errors, model.joints)
         measured = {"recovered_action_deg": degrees(errors), "recovered_action_by_joint_deg": by_joint}
         return {**summary(choice), "method": self.method, "trajectories": len(data.training), "heldout": measured}

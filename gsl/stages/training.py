@@ -13,8 +13,10 @@ from gsl.core.split import split
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
 from gsl.errors import TrajectoryError
+from gsl.robots.catalogue import names, robot
 from gsl.storage.references import resolve
 from gsl.storage.trajectories import read
+from gsl.storage.trajectory_contract import suggestion
 
 DATA = "trajectories.parquet"
 PI0 = "pi0"
@@ -51,11 +53,23 @@ def parts(path: Path, *, share: float, seed: int) -> Parts:
         TrajectoryError: The file breaks the contract or holds fewer than three trajectories.
     """
     batch = read(path)
+    _check_joints(path, batch)
     if len(batch) < 3:
         raise TrajectoryError(path, f"holds {len(batch)} episodes; three are the least: to fit, to stop, to hold out")
     rng = np.random.default_rng(seed)
     rest, heldout = _split(batch, share, rng)
     return Parts(*_split(rest, share, rng), heldout)
+
+
+def _check_joints(path: Path, batch: Batch) -> None:
+    """Refuse joints that the robot of the file does not have, if it is one of ours."""
+    name = batch.metadata["robot"]
+    motors = robot(name).motors if name in names() else batch.joints
+    for joint in batch.joints:
+        if joint not in motors:
+            raise TrajectoryError(
+                path, f"the {name} has no such joint{suggestion(joint, motors)}", column=f"position.{joint}"
+            )
 
 
 def _split(batch: Batch, share: float, rng: np.random.Generator) -> tuple[Batch, Batch]:

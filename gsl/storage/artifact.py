@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Protocol
 
 import yaml
 
+from gsl.core.interruption import checkpoint
 from gsl.errors import ArtifactError
 from gsl.storage import documents, manifest
 from gsl.storage.identity import Identity, changes, identify
@@ -26,7 +27,7 @@ METRICS = "metrics.json"
 
 
 class Stage(Protocol):
-    """What `build` needs of a stage; one that can go on where it was killed sets `resumable = True` beside `kind`."""
+    """What `build` needs of a stage; one that can be resumed sets `progress`, the file that it goes on from."""
 
     kind: ClassVar[str]
 
@@ -86,7 +87,7 @@ def build(stage: Stage, *, config: Mapping[str, Any], out: Path, command: str, f
         if (existing := _existing(out, identity, config, force=force)) is not None:
             os.utime(out / manifest.NAME)
             return existing
-        with workplace(out, identity.key, resumable=getattr(stage, "resumable", False)) as folder:
+        with workplace(out, identity.key, progress=getattr(stage, "progress", "")) as folder:
             made = _work(stage, identity, config, folder, command, console)
             manifest.write(folder, made)
             flush_tree(folder)
@@ -120,6 +121,7 @@ def _work(
     with logged(folder) as logger:
         logger.info("%s begins: %s", identity.kind, command)
         metrics = stage.run(folder, console)
+        checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
     documents.write_json(folder / METRICS, metrics)
     return Manifest(

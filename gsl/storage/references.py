@@ -28,6 +28,8 @@ def resolve(reference: str | Path, *, kind: str | None = None, runs: Path = RUNS
     place = _place(str(reference), runs)
     if place.is_file():
         return place
+    if (place / manifest.NAME).is_file():
+        manifest.read(place)
     found = _artifacts(place)
     own = [one for one in found if one.folder == place]
     if own and kind in (None, own[0].manifest.kind):

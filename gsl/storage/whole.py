@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from gsl.errors import GslError
+
+_REMEDIES = {
+    errno.ENOSPC: "free space or choose another folder with out=",
+    errno.EDQUOT: "free space or choose another folder with out=",
+    errno.EACCES: "give yourself the right to write or choose another folder with out=",
+    errno.EPERM: "give yourself the right to write or choose another folder with out=",
+}
 
 
 @contextmanager
@@ -20,9 +28,9 @@ def explained(folder: Path) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         named = f" ({error.filename})" if error.filename else ""
-        raise GslError(
-            f"{folder}: cannot be written: {reason}{named}; free space or choose another folder with out="
-        ) from error
+        remedy = _REMEDIES.get(error.errno or 0, "choose another folder with out=")
+        place = folder.parent if folder.name.startswith(".") else folder  # what is hidden is gone when this is read
+        raise GslError(f"{place}: cannot be written: {reason}{named}; {remedy}") from error
 
 
 @contextmanager

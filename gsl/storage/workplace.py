@@ -65,9 +65,9 @@ def recover(out: Path) -> None:
 
 
 @contextmanager
-def workplace(out: Path, key: str, *, resumable: bool) -> Iterator[Path]:
-    """Yield the folder to build `out` in, which goes when the block fails, unless the work can be resumed."""
-    folder = out.with_name(f".{out.name}.partial" if resumable else f".{out.name}.tmp-{os.getpid()}")
+def workplace(out: Path, key: str, *, progress: str) -> Iterator[Path]:
+    """Yield the folder to build `out` in; it goes when the block fails, unless the file `progress` holds something."""
+    folder = out.with_name(f".{out.name}.partial" if progress else f".{out.name}.tmp-{os.getpid()}")
     if folder.exists() and not _belongs(folder, key):
         shutil.rmtree(folder)
     folder.mkdir(exist_ok=True)
@@ -75,8 +75,12 @@ def workplace(out: Path, key: str, *, resumable: bool) -> Iterator[Path]:
     try:
         yield folder
     finally:
-        if not resumable:
+        if not (progress and _begun(folder / progress)):
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def _begun(progress: Path) -> bool:
+    return progress.is_file() and progress.stat().st_size > 0
 
 
 def _belongs(folder: Path, key: str) -> bool:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple, Protocol, runtime_checkable
+from typing import ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from gsl.core.layout import Layout
 from gsl.core.trajectory import Trajectory
 
-REAL, SIM = "real", "sim"
+REAL: Literal["real"] = "real"
+SIM: Literal["sim"] = "sim"
 
 
 class Step(NamedTuple):

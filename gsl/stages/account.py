@@ -1,0 +1,186 @@
+"""The account of an artifact: its results as tables for a person, read from its files."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from gsl.stages.headline import Unit, falls, unit_of
+from gsl.stages.measured import cells, columns
+from gsl.storage.artifact import Artifact
+
+
+class Told(NamedTuple):
+    """A table with its title and what is said below it."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    caption: str | None = None
+
+
+def account(artifact: Artifact) -> list[Told]:
+    """Return the results of an artifact; of an unknown kind or of another version's, its metrics by name."""
+    tell = _TELLERS.get(artifact.manifest.kind)
+    try:
+        return [tell(artifact.folder, artifact.metrics, unit_of(artifact))] if tell else [_plain(artifact)]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return [_plain(artifact)]
+
+
+def _collect(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    titles = ("episodes", "steps", "falls", f"value of π0 [{unit.name}]")
+    row = (metrics["episodes"], f"{metrics['steps']:,}", metrics["falls"], unit.bare(metrics["value"]))
+    return Told("trajectories", titles, [tuple(map(str, row))])
+
+
+def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    names = {
+        "one_step_deg": "one tick [°]",
+        "one_step_no_change_deg": "no change, one tick [°]",
+        "r2": "R²",
+        "free_run_deg": "0.2 s [°]",
+        "free_run_no_change_deg": "no change, 0.2 s [°]",
+    }
+    rows = [
+        (
+            {"pi0": "of π0", "off_pi0": "off π0"}[group],
+            str(measured["trajectories"]),
+            *(_number(measured.get(name)) for name in names),
+            _worst(measured.get("free_run_by_joint_deg") or measured["one_step_by_joint_deg"]),
+        )
+        for group, measured in metrics["heldout"].items()
+    ]
+    title = f"forward model ({metrics['family']}) on held-out real trajectories"
+    return Told(title, ("policy", "trajectories", *names.values(), "worst joint"), rows)
+
+
+def _train_inverse(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    measured = metrics["heldout"]
+    title = f"inverse model ({metrics['method']}, {metrics['family']}) on held-out simulated trajectories"
+    row = (_number(measured["recovered_action_deg"]), _worst(measured["recovered_action_by_joint_deg"]))
+    return Told(title, ("action error [°]", "worst joint"), [row])
+
+
+def _optimize(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    document = json.loads((folder / "policies.json").read_text(encoding="utf-8"))
+    rows = [
+        (str(one["generation"]), str(one["name"]), unit.bare(one["value_sim"]))
+        for one in document["policies"]
+        if one["generation"]
+    ]
+    titles = ("generation", "policy", f"in simulation [{unit.name}]")
+    problems = _problems(folder)
+    return Told("best of each generation", titles, rows, f"the grounding: {problems}" if problems else None)
+
+
+def _problems(folder: Path) -> str:
+    report = folder / "grounding.json"
+    return "; ".join(json.loads(report.read_text(encoding="utf-8"))["problems"]) if report.is_file() else ""
+
+
+def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    document = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
+    rows = [
+        tuple(cells(one | {"interval": _bounds(one["interval"])}, f"{one['name']}{purpose}", unit.factor))
+        for phase, purpose in {"policies": "", "check": ", checked", "confirmation": ", fresh"}.items()
+        for one in document[phase]
+    ]
+    titles = tuple(columns(document["policies"][0], unit.name))
+    return Told("policies in the real world", titles, rows, _returned(metrics, unit))
+
+
+def _bounds(interval: list[float | None]) -> list[float]:
+    return [math.inf if bound is None else bound for bound in interval]
+
+
+def _returned(metrics: Mapping[str, Any], unit: Unit) -> str:
+    spent = f"{metrics['real_episodes']} real episodes"
+    if not metrics["best_generation"]:
+        return f"no stable policy was faster: {metrics['best']} is returned; {spent}"
+    gain, after = metrics["gain"], metrics["returned"]
+    bounds = unit.interval(gain["interval"], sign=True)
+    fallen = falls(after["falls"], after["episodes"])
+    told = f"{unit.shown(gain['value'], sign=True)} on fresh episodes, 95 % interval {bounds}, {fallen}"
+    return f"{metrics['best']} is returned: {told}; {spent}"
+
+
+def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    titles, rows = _markdown(folder / "table.md")
+    spent, learned = metrics["real_episodes"], metrics["learned_from"]
+    plots = ", ".join(sorted(path.name for path in folder.glob("*.png")))
+    below = [
+        metrics["verdict"],
+        f"real data: {learned} episodes to learn from, {spent - learned} to measure, {spent} in all",
+        f"plots: {folder.as_posix()}/ ({plots})",
+    ]
+    return Told(f"grounded simulation learning [{unit.name}]", titles, rows, "\n".join(below))
+
+
+def _compare(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    from gsl.stages.comparison import COLUMNS, Trial, rows, summaries
+
+    trials = [Trial(**one) for one in json.loads((folder / "trials.json").read_text(encoding="utf-8"))]
+    found = summaries(trials)
+    below = f"differences and every trial: {folder.as_posix()}/table.md"
+    return Told(f"{found[0].trials} trials of each method", COLUMNS, rows(found), below)
+
+
+def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    return Told(f"worlds [{unit.name}]", *_markdown(folder / "table.md"))
+
+
+def _markdown(path: Path) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return the titles and rows of the first table of a file."""
+    lines = itertools.takewhile(lambda line: line.startswith("|"), path.read_text(encoding="utf-8").splitlines())
+    titles, _, *rows = (tuple(cell.strip() for cell in line[1:-1].split("|")) for line in lines)
+    return titles, rows
+
+
+def _plain(artifact: Artifact) -> Told:
+    return Told("metrics", ("metric", "value"), list(flat(artifact.metrics)))
+
+
+def flat(values: Any, path: str = "") -> Iterator[tuple[str, str]]:
+    """Yield one row a value, with its dotted name."""
+    if isinstance(values, dict) and values:
+        for key, value in values.items():
+            yield from flat(value, f"{path}.{key}".lstrip("."))
+    else:
+        yield path, plain(values)
+
+
+def plain(value: Any) -> str:
+    """Return a value as a person writes it."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(plain, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key}: {plain(entry)}' for key, entry in value.items())}}}"
+    if isinstance(value, bool) or value is None:
+        return {True: "true", False: "false", None: "none"}[value]
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
+
+
+def _worst(by_joint: Mapping[str, float]) -> str:
+    joint = max(by_joint, key=lambda name: by_joint[name])
+    return f"{joint} {by_joint[joint]:.2f}°"
+
+
+_TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told]] = {
+    "collect": _collect,
+    "train_forward": _train_forward,
+    "train_inverse": _train_inverse,
+    "optimize": _optimize,
+    "evaluate": _evaluate,
+    "iterate": _iterate,
+    "compare": _compare,
+    "survey": _survey,
+}

@@ -1,0 +1,120 @@
+"""The headline of an artifact: what came out of a stage, in a few words with units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from gsl.storage.artifact import Artifact
+
+Metrics = Mapping[str, Any]
+
+
+class Unit(NamedTuple):
+    """How people are shown the values of a task: `factor` times the value, in `name`."""
+
+    factor: float = 1.0
+    name: str = ""
+
+    def shown(self, value: float | None, *, sign: bool = False) -> str:
+        """Return a value with its unit, `-` if there is none."""
+        if value is None:
+            return "-"
+        return f"{self.bare(value, sign=sign)} {self.name}".rstrip()
+
+    def bare(self, value: float | None, *, sign: bool = False) -> str:
+        """Return a value without its unit."""
+        return "-" if value is None else f"{self.factor * value:{'+' if sign else ''}.1f}"
+
+    def interval(self, bounds: list[float | None], *, sign: bool = False) -> str:
+        """Return an interval without its unit."""
+        return " to ".join(self.bare(bound, sign=sign) for bound in bounds)
+
+
+def unit_of(artifact: Artifact) -> Unit:
+    """Return the unit of the task that an artifact's settings name; the bare value if the task is not gsl's."""
+    from hydra.utils import get_object
+
+    config = artifact.config
+    task = config.get("task") or config.get("iterate", {}).get("task") or {}
+    name = task.get("_target_", "") if isinstance(task, Mapping) else ""
+    if not str(name).startswith("gsl.tasks."):
+        return Unit()
+    try:
+        kind = get_object(name)
+        return Unit(float(kind.shown), str(kind.unit))
+    except (ImportError, ValueError, AttributeError):
+        return Unit()
+
+
+def headline(artifact: Artifact) -> str:
+    """Return what came out, nothing for an artifact of an unknown kind or of another version's metrics."""
+    tell = _TELLERS.get(artifact.manifest.kind)
+    try:
+        return tell(artifact.metrics, unit_of(artifact)) if tell else ""
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
+
+
+def falls(count: int, episodes: int | None = None) -> str:
+    """Return how often the robot fell."""
+    return f"{count or 'no'} fall{'s' * (count != 1)}" + (f" in {episodes}" if episodes is not None else "")
+
+
+def _collect(metrics: Metrics, unit: Unit) -> str:
+    return f"{metrics['episodes']} episodes, {falls(metrics['falls'])}, π0 {unit.shown(metrics['value'])}"
+
+
+def _train_forward(metrics: Metrics, unit: Unit) -> str:
+    names = {"pi0": "of π0", "off_pi0": "off π0"}
+    errors = {
+        names[group]: measured.get("free_run_deg", measured["one_step_deg"])
+        for group, measured in metrics["heldout"].items()
+    }
+    return f"{metrics['family']}, held out: " + ", ".join(f"{error:.2f}° {group}" for group, error in errors.items())
+
+
+def _train_inverse(metrics: Metrics, unit: Unit) -> str:
+    return f"{metrics['family']}, held out: {metrics['heldout']['recovered_action_deg']:.2f}° of action"
+
+
+def _optimize(metrics: Metrics, unit: Unit) -> str:
+    told = f"{metrics['generations']} generations, best {unit.shown(metrics['best_value_sim'])} in simulation"
+    alpha = metrics.get("alpha")
+    if alpha is None:
+        return told
+    verdict = "passed" if metrics["grounding_acceptable"] else "failed its check"
+    return f"{told}; grounding (alpha {alpha:g}) {verdict}"
+
+
+def _evaluate(metrics: Metrics, unit: Unit) -> str:
+    after, gain = metrics["returned"], metrics["gain"]
+    told = f"{metrics['best']} {unit.shown(after['value'])}, {falls(after['falls'], after['episodes'])}"
+    return told if not gain["share"] else f"{told}; {100 * gain['share']:+.1f} % over the start"
+
+
+def _iterate(metrics: Metrics, unit: Unit) -> str:
+    before, after = metrics["baseline"], metrics["returned"]
+    told = f"π0 {unit.shown(before['value'])} -> {unit.shown(after['value'])}"
+    return f"{told}, {falls(after['falls'], after['episodes'])}; {metrics['real_episodes']} real episodes"
+
+
+def _compare(metrics: Metrics, unit: Unit) -> str:
+    methods = dict.fromkeys(one["method"] for one in metrics["summaries"])
+    return f"{metrics['trials']} trials of {', '.join(methods)}"
+
+
+def _survey(metrics: Metrics, unit: Unit) -> str:
+    return ", ".join(f"{name}: π0 {unit.shown(one['pi0'])}, rank {one['rank']:.2f}" for name, one in metrics.items())
+
+
+_TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
+    "collect": _collect,
+    "train_forward": _train_forward,
+    "train_inverse": _train_inverse,
+    "optimize": _optimize,
+    "evaluate": _evaluate,
+    "iterate": _iterate,
+    "compare": _compare,
+    "survey": _survey,
+}

@@ -1,0 +1,65 @@
+"""Ctrl-C and SIGTERM end every stage with one line and 130; nothing half-written stays, and no worker."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from commands import eventually, gsl, session, started
+
+FOREVER = {
+    "collect": ("episodes=2000",),
+    "train-forward": ("data=chain/collect_real", "model=mlp", "model.epochs=1000000", "model.patience=1000000"),
+    "train-inverse": ("data=chain/collect_sim", "model=mlp", "model.epochs=1000000", "model.patience=1000000"),
+    "optimize": ("grounding=none", "rollouts=500"),
+    "evaluate": ("policies=chain/optimize", "episodes=2000"),
+    "iterate": ("budget.real_episodes=2000",),
+    "compare": ("iterate.budget.rollouts=500",),
+}
+WORKERS = {"collect": "workers=2", "optimize": "workers=2", "evaluate": "workers=2", "iterate": "workers=2",
+           "compare": "iterate.workers=2"}  # fmt: skip
+
+
+def stopped(stage: str, stop: signal.Signals, chain: Path, out: Path) -> str:
+    """Start a stage, wait until it works, stop it, and return what it says when it and its workers are gone."""
+    settings = (*FOREVER[stage], *filter(None, [WORKERS.get(stage)]), f"out={out}/it", f"name={out.name}")
+    with started(stage, *settings, folder=chain) as process:
+        expected = 4 if stage in WORKERS else 1
+        assert eventually(lambda: any(out.iterdir()) and len(session(process.pid)) >= expected), process.poll()
+        time.sleep(0.4)
+        assert gsl("collect", f"out={out}/it", folder=chain).lines == [
+            f"gsl collect: {out}/it: another process is building it; wait for it or choose another out="
+        ]
+        if stop == signal.SIGINT:
+            os.killpg(process.pid, stop)  # as a terminal does it
+        else:
+            process.send_signal(stop)
+        _, said = process.communicate(timeout=30)
+        assert process.returncode == 130, said
+        assert eventually(lambda: not session(process.pid), seconds=5.0), "workers are left"
+    return said
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "sigterm"])
+@pytest.mark.parametrize("stage", FOREVER)
+def test_a_stage_that_is_stopped_leaves_nothing(stage: str, stop: signal.Signals, chain: Path, tmp_path: Path) -> None:
+    said = stopped(stage, stop, chain, tmp_path)
+    lines = [line for line in said.splitlines() if not line.startswith("fitting ")]
+    assert lines == [f"gsl {stage}: interrupted"]
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+    assert not (chain / "runs" / tmp_path.name).exists()
+
+
+def test_after_kill_9_no_worker_stays_and_the_artifact_can_be_built(chain: Path, tmp_path: Path) -> None:
+    with started("collect", *FOREVER["collect"], "workers=2", f"out={tmp_path}/it", folder=chain) as process:
+        assert eventually(lambda: len(session(process.pid)) >= 4)
+        time.sleep(1.0)
+        process.kill()
+        process.wait()
+        assert eventually(lambda: not session(process.pid), seconds=15.0)
+    quick = ("episodes=1", "neighbours=0", "task.duration=0.1", "workers=1")
+    assert gsl("collect", *quick, f"out={tmp_path}/it", folder=chain).code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["it"]
