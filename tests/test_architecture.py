@@ -19,7 +19,9 @@ MAY_IMPORT = {
     "stages": ("core", "effects", *COMPONENTS, "storage", "report"),
 }
 ANYWHERE = ("errors", "console")
+COMPOSING = ("composer", "config_errors", "known_settings", "multirun")
 ONLY = {
+    "hydra": ("config.py", *(f"commandline/{name}.py" for name in COMPOSING)),
     "pybullet": ("worlds/engine.py", "worlds/camera.py"),
     "torch": ("models/fitting.py",),
     "cma": ("optimizers/cma_es.py",),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -33,15 +34,14 @@ class Unit(NamedTuple):
 
 def unit_of(artifact: Artifact) -> Unit:
     """Return the unit of the task that an artifact's settings name; the bare value if the task is not gsl's."""
-    from hydra.utils import get_object
-
     config = artifact.config
     task = config.get("task") or config.get("iterate", {}).get("task") or {}
     name = task.get("_target_", "") if isinstance(task, Mapping) else ""
     if not str(name).startswith("gsl.tasks."):
         return Unit()
     try:
-        kind = get_object(name)
+        module, _, attribute = str(name).rpartition(".")
+        kind = getattr(importlib.import_module(module), attribute)
         return Unit(float(kind.shown), str(kind.unit))
     except (ImportError, ValueError, AttributeError):
         return Unit()
