@@ -16,7 +16,7 @@ from gsl import __version__
 from gsl.commandline.completion import CONFIG_DIR, complete, user_folder
 from gsl.commandline.failure import INTERRUPTED, leave_quietly, report
 from gsl.console import Console
-from gsl.core.interruption import listen
+from gsl.core.interruption import ignore, listen
 
 
 class StageCommand(TyperCommand):
@@ -142,6 +142,7 @@ def main() -> None:
     listen()
     sys.path.append(os.getcwd())
     code = call(sys.argv[1:])
+    ignore()
     exec("")  # else Python, if it was interrupted in a library's exec(), ends by the signal and not with our exit code
     sys.exit(code)
 

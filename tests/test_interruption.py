@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -33,10 +34,13 @@ def stopped(stage: str, stop: signal.Signals, chain: Path, out: Path) -> str:
         assert gsl("collect", f"out={out}/it", folder=chain).lines == [
             f"gsl collect: {out}/it: another process is building it; wait for it or choose another out="
         ]
-        if stop == signal.SIGINT:
-            os.killpg(process.pid, stop)  # as a terminal does it
-        else:
-            process.send_signal(stop)
+        for pause in (0.0, 0.02, 0.15):  # an impatient user, or `timeout`, says it more than once
+            time.sleep(pause)
+            with suppress(ProcessLookupError):
+                if stop == signal.SIGINT:
+                    os.killpg(process.pid, stop)  # as a terminal does it
+                else:
+                    process.send_signal(stop)
         _, said = process.communicate(timeout=30)
         assert process.returncode == 130, said
         assert eventually(lambda: not session(process.pid), seconds=5.0), "workers are left"
