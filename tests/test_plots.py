@@ -30,7 +30,7 @@ FALLEN = {
     "falls": 1,
 }
 AGAIN = {**STABLE, "value": 0.205, "interval": [0.195, 0.215]}
-EVALUATION = {"policies": [PI0, STABLE, FALLEN], "confirmation": [PI0, AGAIN]}
+EVALUATION = {"policies": [PI0, STABLE, FALLEN], "check": [AGAIN], "confirmation": [PI0, AGAIN]}
 SEARCH = search("iteration 1", EVALUATION, shown=100.0, returned="generation_01")
 TIME = np.arange(0.0, 1.5, 0.02)
 TRACES = Traces(TIME, np.sin(TIME), np.sin(TIME - 0.1), np.sin(TIME), np.sin(TIME - 0.1) + math.radians(2.0))
@@ -50,6 +50,11 @@ def test_points_are_the_rows_of_an_evaluation_in_the_unit_that_is_shown() -> Non
     assert start == Point(0, None, 19.0, 18.0, 20.0, 0)
     assert stable == Point(1, 25.0, 21.0, 20.0, 22.0, 0)
     assert fallen == Point(2, 30.0, 0.0, -math.inf, math.inf, 1)
+
+
+def test_a_policy_that_falls_after_the_choice_has_fallen() -> None:
+    later = search("iteration 1", {**EVALUATION, "check": [{**STABLE, "falls": 1}]}, shown=100.0)
+    assert [point.falls for point in later.points] == [0, 1, 1]
 
 
 def test_the_returned_policy_is_shown_as_it_was_measured_again() -> None:

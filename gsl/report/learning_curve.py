@@ -52,7 +52,7 @@ class Search(NamedTuple):
 def search(
     label: str, evaluation: Mapping[str, Any], *, shown: float = 1.0, returned: str | None = None, start: str = "π0"
 ) -> Search:
-    """Return what an `evaluation.json` holds.
+    """Return what an `evaluation.json` holds; a policy that fell in any of its episodes, early or late, has fallen.
 
     Args:
         label: Heading of its panel.
@@ -63,7 +63,9 @@ def search(
     """
     fresh = [row for row in evaluation["confirmation"] if row["name"] == returned and row["generation"]]
     confirmed = points(fresh, shown=shown)[0] if fresh else None
-    return Search(label, points(evaluation["policies"], shown=shown), confirmed, start)
+    later = {one["name"] for phase in ("check", "confirmation") for one in evaluation[phase] if one["falls"]}
+    rows = [{**one, "falls": one["falls"] + (one["name"] in later)} for one in evaluation["policies"]]
+    return Search(label, points(rows, shown=shown), confirmed, start)
 
 
 def points(rows: Sequence[Mapping[str, Any]], *, shown: float = 1.0) -> list[Point]:
