@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -158,5 +157,4 @@ class _Lines:
 def _rich_console(is_terminal: bool, *, stderr: bool) -> rich.console.Console:
     from rich.console import Console as RichConsole
 
-    width = None if is_terminal else int(os.environ.get("COLUMNS") or WIDTH_WITHOUT_TERMINAL)
-    return RichConsole(stderr=stderr, width=width)
+    return RichConsole(stderr=stderr, width=None if is_terminal else WIDTH_WITHOUT_TERMINAL)

@@ -74,7 +74,8 @@ def test_joint_inertia_agrees_with_bullets(tmp_path: Path) -> None:
     engine.load(start.reading, start.commands)
     b, client, order = engine.bullet, engine.client, np.argsort(engine.joints)
     (tmp_path / "bare.urdf").write_text(urdf(robot, visuals=False))
-    bare = b.loadURDF(str(tmp_path / "bare.urdf"), useFixedBase=True, flags=b.URDF_USE_INERTIA_FROM_FILE)
+    flags = b.URDF_USE_INERTIA_FROM_FILE
+    bare = b.loadURDF(str(tmp_path / "bare.urdf"), useFixedBase=True, flags=flags, physicsClientId=client)
     for _ in range(5):
         angles = rng.uniform(-0.3, 0.3, 16)
         theirs = b.calculateMassMatrix(bare, angles[order].tolist(), physicsClientId=client)

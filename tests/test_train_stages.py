@@ -116,3 +116,10 @@ def test_two_trajectories_are_too_few(tmp_path: Path) -> None:
 def test_a_sensor_that_was_not_recorded_is_named(real: str, tmp_path: Path) -> None:
     with pytest.raises(TrajectoryError, match=r"foot_force\.left.*leave the sensor out"):
         TrainForward(data=real, model=ModelConfig(family="linear", sensors=("foot_force",))).run(tmp_path, QUIET)
+
+
+def test_logs_of_the_other_world_are_refused(real: str, sim: str, tmp_path: Path) -> None:
+    with pytest.raises(TrajectoryError, match="role=sim"):
+        TrainForward(data=sim, model=LINEAR).run(tmp_path, QUIET)
+    with pytest.raises(TrajectoryError, match="role=real"):
+        TrainInverse(data=real, model=LINEAR).run(tmp_path, QUIET)

@@ -29,6 +29,7 @@ from gsl.stages.training import (
 )
 from gsl.storage.models import write_model
 from gsl.storage.trajectories import write
+from gsl.tasks.task import SIM
 
 HELDOUT = "heldout.parquet"
 
@@ -57,7 +58,7 @@ class TrainForward:
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the model and the trajectories it has not seen."""
         path = data_file(self.data)
-        data = parts(path, share=self.heldout, seed=self.seed)
+        data = parts(path, other=SIM, share=self.heldout, seed=self.seed)
         self._check(path, data)
         console.status(f"fitting a forward model to {len(data.training)} trajectories")
         judges = self._long(of_policy(data.validation, pi0=False)) or self._long(data.validation.episodes)

@@ -21,6 +21,7 @@ from gsl.models.linear import fit_linear
 from gsl.models.network import Samples
 from gsl.stages.training import Parts, checked, data_file, degrees, degrees_by_joint, parts, summary
 from gsl.storage.models import write_model
+from gsl.tasks.task import REAL
 
 
 @component
@@ -53,7 +54,7 @@ class TrainInverse:
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the model."""
         path = data_file(self.data)
-        data = parts(path, share=self.heldout, seed=self.seed)
+        data = parts(path, other=REAL, share=self.heldout, seed=self.seed)
         for part in data:
             checked(path, part.episodes, self.model.of_joints.span + TICKS + self.model.horizon)
         console.status(f"fitting an inverse model to {len(data.training)} trajectories")

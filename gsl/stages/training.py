@@ -17,6 +17,7 @@ from gsl.robots.catalogue import names, robot
 from gsl.storage.references import resolve
 from gsl.storage.trajectories import read
 from gsl.storage.trajectory_contract import suggestion
+from gsl.tasks.task import SIM
 
 DATA = "trajectories.parquet"
 PI0 = "pi0"
@@ -46,13 +47,16 @@ def of_policy(batch: Batch, *, pi0: bool) -> tuple[Trajectory, ...]:
     return tuple(one for one, label in zip(batch.episodes, labels(batch), strict=True) if (label == PI0) == pi0)
 
 
-def parts(path: Path, *, share: float, seed: int) -> Parts:
-    """Read a trajectory file and split it by trajectory.
+def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
+    """Read a trajectory file and split it by trajectory; `other` is the role its world must not have played.
 
     Raises:
-        TrajectoryError: The file breaks the contract or holds fewer than three trajectories.
+        TrajectoryError: The file breaks the contract, is of the other world or holds fewer than three trajectories.
     """
     batch = read(path)
+    if batch.metadata.get("role") == other:
+        wanted = "a forward model learns the real robot" if other == SIM else "an inverse model learns the simulator"
+        raise TrajectoryError(path, f"was recorded with role={other}; {wanted}")
     _check_joints(path, batch)
     if len(batch) < 3:
         raise TrajectoryError(path, f"holds {len(batch)} episodes; three are the least: to fit, to stop, to hold out")
