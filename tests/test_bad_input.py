@@ -146,7 +146,7 @@ def test_a_log_of_joints_that_the_robot_does_not_have(chain: Path, rewritten: Ca
 
 def test_a_model_of_another_robot(chain: Path, rewritten: Callable[..., str], tmp_path: Path) -> None:
     joints = [joint.replace("LKneePitch", "LElbowRoll") for joint in _joints(chain)]
-    data = rewritten(_with_elbows, joints=joints, robot="mine")
+    data = rewritten(_with_elbows, joints=joints, robot="mine", role="imported")
     for stage in ("train-forward", "train-inverse"):
         assert gsl(stage, f"data={data}", "model=linear", f"out={tmp_path / stage}", folder=chain).code == 0
     models = (f"grounding.forward_model={tmp_path}/train-forward", f"grounding.inverse_model={tmp_path}/train-inverse")
