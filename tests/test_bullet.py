@@ -46,6 +46,20 @@ def test_a_rollout_depends_on_its_seed_and_on_nothing_before_it(env: BulletEnv) 
     np.testing.assert_array_equal(walked(env, 1, SECONDS), first)
 
 
+def test_falls_and_short_rollouts_leave_nothing_behind() -> None:
+    used, fresh = world().make(), world().make()
+    rng = np.random.default_rng(0)
+    low, high = used.action_space.low, used.action_space.high
+    for length in (1, 40, 3, 60, 2, 50):
+        used.reset(seed=int(rng.integers(1000)))
+        for _ in range(length):
+            if used.step(rng.uniform(low, high))[2]:
+                break
+    np.testing.assert_array_equal(walked(used, 1, SECONDS), walked(fresh, 1, SECONDS))
+    used.close()
+    fresh.close()
+
+
 def test_another_world_beside_it_changes_nothing(env: BulletEnv) -> None:
     first = walked(env, 1, SECONDS)
     beside = world({"link_mass": {"link": "torso", "mass": 0.5}}, step=0.001).make()
