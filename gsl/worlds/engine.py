@@ -78,8 +78,8 @@ class Reading(NamedTuple):
 class Engine:
     """One client of Bullet in DIRECT mode that holds one robot; `load` removes it and loads it anew every time.
 
-    With the robot go its contacts, motors and friction, and the ground has no state: a rollout has the same bits as in a
-    client that was reset, which would take two thirds of the time of loading (tests/test_bullet.py).
+    With the robot go its contacts, motors and friction, and the ground has no state: a rollout has the same bits as in
+    a client that was reset, which would take more time than the loading itself (tests/test_bullet.py).
 
     Args:
         plant: What to simulate.
