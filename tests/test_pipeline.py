@@ -128,7 +128,7 @@ def test_iterate_runs_the_whole_chain_and_says_what_it_cost(whole: tuple[Path, S
     assert metrics["learned_from"] == collected["real_episodes"]
     assert metrics["real_episodes"] == measured["real_episodes"] + collected["real_episodes"]
     made = {path.name for path in (folder / "runs/whole/iterate").iterdir()}
-    assert {"policies.json", "learning_curve.png", "joint_trace.png", "table.md"} < made
+    assert {"policies.json", "learning_curve.png", "joint_trace.png", "walk.png", "table.md"} < made
 
 
 def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr(whole: tuple[Path, Said]) -> None:
@@ -142,7 +142,7 @@ def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr
     spent, learned = metrics["real_episodes"], metrics["learned_from"]
     assert f"real data: {learned} episodes to learn from, {spent - learned} to measure, {spent} in all\n" in table
     assert metrics["verdict"] in table
-    assert "plots: runs/whole/iterate/ (joint_trace.png, learning_curve.png)\n" in table
+    assert "plots: runs/whole/iterate/ (joint_trace.png, learning_curve.png, walk.png)\n" in table
     assert table.splitlines()[-1] == "runs/whole/iterate"
     grown = [line for line in said.lines if line.startswith("  ")]
     assert grown[0].split()[:2] == ["iteration", "policy"]

@@ -12,7 +12,7 @@ from gsl.console import Console
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.walk_engine import WalkEngine
-from gsl.report.render import portrait, walk_gif, walk_strip
+from gsl.report.render import portrait, walk_strip
 from gsl.robots.nao import nao
 from gsl.stages.robot import write_robot
 from gsl.stages.rollout import Scenario, rollout
@@ -43,19 +43,6 @@ def test_a_strip_has_its_frames_side_by_side(walk, tmp_path: Path) -> None:
     assert image.shape == (100, 3 * 62, 3)
     frames = np.split(image, 3, axis=1)
     assert all(np.abs(one - other).mean() > 0.3 for one, other in zip(frames, frames[1:], strict=False))
-
-
-def test_a_moving_picture_lasts_as_long_as_the_walk(walk, tmp_path: Path) -> None:
-    walk_gif(nao(), walk, tmp_path / "walk.gif", width=64, height=48, frames=8)
-    with Image.open(tmp_path / "walk.gif") as movie:
-        assert movie.size == (64, 48) and 4 <= movie.n_frames <= 8
-        seconds = sum(_duration(movie, frame) for frame in range(movie.n_frames)) / 1000.0
-    assert seconds == pytest.approx(walk.time[-1], rel=0.2)
-
-
-def _duration(movie: Image.Image, frame: int) -> float:
-    movie.seek(frame)
-    return movie.info["duration"]
 
 
 def test_the_robot_command_names_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""Pictures of the robot: standing, as a strip of a walk, as a moving picture; walks are posed from logged angles."""
+"""Pictures of the robot: standing, and as a strip of a walk posed from logged angles."""
 
 from __future__ import annotations
 
@@ -31,20 +31,6 @@ def walk_strip(robot: Robot, trajectory: Trajectory, path: Path, *, frames: int 
     with _camera(robot) as camera:
         pictures = [_frame(camera, robot, trajectory, row, round(0.62 * height), height) for row in rows]
     _write(np.concatenate(pictures, axis=1), path)
-
-
-def walk_gif(
-    robot: Robot, trajectory: Trajectory, path: Path, *, width: int = 320, height: int = 240, frames: int = 60
-) -> None:
-    """Write a walk as a moving picture in real time, of at most `frames` frames."""
-    from PIL import Image
-
-    stride = -(-(len(trajectory) + 1) // frames)
-    rows = range(0, len(trajectory) + 1, stride)
-    with _camera(robot) as camera:
-        images = [Image.fromarray(_frame(camera, robot, trajectory, row, width, height)) for row in rows]
-    period = 1000.0 * float(np.median(np.diff(trajectory.time))) * stride
-    images[0].save(path, save_all=True, append_images=images[1:], duration=round(period), loop=0)
 
 
 def _frame(camera: Camera, robot: Robot, trajectory: Trajectory, row: int, width: int, height: int) -> np.ndarray:

@@ -15,6 +15,7 @@ from gsl.grounding.none import NoGrounding
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
 from gsl.policies.policy import Policy
+from gsl.report.render import walk_strip
 from gsl.stages.chain import Budget, Chain
 from gsl.stages.choices import FILE, policies, record
 from gsl.stages.iteration_report import COLUMNS, Rounds, write_curve, write_table, write_trace
@@ -123,7 +124,7 @@ class Iterate:
         return self.chain.measure(place / "evaluate_none", found, self.seed, console)
 
     def _trace(self, folder: Path, home: Path) -> None:
-        """Draw the first iteration's grounding on a real walk that its models have not seen."""
+        """Draw a real walk that no model has seen, and what the first iteration's grounding makes of it."""
         place = home / "iteration_01"
         alpha = json.loads((place / "optimize" / "metrics.json").read_text(encoding="utf-8"))["alpha"]
         assert isinstance(self.grounding, ActionTransformation), "only learned groundings are traced"
@@ -133,4 +134,6 @@ class Iterate:
         heldout = read(place / "train_forward" / HELDOUT)
         walks = of_policy(heldout, pi0=True) or heldout.episodes
         assert isinstance(self.sim, BulletWorld), "the check of the grounding has replayed in it"
-        write_trace(folder, self.sim, grounding, max(walks, key=len))
+        walk = max(walks, key=len)
+        write_trace(folder, self.sim, grounding, walk)
+        walk_strip(self.sim.plant.robot, walk, folder / "walk.png")
