@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gsl.core.plant import Servo
-from gsl.worlds.servo import BRISTLE, TOOTH_STIFFNESS, first_state, packed, servo_torque
+from gsl.worlds.drive_train import TOOTH_STIFFNESS
+from gsl.worlds.servo import BRISTLE, first_state, packed, servo_torque
 
 STEP, PERIOD = 0.002, 0.02
 INERTIA = 0.008  # of the joint's output in these tests [kg·m²]
@@ -12,26 +13,25 @@ INERTIA = 0.008  # of the joint's output in these tests [kg·m²]
 
 def servo(**fields: float) -> np.ndarray:
     usual = {"kp": 10.0, "kd": 0.0, "limit": 5.0, "no_load_speed": 8.0, "armature": 0.007}
-    names = ("kp", "kd", "limit", "no_load_speed", "coulomb", "viscous", "armature", "delay", "play")
-    return packed(Servo(**{name: np.array([{**usual, **fields}.get(name, 0.0)]) for name in names}))
+    return packed(Servo.of(**{name: np.array([value]) for name, value in {**usual, **fields}.items()}), 12.0)
 
 
 def torque(parameters: np.ndarray, target: float, q: float, v: float, elapsed: float = 0.0) -> float:
     motion, result = np.array([[q], [v]]), np.zeros(1)
-    state = first_state(np.array([[target]]), motion)
-    servo_torque(parameters, state.commands, state.memory, motion, elapsed, STEP, PERIOD, result)
+    state = first_state(np.array([[target]]), motion, STEP)
+    servo_torque(parameters, state, motion, elapsed, STEP, PERIOD, result)
     return float(result[0])
 
 
 def targets_seen(delay: float, commands: np.ndarray) -> np.ndarray:
     """What a servo with kp = 1 follows at each physics step while `commands` are issued, one a control period."""
     parameters, motion, result, seen = servo(kp=1.0, delay=delay, limit=1e9), np.zeros((2, 1)), np.zeros(1), []
-    state = first_state(np.zeros((1, 1)), motion)
+    state = first_state(np.zeros((1, 1)), motion, STEP)
     for command in commands:
         state.commands[1:] = state.commands[:-1].copy()
         state.commands[0] = command
         for k in range(round(PERIOD / STEP)):
-            servo_torque(parameters, state.commands, state.memory, motion, k * STEP, STEP, PERIOD, result)
+            servo_torque(parameters, state, motion, k * STEP, STEP, PERIOD, result)
             seen.append(result[0])
     return np.array(seen)
 
@@ -73,10 +73,10 @@ def test_inside_the_limits_the_law_is_linear() -> None:
 def joint_motion(parameters: np.ndarray, load: np.ndarray, *, target: float = 0.0, start: float = 0.0) -> np.ndarray:
     """Positions and velocities of one joint under `load` [N·m], integrated as Bullet does, shape (T, 2)."""
     motion, result, path = np.array([[start], [0.0]]), np.zeros(1), []
-    state = first_state(np.array([[target]]), motion)
+    state = first_state(np.array([[target]]), motion, STEP)
     for k, external in enumerate(load):
         elapsed = (k % 10) * STEP
-        servo_torque(parameters, state.commands, state.memory, motion, elapsed, STEP, PERIOD, result)
+        servo_torque(parameters, state, motion, elapsed, STEP, PERIOD, result)
         motion[1] += STEP * (result + external) / INERTIA
         motion[0] += STEP * motion[1]
         path.append(motion[:, 0].copy())
@@ -116,9 +116,9 @@ def test_a_load_that_turns_moves_the_rotor_through_the_play() -> None:
     parameters, gaps, outputs = servo(viscous=0.3, play=0.04), [], []
     for load in (0.3, -0.3):
         motion, result = np.array([[0.0], [0.0]]), np.zeros(1)
-        state = first_state(np.zeros((1, 1)), motion)
+        state = first_state(np.zeros((1, 1)), motion, STEP)
         for _ in range(5_000):
-            servo_torque(parameters, state.commands, state.memory, motion, 0.0, STEP, PERIOD, result)
+            servo_torque(parameters, state, motion, 0.0, STEP, PERIOD, result)
             motion[1] += STEP * (result + load) / INERTIA
             motion[0] += STEP * motion[1]
         gaps.append(state.memory[1, 0] - motion[0, 0])
@@ -131,10 +131,10 @@ def test_energy_does_not_grow_in_the_play() -> None:
     """Two masses fly at each other through the gap again and again, with no drive."""
     parameters = servo(kp=0.0, play=0.02)
     motion, result = np.array([[0.0], [0.5]]), np.zeros(1)
-    state = first_state(np.zeros((1, 1)), np.zeros((2, 1)))
+    state = first_state(np.zeros((1, 1)), np.zeros((2, 1)), STEP)
     rotor, energies = 0.7 * 0.007, []
     for _ in range(5_000):
-        servo_torque(parameters, state.commands, state.memory, motion, 0.0, STEP, PERIOD, result)
+        servo_torque(parameters, state, motion, 0.0, STEP, PERIOD, result)
         motion[1] += STEP * result / INERTIA
         motion[0] += STEP * motion[1]
         apart = abs(state.memory[1, 0] - motion[0, 0]) < 0.01

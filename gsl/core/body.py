@@ -77,6 +77,10 @@ class Robot:
         feet: Links whose ground contact is felt, by side.
         gains: Nominal proportional [N·m/rad] and derivative [N·m·s/rad] servo gains by motor.
         no_load_speed: Factor on max_velocity at which motoring torque vanishes.
+        supply_voltage: Of the battery without load [V].
+        torque_constant: Of the motors, seen at the output [N·m/A], by motor.
+        encoder_side: Where the joint encoders sit, `output` or `motor`.
+        encoder_step: Resolution of the joint encoders [rad].
         stance: A usual posture [rad] by joint, the one at which approximations are exact.
         upright_height: Base height below which it lies on the ground [m].
     """
@@ -90,6 +94,10 @@ class Robot:
     feet: Mapping[str, str] = field(default_factory=dict)
     gains: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     no_load_speed: float = 1.15
+    supply_voltage: float = 12.0
+    torque_constant: Mapping[str, float] = field(default_factory=dict)
+    encoder_side: str = "output"
+    encoder_step: float = 0.0
     stance: Mapping[str, float] = field(default_factory=dict)
     upright_height: float = 0.0
 

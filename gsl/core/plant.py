@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from gsl.core.body import Robot
+
+GRAVITY = 9.81  # [m/s²]
+Hook = Callable[[np.ndarray, float], np.ndarray]
 
 
 @dataclass(frozen=True)
 class Servo:
     """One joint servo per motor; every field has shape (n_motors,).
 
-        u = kp (target - q) - kd dq/dt,  |u| <= limit, and <= limit (1 - |v| / no_load_speed) where it drives the motion
+        u = kp (1 - fade t) dead(target + offset - q) - kd dq/dt, within the torque limit and the speed line
+        torque = u (1 - duty_loss |u| / limit) - viscous dq/dt - dry friction
 
     Attributes:
         kp, kd: Gains [N·m/rad], [N·m·s/rad].
@@ -22,9 +26,23 @@ class Servo:
         no_load_speed: Speed at which driving torque vanishes [rad/s].
         coulomb: Dry friction at the output [N·m].
         viscous: Friction proportional to speed [N·m·s/rad].
+        stribeck, stribeck_velocity: Dry friction added at low speed [N·m], and how low [rad/s].
+        load_friction: Dry friction added per torque in the gear [-].
         armature: Rotor inertia seen at the output [kg·m²].
         delay: How much later the target arrives [s].
+        smoothing: Time constant of the filter on the target [s].
+        quantum: Step of the target [rad].
+        deadband: Half width of the errors that the servo ignores [rad].
         play: Full width of the backlash between rotor and output [rad].
+        compliance: Of the spring between rotor and output [rad/(N·m)].
+        supply_resistance: Resistance of the common supply as the motor's limits see it [Ω].
+        torque_constant: At the output [N·m/A].
+        duty_loss: Share of the driving torque lost at the torque limit [-].
+        fade: Loss of kp with time [1/s].
+        offset: Of the joint's zero: it goes to target + offset [rad].
+        sensor_delay: Age of what the encoder tells servo and log [s].
+        lower_stop, upper_stop: Where the joint hits something hard [rad].
+        motor_encoder: 1.0 where the encoder sits on the motor's side of play and compliance, else 0.0.
     """
 
     kp: np.ndarray
@@ -33,38 +51,108 @@ class Servo:
     no_load_speed: np.ndarray
     coulomb: np.ndarray
     viscous: np.ndarray
+    stribeck: np.ndarray
+    stribeck_velocity: np.ndarray
+    load_friction: np.ndarray
     armature: np.ndarray
     delay: np.ndarray
+    smoothing: np.ndarray
+    quantum: np.ndarray
+    deadband: np.ndarray
     play: np.ndarray
+    compliance: np.ndarray
+    supply_resistance: np.ndarray
+    torque_constant: np.ndarray
+    duty_loss: np.ndarray
+    fade: np.ndarray
+    offset: np.ndarray
+    sensor_delay: np.ndarray
+    lower_stop: np.ndarray
+    upper_stop: np.ndarray
+    motor_encoder: np.ndarray
+
+    @classmethod
+    def of(cls, **given: np.ndarray) -> Servo:
+        """Return servos with the given fields, the others such that they do nothing."""
+        zero = np.zeros(len(next(iter(given.values()))))
+        inert = {
+            "limit": zero + np.inf,
+            "no_load_speed": zero + np.inf,
+            "stribeck_velocity": zero + 1.0,
+            "torque_constant": zero + 1.0,
+            "lower_stop": zero - np.inf,
+            "upper_stop": zero + np.inf,
+        }
+        return cls(**{field.name: given.get(field.name, inert.get(field.name, zero)) for field in fields(cls)})
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Friction coefficients of foot and ground; Bullet multiplies them."""
+    """Of foot and ground.
+
+    Attributes:
+        foot_friction, ground_friction: Coefficients of friction; Bullet multiplies them.
+        stiffness, damping: Of the ground as a spring [N/m], [N·s/m]; None for a hard one.
+        roughness: Greatest height of the ground's random bumps [m]; 0 for a plane.
+        spacing: Distance of the bumps [m].
+    """
 
     foot_friction: float = 0.8
     ground_friction: float = 1.0
+    stiffness: float | None = None
+    damping: float = 0.0
+    roughness: float = 0.0
+    spacing: float = 0.1
 
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the log shows of the joints.
+    """What the log shows of the joints; each of shape (n_motors,).
 
     Attributes:
-        encoder_noise: Standard deviation of the logged positions [rad], shape (n_motors,).
+        encoder_noise: Standard deviation of the logged positions [rad].
+        bias: Added to the logged positions [rad].
     """
 
     encoder_noise: np.ndarray
+    bias: np.ndarray
+
+
+@dataclass(frozen=True)
+class Push:
+    """A force on a link's centre of mass for some time.
+
+    Attributes:
+        link: Name of the link.
+        force: In world axes [N], shape (3,).
+        start, end: From the start of the episode [s].
+    """
+
+    link: str
+    force: np.ndarray
+    start: float
+    end: float
 
 
 @dataclass(frozen=True)
 class Plant:
-    """Robot, servos, contact and sensors."""
+    """Robot, servos, contact, sensors, and what the surroundings do.
+
+    Attributes:
+        gravity: In world axes [m/s²], shape (3,).
+        pushes: Forces from outside.
+        action_noise: Standard deviation of the noise on each motor's target [rad], shape (n_motors,).
+        hook: A user's own joint torque: (motion (2, n_motors), time since the episode began [s]) -> (n_motors,) [N·m].
+    """
 
     robot: Robot
     servo: Servo
     contact: Contact
     sensors: Sensors
+    gravity: np.ndarray
+    action_noise: np.ndarray
+    pushes: tuple[Push, ...] = ()
+    hook: Hook | None = None
 
     def mask(self, joints: str | Sequence[str]) -> np.ndarray:
         """Return which motors a scope names, shape (n_motors,): `all`, a group of the robot, joint names or a mix.
@@ -96,15 +184,14 @@ def nominal(robot: Robot) -> Plant:
     joints = [robot.joint(name) for name in robot.motors]
     gains = np.array([robot.gains[name] for name in robot.motors])
     zero = np.zeros(len(joints))
-    servo = Servo(
+    servo = Servo.of(
         kp=gains[:, 0],
         kd=gains[:, 1],
         limit=np.array([joint.effort for joint in joints]),
         no_load_speed=robot.no_load_speed * np.array([joint.max_velocity for joint in joints]),
-        coulomb=zero,
-        viscous=zero,
         armature=np.array([joint.armature for joint in joints]),
-        delay=zero,
-        play=zero,
+        torque_constant=np.array([robot.torque_constant.get(name, 1.0) for name in robot.motors]),
+        motor_encoder=zero + (robot.encoder_side == "motor"),
     )
-    return Plant(robot, servo, Contact(), Sensors(encoder_noise=zero))
+    sensors = Sensors(encoder_noise=zero, bias=zero)
+    return Plant(robot, servo, Contact(), sensors, gravity=np.array([0.0, 0.0, -GRAVITY]), action_noise=zero)

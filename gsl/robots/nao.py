@@ -5,6 +5,8 @@ Sources:
        mass, inertias about them, limits, effort, speed. Only the left side is listed; the right one is its
        mirror image (A's right pelvis and arm tensors and ankle pitch limits are not exact mirrors: symmetrised).
     E  Aldebaran documentation, motor pages: gear ratios 1A 201.3, 1B 130.85, 2A 150.27, 2B 173.22.
+    B  Aldebaran documentation, battery page: 21.6 V nominal.
+    D  SimSpark SPL, nao.rsg: torque constants from experiments on a real NAO, at the output.
     M  maxon data sheets, RE-max 24 and RE-max 17: rotor inertia about 4.0e-7 and 8.7e-8 kg·m² (winding unknown).
 """
 
@@ -30,6 +32,9 @@ LEG_GAINS = (
     150.0,
     4.0,
 )  # [N·m/rad], [N·m·s/rad]: no published servo gains; chosen with the rotor inertia (docs/worlds.md)
+SUPPLY_VOLTAGE = 21.6  # [V] B
+TORQUE_CONSTANT = {"1A": 4.3, "1B": 2.8, "2A": 2.5, "2B": 2.5}  # [N·m/A] D
+ENCODER_STEP = 2.0 * np.pi / 4096  # [rad] E: 12 bits a turn
 ARM_GAINS = (0.35 * LEG_GAINS[0], 0.35 * LEG_GAINS[1])
 
 # name, mass [kg], centre of mass [m], inertia about it [1e-6 kg·m²] as (xx, xy, xz, yy, yz, zz); A
@@ -100,6 +105,11 @@ def nao() -> Robot:
         groups={"legs": legs, "arms": arms},
         feet={"left": "LFoot", "right": "RFoot"},
         gains={**dict.fromkeys(legs, LEG_GAINS), **dict.fromkeys(arms, ARM_GAINS)},
+        supply_voltage=SUPPLY_VOLTAGE,
+        torque_constant={
+            _right(row[0]) if right else row[0]: TORQUE_CONSTANT[row[-1]] for row in _JOINTS for right in (0, 1)
+        },
+        encoder_step=ENCODER_STEP,
         stance={f"{side}{joint}": angle for side in "LR" for joint, angle in _CROUCH.items()},
         upright_height=0.2,
     )

@@ -101,9 +101,10 @@ class BulletEnv(gymnasium.Env):
         if self._engine is None:
             physics = Physics(self.world.step, self.world.iterations, self.world.period, self.world.floating)
             self._engine = Engine(self._plant, physics)
-        self._engine.load(start.reading, start.commands)
+        before = 0 if options.get("start") else round(self.world.settle / self.world.period)
+        self._engine.load(start.reading, start.commands, -before * self.world.period)
         reading = self._engine.read()
-        for _ in range(0 if options.get("start") else round(self.world.settle / self.world.period)):
+        for _ in range(before):
             self._engine.run(start.commands[0])
             reading = self._engine.read()
         return self._observe(reading), {"fell": False}
@@ -115,7 +116,10 @@ class BulletEnv(gymnasium.Env):
             GslError: if the action has another size or holds what is not a finite number.
         """
         assert self._engine is not None, "reset comes first"
-        self._engine.run(self._checked(action)[self._drive])
+        targets, noise = self._checked(action)[self._drive], self._plant.action_noise
+        if noise.any():
+            targets = targets + noise * self.np_random.standard_normal(len(noise))
+        self._engine.run(targets)
         reading = self._engine.read()
         fell = self.world.floating and (reading.up < FALLEN_TILT or reading.place[2] < self._robot.upright_height)
         return self._observe(reading), 0.0, bool(fell), False, {"fell": bool(fell)}
@@ -140,7 +144,9 @@ class BulletEnv(gymnasium.Env):
     def _observe(self, reading: Reading) -> np.ndarray:
         n = self._n
         observation = np.empty(self.layout.size)
-        observation[:n], observation[n : 2 * n] = reading.motion[0, :n], reading.motion[1, :n]
+        assert self._engine is not None
+        told = self._engine.encoders(reading)
+        observation[:n], observation[n : 2 * n] = told[0, :n] + self._plant.sensors.bias[:n], told[1, :n]
         noise = self._plant.sensors.encoder_noise[:n]
         if noise.any():
             observation[:n] += noise * self.np_random.standard_normal(n)

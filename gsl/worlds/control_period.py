@@ -6,7 +6,7 @@ pybullet, for where there is no handle. Both do the same to the bit.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from numba import carray  # type: ignore[attr-defined]
 from gsl.core.compiled import compiled
 from gsl.worlds import bullet_c as c
 from gsl.worlds.rotor import Rotors, compensation
-from gsl.worlds.servo import servo_torque
+from gsl.worlds.servo import ServoState, servo_torque
 
 
 class Drive(NamedTuple):
@@ -46,8 +46,7 @@ class Memory(NamedTuple):
     """What changes in time, all of it in place, with n motors.
 
     Attributes:
-        commands: Targets of the last control periods, newest first [rad], shape (COMMANDS, n).
-        servo: State rows of the servos, shape (3, n).
+        servo: State of the servos.
         rotor: Memory of the compensation, shape (6, 3 + n).
         motion: Joint positions [rad] and velocities [rad/s] at this physics step, shape (2, n).
         spin: Angular velocity of the base in world axes, then in base axes [rad/s], shape (2, 3).
@@ -56,8 +55,7 @@ class Memory(NamedTuple):
         work: Scratch, shape (n, 18).
     """
 
-    commands: np.ndarray
-    servo: np.ndarray
+    servo: ServoState
     rotor: np.ndarray
     motion: np.ndarray
     spin: np.ndarray
@@ -66,11 +64,10 @@ class Memory(NamedTuple):
     work: np.ndarray
 
 
-def first_memory(commands: np.ndarray, servo: np.ndarray) -> Memory:
-    """Return the memory at the start, given that of the servos, see `servo.ServoState`."""
-    n = commands.shape[1]
+def first_memory(servo: ServoState) -> Memory:
+    """Return the memory at the start, given that of the servos."""
+    n = servo.memory.shape[1]
     return Memory(
-        commands,
         servo,
         rotor=np.zeros((6, 3 + n)),
         motion=np.zeros((2, n)),
@@ -93,7 +90,7 @@ def torques(drive: Drive, memory: Memory, turn: np.ndarray, elapsed: float, step
         step: Physics period [s].
         period: Control period [s].
     """
-    servo_torque(drive.servo, memory.commands, memory.servo, memory.motion, elapsed, step, period, memory.torque)
+    servo_torque(drive.servo, memory.servo, memory.motion, elapsed, step, period, memory.torque)
     world, base = memory.spin[0], memory.spin[1]
     for k in range(3):
         base[k] = world[0] * turn[0, k] + world[1] * turn[1, k] + world[2] * turn[2, k]
@@ -165,14 +162,31 @@ def read_joints(handle: int, body: int, places: np.ndarray, motion: np.ndarray, 
 def in_python(
     bullet: Any, client: int, body: int, joints: Sequence[int],
     floating: bool, substeps: int, step: float, period: float, drive: Drive, memory: Memory, turn: np.ndarray,
+    outside: Callable[[np.ndarray, float], np.ndarray] | None = None,
 ) -> None:  # fmt: skip
-    """Do as `in_c` does, by pybullet; `joints` are Bullet's numbers of the motors."""
+    """Do as `in_c` does, by pybullet.
+
+    Args:
+        bullet: The module.
+        client: pybullet's number of the client.
+        body: pybullet's number of the robot.
+        joints: Bullet's numbers of the motors.
+        floating: See `in_c`, as for what follows.
+        substeps: Physics steps.
+        step: Physics period [s].
+        period: Control period [s].
+        drive: Parameters.
+        memory: Moved on.
+        turn: From base to world axes, shape (3, 3).
+        outside: Given motion and time, applies what acts from outside and returns more joint torques [N·m].
+    """
     for k in range(substeps):
         memory.motion[0], memory.motion[1], _, _ = zip(*bullet.getJointStates(body, joints, client), strict=True)
         if floating:
             memory.spin[0] = bullet.getBaseVelocity(body, client)[1]
         torques(drive, memory, turn, k * step, step, period)
-        forces = memory.torque.tolist()
+        more = 0.0 if outside is None else outside(memory.motion, memory.servo.clock[0] + k * step)
+        forces = (memory.torque + more).tolist()
         bullet.setJointMotorControlArray(body, joints, bullet.TORQUE_CONTROL, forces=forces, physicsClientId=client)
         if floating:
             bullet.applyExternalTorque(body, c.BASE, memory.push.tolist(), bullet.LINK_FRAME, client)

@@ -20,9 +20,8 @@ from gsl.worlds.base_frame import base_motion
 from gsl.worlds.bullet_c import NO_HANDLE, client_handle
 from gsl.worlds.control_period import Drive, first_memory, in_c, in_python, read_joints
 from gsl.worlds.rotor import carried_inertia, rotors
-from gsl.worlds.servo import first_state, packed
+from gsl.worlds.servo import ROTOR, encoder_motion, first_state, packed
 
-GRAVITY = 9.81  # [m/s²]
 NOTHING = -1  # Bullet's number of a robot that is not loaded yet
 # The visual keeps Bullet from preparing to draw the plane at every load, which takes half a millisecond.
 _GROUND = """<robot name="ground"><link name="ground"><inertial><mass value="0"/>
@@ -105,8 +104,8 @@ class Engine:
         self.body = NOTHING
         self.plant, self.physics, self.robot = plant, physics, lumped(plant.robot)
         self.handle = client_handle(pybullet.__file__, self.client)
-        servo = packed(plant.servo)
-        armature = plant.servo.armature - servo[-1]  # what is beyond the play turns on its own
+        servo = packed(plant.servo, plant.robot.supply_voltage)
+        armature = plant.servo.armature - servo[ROTOR]  # what is beyond the play turns on its own
         rotor = rotors(self.robot, armature, floating=physics.floating)
         self._loaded = _heavier(self.robot, carried_inertia(self.robot, rotor.carried))
         self._inertia = {name: principal_axes(link.inertia)[0].tolist() for name, link in self._loaded.links.items()}
@@ -123,12 +122,13 @@ class Engine:
         self.bullet.disconnect(self.client)
         self._folder.cleanup()
 
-    def load(self, reading: Reading, commands: np.ndarray) -> None:
+    def load(self, reading: Reading, commands: np.ndarray, clock: float = 0.0) -> None:
         """Start from nothing in a measured state.
 
         Args:
             reading: Where the robot is and how it moves; forces are what follows, not what is set.
             commands: Targets so far, newest first [rad], shape (k, n_motors); the oldest one stands for all before.
+            clock: Time since the episode began [s], negative before it.
         """
         b, client, physics = self.bullet, self.client, self.physics
         if self.body == NOTHING:
@@ -151,7 +151,7 @@ class Engine:
         centre = reading.velocity + np.cross(spin, turn @ self._base_com)
         if physics.floating and (spin.any() or centre.any()):
             b.resetBaseVelocity(self.body, centre.tolist(), spin.tolist(), client)
-        self._start(commands)
+        self._start(commands, clock)
 
     def _begin(self) -> None:
         """Set up an empty world with its ground."""
@@ -164,7 +164,7 @@ class Engine:
             enableFileCaching=0,
             physicsClientId=client,
         )
-        b.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
+        b.setGravity(*self.plant.gravity.tolist(), physicsClientId=client)
         if physics.floating:
             ground = b.loadURDF(f"{self._folder.name}/ground.urdf", physicsClientId=client)
             b.changeDynamics(ground, -1, lateralFriction=self.plant.contact.ground_friction, physicsClientId=client)
@@ -172,13 +172,16 @@ class Engine:
     def run(self, targets: np.ndarray) -> None:
         """Hold motor `targets` [rad], shape (n_motors,), for one control period."""
         physics, memory = self.physics, self._memory
-        memory.commands[1:] = memory.commands[:-1]
-        memory.commands[0] = targets
-        times = (physics.floating, physics.substeps, physics.step, physics.period)
-        if self.handle == NO_HANDLE:
-            in_python(self.bullet, self.client, self.body, self.joints, *times, self._drive, memory, self._base_turn)
+        memory.servo.commands[1:] = memory.servo.commands[:-1]
+        memory.servo.commands[0] = targets
+        rest = (physics.floating, physics.substeps, physics.step, physics.period, self._drive, memory, self._base_turn)
+        if self.plant.pushes or self.plant.hook:
+            in_python(self.bullet, self.client, self.body, self.joints, *rest, self._outside)
+        elif self.handle == NO_HANDLE:
+            in_python(self.bullet, self.client, self.body, self.joints, *rest)
         else:
-            in_c(self.handle, self.body, self._places, *times, self._drive, memory, self._base_turn)
+            in_c(self.handle, self.body, self._places, *rest)
+        memory.servo.clock[0] += physics.period
 
     def read(self) -> Reading:
         """Measure the robot now, and remember its orientation for the next control period."""
@@ -190,6 +193,30 @@ class Engine:
         turned = b.multiplyTransforms((0, 0, 0), quaternion, (0, 0, 0), self._link_from_inertial)[1]
         up = float(base.turn[2, 2])
         return Reading(self._joint_motion(), base.place, turned, base.velocity, base.gyro, up, self._foot_force())
+
+    def encoders(self, reading: Reading) -> np.ndarray:
+        """Return what the encoders tell of the motors' positions [rad] and velocities [rad/s], shape (2, n_motors)."""
+        told = np.empty_like(reading.motion)
+        encoder_motion(self._drive.servo, self._memory.servo, reading.motion, self.physics.step, told)
+        return told
+
+    def _outside(self, motion: np.ndarray, time: float) -> np.ndarray:
+        """Push the robot's links and return the joint torques of a user's own effect [N·m], shape (n_motors,)."""
+        b, client = self.bullet, self.client
+        for push in self.plant.pushes:
+            if push.start <= time < push.end:
+                centre = self._centre_of_mass(self.links[push.link])
+                b.applyExternalForce(
+                    self.body, self.links[push.link], push.force.tolist(), centre, b.WORLD_FRAME, client
+                )
+        return np.zeros(len(self.joints)) if self.plant.hook is None else self.plant.hook(motion, time)
+
+    def _centre_of_mass(self, link: int) -> Sequence[float]:
+        """Return where a link's centre of mass is, in world axes [m]."""
+        b, body, client = self.bullet, self.body, self.client
+        if link < 0:
+            return b.getBasePositionAndOrientation(body, client)[0]
+        return b.getLinkState(body, link, computeForwardKinematics=True, physicsClientId=client)[0]
 
     def _joint_motion(self) -> np.ndarray:
         motion = np.empty((2, len(self.joints)))
@@ -229,13 +256,13 @@ class Engine:
                 physicsClientId=client,
             )
 
-    def _start(self, commands: np.ndarray) -> None:
+    def _start(self, commands: np.ndarray, clock: float) -> None:
         """Release the default velocity motors and clear what the servos remember."""
         n = len(self.joints)
         self.bullet.setJointMotorControlArray(
             self.body, self.joints, self.bullet.VELOCITY_CONTROL, forces=[0.0] * n, physicsClientId=self.client
         )
-        self._memory = first_memory(*first_state(commands, self.read().motion))
+        self._memory = first_memory(first_state(commands, self.read().motion, self.physics.step, clock))
 
 
 def _heavier(robot: Robot, extra: Mapping[str, np.ndarray]) -> Robot:

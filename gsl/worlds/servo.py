@@ -1,12 +1,15 @@
 """The joint servo, compiled: from targets and joint motion to the torque of every joint at one physics step.
 
-    e = target(t - delay) - q             q at the output encoder
-    u = clip(kp e - kd dq/dt)             driving torque falls to zero at the no-load speed, braking torque does not
-    rotor inertia                         see rotor.py; beyond backlash the rotor is a second mass of its own
-    torque = u - viscous dq/dt - dry friction
+    target <- command(t - delay), smoothed, rounded
+    e = dead(target + offset - q)                     q as the encoder tells it
+    u = clip(kp (1 - fade t) e - kd dq/dt)            driving torque falls to zero at the no-load speed, braking not
+    rotor inertia                                     see rotor.py; beyond play or a spring the rotor is a second mass
+    torque = u (1 - duty_loss |u| / limit) - viscous dq/dt - dry friction - hard stops
 
-Dry friction is a bristle that gives way at the Coulomb torque (Dahl 1968): torque = k z, z follows the motion and is
-held within +-BRISTLE; it holds a joint at rest under load without creep, which a clipped stopping torque does not.
+Dry friction is a bristle that gives way at the friction's size (Dahl 1968): torque = k z, z follows the motion and is
+held within +-BRISTLE; it holds a joint at rest under load without creep, which a clipped stopping torque does not. Its
+size is coulomb + stribeck exp(-(v / stribeck_velocity)²) + load_friction |u - external torque| (Rhoban/bam, M4), the
+external torque being what the last physics step tells: armature · acceleration - u + friction.
 """
 
 from __future__ import annotations
@@ -17,95 +20,138 @@ import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.plant import Servo
+from gsl.worlds.drive_train import ROTOR_SHARE, limited, through_gear
+from gsl.worlds.encoder import REMEMBERED, first_history, seen
 
 BRISTLE = 1e-3  # deflection at which dry friction slips [rad]: below an encoder's noise, stable at 2 ms with our rotors
-TOOTH_STIFFNESS = 300.0  # of the gear teeth in contact, if there is play [N·m/rad]: an estimate
-ROTOR_SHARE = 0.7  # of the armature that is beyond the play; the rest moves with the output and keeps 2 ms stable
-TOOTH_SUBSTEPS = 8
+STOP_STIFFNESS, STOP_DAMPING = 500.0, 2.0  # of a hard stop [N·m/rad], [N·m·s/rad]: stable at 2 ms with our rotors
 COMMANDS = 16  # control periods of targets that are remembered: the longest delay
 
-KP, KD, LIMIT, NO_LOAD, COULOMB, VISCOUS, DELAY, PLAY, ROTOR = range(9)  # rows of the parameters
-BENT, ROTOR_ANGLE, ROTOR_SPEED = range(3)  # rows of the state
+(
+    KP, KD, LIMIT, NO_LOAD, COULOMB, VISCOUS, STRIBECK, STRIBECK_VELOCITY, LOAD, OUTPUT_ARMATURE, DELAY, SMOOTHING,
+    QUANTUM, DEADBAND, PLAY, COMPLIANCE, SAG, DUTY_LOSS, FADE, OFFSET, SENSOR_DELAY, LOWER, UPPER, MOTOR_ENCODER,
+    PER_AMPERE, ROTOR,
+) = range(26)  # rows of the parameters  # fmt: skip
+BENT, ROTOR_ANGLE, ROTOR_SPEED, SMOOTHED, SPEED, DRIVE, THROUGH, FRICTION = range(8)  # rows of the state
 
 
 class ServoState(NamedTuple):
-    """What changes in time; `servo_torque` writes into `memory`.
+    """What changes in time, all of it in place.
 
     Attributes:
         commands: Targets of the last control periods, newest first [rad], shape (COMMANDS, n_motors).
-        memory: Bristle deflection [rad], rotor angle [rad] and speed [rad/s] as seen at the output, (3, n_motors).
+        memory: Bristle deflection [rad]; rotor angle [rad] and speed [rad/s] as seen at the output; filtered target
+            [rad]; at the last physics step: output speed [rad/s], motor torque, torque through the gear, friction
+            [N·m]; shape (8, n_motors).
+        history: What the encoders measured at the last physics steps, see `encoder.seen`.
+        clock: Time of the newest command since the episode began [s] and number of physics steps so far, shape (2,).
     """
 
     commands: np.ndarray
     memory: np.ndarray
+    history: np.ndarray
+    clock: np.ndarray
 
 
-def packed(servo: Servo) -> np.ndarray:
-    """Return the parameters as the kernel reads them, shape (9, n_motors)."""
-    rotor = np.where(servo.play > 0.0, ROTOR_SHARE * servo.armature, 0.0)
+def packed(servo: Servo, supply_voltage: float) -> np.ndarray:
+    """Return the parameters as the kernel reads them, shape (26, n_motors).
+
+    Args:
+        servo: The servos.
+        supply_voltage: Of the common supply without load [V].
+    """
+    two_masses = (servo.play > 0.0) | (servo.compliance > 0.0)
+    rotor = np.where(two_masses, ROTOR_SHARE * servo.armature, 0.0)
     rows = (
-        servo.kp,
-        servo.kd,
-        servo.limit,
-        servo.no_load_speed,
-        servo.coulomb,
-        servo.viscous,
-        servo.delay,
-        servo.play,
-        rotor,
-    )
+        servo.kp, servo.kd, servo.limit, servo.no_load_speed, servo.coulomb, servo.viscous, servo.stribeck,
+        servo.stribeck_velocity, servo.load_friction, servo.armature - rotor, servo.delay, servo.smoothing,
+        servo.quantum, servo.deadband, servo.play, servo.compliance, servo.supply_resistance / supply_voltage,
+        servo.duty_loss, servo.fade, servo.offset, servo.sensor_delay, servo.lower_stop, servo.upper_stop,
+        servo.motor_encoder, 1.0 / servo.torque_constant, rotor,
+    )  # fmt: skip
     return np.array(rows)
 
 
-def first_state(commands: np.ndarray, motion: np.ndarray) -> ServoState:
-    """Return the state of servos in motion, their bristles slack and their gaps centred.
+def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: float = 0.0) -> ServoState:
+    """Return the state of servos in motion, their bristles slack, gaps centred and filters settled.
 
     Args:
         commands: Targets so far, newest first [rad], shape (k, n_motors); the oldest one is taken to be older still.
         motion: Positions [rad] and velocities [rad/s] at the output, shape (2, n_motors).
+        step: Physics period [s].
+        clock: Time since the episode began [s].
     """
     older = np.repeat(commands[-1:], max(0, COMMANDS - len(commands)), axis=0)
-    return ServoState(np.vstack([commands, older])[:COMMANDS].copy(), np.vstack([np.zeros(motion.shape[1]), motion]))
+    memory = np.zeros((8, motion.shape[1]))
+    memory[ROTOR_ANGLE], memory[ROTOR_SPEED], memory[SMOOTHED], memory[SPEED] = *motion, commands[0], motion[1]
+    return ServoState(
+        np.vstack([commands, older])[:COMMANDS].copy(), memory, first_history(motion, step), np.array([clock, 0.0])
+    )
 
 
 @compiled
 def servo_torque(
     parameters: np.ndarray,
-    commands: np.ndarray,
-    memory: np.ndarray,
+    state: ServoState,
     motion: np.ndarray,
     elapsed: float,
     step: float,
     period: float,
     torque: np.ndarray,
 ) -> None:
-    """Fill `torque` [N·m] for one physics step and move `memory` on.
+    """Fill `torque` [N·m] for one physics step and move `state` on.
 
     Args:
         parameters: From `packed`.
-        commands: Targets, newest first [rad], shape (COMMANDS, n_motors).
-        memory: State rows, changed in place.
-        motion: Positions [rad] then velocities [rad/s], shape (2, n_motors).
+        state: Changed in place, but for `commands` and the time, which are the caller's.
+        motion: Positions [rad] then velocities [rad/s] at the output, shape (2, n_motors).
         elapsed: Time since the newest command was issued [s].
         step: Physics period [s].
         period: Control period [s].
         torque: Result, shape (n_motors,).
     """
+    memory, count = state.memory, int(state.clock[1])
+    current = 0.0
     for i in range(motion.shape[1]):
-        q, v = motion[0, i], motion[1, i]
-        target = _delayed(commands, i, (elapsed - parameters[DELAY, i]) / period, step / period)
-        u = parameters[KP, i] * (target - q) - parameters[KD, i] * v
-        bound = parameters[LIMIT, i]
-        if parameters[PLAY, i] > 0.0:
-            through = _through_teeth(parameters, memory, i, q, v, u, step)
-        else:
-            through = _limited(u, v, bound, parameters[NO_LOAD, i])
-        friction = parameters[VISCOUS, i] * v
-        if parameters[COULOMB, i] > 0.0:
-            bent = min(BRISTLE, max(-BRISTLE, memory[BENT, i] + v * step))
-            memory[BENT, i] = bent
-            friction += parameters[COULOMB, i] * bent / BRISTLE
-        torque[i] = through - friction
+        current += abs(memory[DRIVE, i]) * parameters[PER_AMPERE, i]
+    for i in range(motion.shape[1]):
+        target = _delayed(state.commands, i, (elapsed - parameters[DELAY, i]) / period, step / period)
+        target = _shaped(parameters, memory, i, target, step)
+        encoder = (
+            memory[ROTOR_ANGLE : ROTOR_SPEED + 1]
+            if parameters[MOTOR_ENCODER, i] * parameters[ROTOR, i] > 0.0
+            else motion
+        )
+        q, v = encoder[0, i], encoder[1, i]
+        if parameters[SENSOR_DELAY, i] > 0.0:
+            delay = parameters[SENSOR_DELAY, i]
+            q = seen(delay, state.history, count, encoder, 0, i, step)
+            v = seen(delay, state.history, count, encoder, 1, i, step)
+            state.history[count % REMEMBERED, :, i] = encoder[:, i]
+        fade = max(0.0, 1.0 - parameters[FADE, i] * max(0.0, state.clock[0] + elapsed))
+        error = target + parameters[OFFSET, i] - q
+        error -= min(parameters[DEADBAND, i], max(-parameters[DEADBAND, i], error))
+        u = fade * parameters[KP, i] * error - parameters[KD, i] * v
+        torque[i] = _output(parameters, memory, i, motion, u, max(1e-3, 1.0 - parameters[SAG, i] * current), step)
+    state.clock[1] += 1.0
+
+
+@compiled
+def encoder_motion(
+    parameters: np.ndarray, state: ServoState, motion: np.ndarray, step: float, told: np.ndarray
+) -> None:
+    """Fill `told` with what the encoders tell between two physics steps, given the outputs', both (2, n_motors)."""
+    count = int(state.clock[1])
+    for i in range(motion.shape[1]):
+        encoder = (
+            state.memory[ROTOR_ANGLE : ROTOR_SPEED + 1]
+            if parameters[MOTOR_ENCODER, i] * parameters[ROTOR, i] > 0.0
+            else motion
+        )
+        told[0, i], told[1, i] = encoder[0, i], encoder[1, i]
+        if parameters[SENSOR_DELAY, i] > 0.0:
+            for row in range(2):
+                told[row, i] = seen(parameters[SENSOR_DELAY, i], state.history, count, encoder, row, i, step)
 
 
 @compiled
@@ -126,31 +172,55 @@ def _delayed(commands: np.ndarray, i: int, start: float, length: float) -> float
 
 
 @compiled
-def _limited(u: float, v: float, bound: float, no_load: float) -> float:
-    high = bound * min(1.0, max(0.0, 1.0 - v / no_load)) if v > 0.0 else bound
-    low = bound * min(1.0, max(0.0, 1.0 + v / no_load)) if v < 0.0 else bound
-    return min(high, max(-low, u))
+def _shaped(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, step: float) -> float:
+    """Filter and round a target [rad]."""
+    if parameters[SMOOTHING, i] > 0.0:
+        memory[SMOOTHED, i] += (1.0 - np.exp(-step / parameters[SMOOTHING, i])) * (target - memory[SMOOTHED, i])
+        target = memory[SMOOTHED, i]
+    quantum = parameters[QUANTUM, i]
+    return float(quantum * np.rint(target / quantum)) if quantum > 0.0 else float(target)
 
 
 @compiled
-def _through_teeth(
-    parameters: np.ndarray, memory: np.ndarray, i: int, q: float, v: float, u: float, step: float
+def _output(
+    parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndarray, u: float, supply: float, step: float
 ) -> float:
-    """Torque that the teeth pass on; the rotor is integrated in substeps with the teeth's push and damping."""
-    inertia, half = parameters[ROTOR, i], 0.5 * parameters[PLAY, i]
-    damping = 0.2 * np.sqrt(TOOTH_STIFFNESS * inertia)
-    h, passed = step / TOOTH_SUBSTEPS, 0.0
-    angle, speed = memory[ROTOR_ANGLE, i], memory[ROTOR_SPEED, i]
-    for k in range(TOOTH_SUBSTEPS):
-        gap = angle - (q + v * h * k)
-        push = 0.0
-        if gap > half:
-            push = max(0.0, TOOTH_STIFFNESS * (gap - half) + damping * (speed - v))
-        elif gap < -half:
-            push = min(0.0, TOOTH_STIFFNESS * (gap + half) + damping * (speed - v))
-        drive = _limited(u, speed, parameters[LIMIT, i], parameters[NO_LOAD, i])
-        speed += h * (drive - push) / inertia
-        angle += h * speed
-        passed += push / TOOTH_SUBSTEPS
-    memory[ROTOR_ANGLE, i], memory[ROTOR_SPEED, i] = angle, speed
-    return passed
+    """Return the torque at the output, given what the servo wants and the supply's share of its voltage."""
+    q, v = motion[0, i], motion[1, i]
+    bound, no_load = supply * parameters[LIMIT, i], supply * parameters[NO_LOAD, i]
+    if parameters[DUTY_LOSS, i] > 0.0:
+        limit = parameters[LIMIT, i]
+        u = min(limit, max(-limit, u))
+        u *= 1.0 - parameters[DUTY_LOSS, i] * abs(u) / limit
+    drive = limited(u, v, bound, no_load)
+    through = drive
+    if parameters[ROTOR, i] > 0.0:
+        through = through_gear(
+            memory[ROTOR_ANGLE : ROTOR_SPEED + 1], i, motion, u, bound, no_load, parameters[ROTOR, i],
+            parameters[PLAY, i], parameters[COMPLIANCE, i], step,
+        )  # fmt: skip
+    friction = parameters[VISCOUS, i] * v + _dry(parameters, memory, i, v, through, step)
+    memory[DRIVE, i], memory[THROUGH, i], memory[FRICTION, i], memory[SPEED, i] = drive, through, friction, v
+    return through - friction + _stop(q - parameters[UPPER, i], v) - _stop(parameters[LOWER, i] - q, -v)
+
+
+@compiled
+def _dry(parameters: np.ndarray, memory: np.ndarray, i: int, v: float, through: float, step: float) -> float:
+    size = parameters[COULOMB, i]
+    if parameters[STRIBECK, i] > 0.0:
+        size += parameters[STRIBECK, i] * np.exp(-((v / parameters[STRIBECK_VELOCITY, i]) ** 2))
+    if parameters[LOAD, i] > 0.0:
+        inertial = parameters[OUTPUT_ARMATURE, i] * (v - memory[SPEED, i]) / step
+        external = inertial - memory[THROUGH, i] + memory[FRICTION, i]
+        size += parameters[LOAD, i] * abs(through - external)
+    if size == 0.0:
+        return 0.0
+    bent = min(BRISTLE, max(-BRISTLE, memory[BENT, i] + v * step))
+    memory[BENT, i] = bent
+    return float(size * bent / BRISTLE)
+
+
+@compiled
+def _stop(beyond: float, v: float) -> float:
+    """Return the torque of a stop that only pushes back [N·m], `beyond` it [rad] at speed v away from it."""
+    return -max(0.0, STOP_STIFFNESS * beyond + STOP_DAMPING * v) if beyond > 0.0 else 0.0
