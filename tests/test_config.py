@@ -198,15 +198,16 @@ def _choices() -> Iterator[tuple[str, ...]]:
     conf = configuration_folder()
     for command in sorted(conf.glob("*.yaml")):
         groups = [entry for entry in yaml.safe_load(command.read_text())["defaults"] if isinstance(entry, dict)]
-        found = [_typed(next(iter(entry)).lstrip("/"), conf) for entry in groups]
+        found = [_typed(next(iter(entry)).lstrip("/"), conf, command.stem) for entry in groups]
         for number in range(max(map(len, found))):
             yield command.stem.replace("_", "-"), *(typed[min(number, len(typed) - 1)] for typed in found)
     yield from [("iterate", f"experiment={option.stem}") for option in sorted((conf / "experiment").glob("*.yaml"))]
 
 
-def _typed(group: str, conf: Path) -> list[str]:
+def _typed(group: str, conf: Path, command: str) -> list[str]:
     folder, _, role = group.partition("@")
-    return [f"{role or folder}={option.stem}" for option in sorted((conf / folder).glob("*.yaml"))]
+    found = (option.stem for option in sorted((conf / folder).glob("*.yaml")))
+    return [f"{role or folder}={name}" for name in found if name != "excite" or command == "collect"]
 
 
 @pytest.mark.parametrize("line", list(_choices()), ids=" ".join)

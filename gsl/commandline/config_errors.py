@@ -46,11 +46,12 @@ def unknown_key(error: Exception) -> str | None:
 
 
 def unfit(command: str, arguments: Sequence[str], unknown: str | None) -> ConfigError | None:
-    """Return the error for an experiment that sets what a command does not have, if that is the matter."""
+    """Return the error for an experiment or task that sets what a command does not have, if that is the matter."""
     typed = dict(one.lstrip("+").partition("=")[::2] for one in arguments)
-    if unknown is None or unknown in typed or "experiment" not in typed:
+    key = next((key for key in typed if key.rpartition(".")[2] in ("experiment", "task")), None)
+    if unknown is None or unknown in typed or key is None:
         return None
-    return ConfigError("experiment", f"is not for gsl {command}, which has no {unknown}", given=typed["experiment"])
+    return ConfigError(key, f"is not for gsl {command}, which cannot take its {unknown}", given=typed[key])
 
 
 def translated(error: Exception, words: Vocabulary) -> Exception:

@@ -33,9 +33,10 @@ def account(artifact: Artifact) -> list[Told]:
 
 
 def _collect(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    titles = ("episodes", "steps", "falls", f"value of π0 [{unit.name}]")
-    row = (metrics["episodes"], f"{metrics['steps']:,}", metrics["falls"], unit.bare(metrics["value"]))
-    return Told("trajectories", titles, [tuple(map(str, row))])
+    row = {"episodes": metrics["episodes"], "steps": f"{metrics['steps']:,}", "falls": metrics["falls"]}
+    if metrics["value"] is not None:
+        row[f"value of π0 [{unit.name}]"] = unit.bare(metrics["value"])
+    return Told("trajectories", tuple(row), [tuple(map(str, row.values()))])
 
 
 def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:

@@ -14,8 +14,10 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.grounding.ane import ActionNoise
 from gsl.policies.policy import Policy, neighbour
+from gsl.policies.programme import Piece, Programmed
 from gsl.stages.choices import PolicyChoice
 from gsl.stages.population import Job, Workers, trajectories
+from gsl.stages.programme import command_file, playing
 from gsl.stages.rollout import Scenario
 from gsl.storage.trajectories import write
 from gsl.tasks.task import Task
@@ -26,7 +28,10 @@ FILE = "trajectories.parquet"
 
 @component
 class Collect:
-    """`episodes` of the policy itself, then `neighbours` episodes of one perturbed policy each."""
+    """`episodes` of the policy itself, then `neighbours` episodes of one perturbed policy each.
+
+    A policy with a programme (programme.py) plays that instead, whatever the two numbers are.
+    """
 
     kind: ClassVar[str] = "collect"
 
@@ -43,20 +48,21 @@ class Collect:
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def parents(self) -> Mapping[str, Path]:
-        """Return the artifact that the parameters come from, if any."""
-        return PolicyChoice(self.policy, self.initial).parents("initial")
+        """Return the artifact that the parameters come from and the file that is played, if any."""
+        return {**PolicyChoice(self.policy, self.initial).parents("initial"), **command_file(self.policy)}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write one parquet file."""
-        parameters = PolicyChoice(self.policy, self.initial).parameters()
-        scenario = Scenario(self.world, self.task, self.policy, self.role, ActionNoise(sd=self.action_noise))
-        names, jobs = self._jobs(parameters)
+        layout = self.world.layout
+        policy = playing(self.policy, layout)
+        scenario = Scenario(self.world, self.task, policy, self.role, ActionNoise(sd=self.action_noise))
+        pieces = policy.programme if isinstance(policy, Programmed) else self._pieces()
+        jobs = [
+            Job(piece.parameters, derived_seed(self.seed, self.kind, self.role, index))
+            for index, piece in enumerate(pieces)
+        ]
         with console.progress(len(jobs), f"collecting in the {self.role} world") as progress:
             episodes = trajectories(scenario, jobs, workers=self.workers, progress=progress)
-        layout = self.world.layout
-        labels = [
-            {"policy": name, "parameters": job.parameters.tolist()} for name, job in zip(names, jobs, strict=True)
-        ]
         about = {
             "robot": getattr(self.world, "robot", ""),
             "role": self.role,
@@ -65,24 +71,25 @@ class Collect:
             "world": described(self.world),
             "policy": described(self.policy),
             "action_noise": self.action_noise,
-            "episodes": labels,
+            "episodes": [
+                {"policy": piece.label, "parameters": piece.parameters.tolist(), **piece.about} for piece in pieces
+            ],
         }
         write(folder / FILE, Batch(tuple(episodes), layout.joints, layout.control_period, about))
-        falls = sum(episode.ended_in_a_fall for episode in episodes)
-        values = [episode.value for episode in episodes[: self.episodes]]
+        steps, own = sum(map(len, episodes)), [one.value for one in episodes[: self.episodes]]
         return {
             "episodes": len(jobs),
             "real_episodes": len(jobs) if self.role == "real" else 0,
-            "steps": sum(map(len, episodes)),
-            "falls": falls,
-            "value": float(np.mean(values)),
+            "steps": steps,
+            "seconds": steps * layout.control_period,
+            "falls": sum(episode.ended_in_a_fall for episode in episodes),
+            "value": None if isinstance(policy, Programmed) else float(np.mean(own)),
         }
 
-    def _jobs(self, parameters: np.ndarray) -> tuple[list[str], list[Job]]:
+    def _pieces(self) -> tuple[Piece, ...]:
+        """Return the episodes of the policy itself, then those of its neighbours."""
+        parameters = PolicyChoice(self.policy, self.initial).parameters()
         rng = np.random.default_rng(derived_seed(self.seed, self.kind, self.role))
         near = [neighbour(self.policy, parameters, self.spread, rng) for _ in range(self.neighbours)]
-        names = ["pi0"] * self.episodes + [f"neighbour_{index + 1:02d}" for index in range(self.neighbours)]
-        chosen = [parameters] * self.episodes + near
-        return names, [
-            Job(theta, derived_seed(self.seed, self.kind, self.role, index)) for index, theta in enumerate(chosen)
-        ]
+        itself = [Piece("pi0", parameters, {})] * self.episodes
+        return (*itself, *(Piece(f"neighbour_{index + 1:02d}", theta, {}) for index, theta in enumerate(near)))

@@ -62,7 +62,8 @@ def falls(count: int, episodes: int | None = None) -> str:
 
 
 def _collect(metrics: Metrics, unit: Unit) -> str:
-    return f"{metrics['episodes']} episodes, {falls(metrics['falls'])}, π0 {unit.shown(metrics['value'])}"
+    told = f"{metrics['episodes']} episodes, {falls(metrics['falls'])}"
+    return told if metrics["value"] is None else f"{told}, π0 {unit.shown(metrics['value'])}"
 
 
 def _train_forward(metrics: Metrics, unit: Unit) -> str:

@@ -12,6 +12,7 @@ from gsl.core.trajectory import Trajectory
 from gsl.errors import ConfigError
 from gsl.grounding.grounding import Grounding
 from gsl.policies.policy import Policy
+from gsl.policies.programme import OpenLoopRun
 from gsl.tasks.task import Task
 from gsl.worlds.grounded import GroundedEnv
 from gsl.worlds.world import World
@@ -36,7 +37,7 @@ class Scenario:
 
     @property
     def ticks(self) -> int:
-        """Control steps of an episode that does not end early."""
+        """Control steps of an episode that does not end early; an open-loop policy has its own number."""
         return round(self.task.duration / self.world.layout.control_period)
 
     def make(self) -> gymnasium.Env:
@@ -58,7 +59,7 @@ def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed
     policy = scenario.policy.start(parameters, layout)
     task = scenario.task.start(layout, observation, scenario.role)
     observations, actions, sent, rewards, fell = [observation], [], [], [], False
-    for _ in range(scenario.ticks):
+    for _ in range(policy.ticks if isinstance(policy, OpenLoopRun) else scenario.ticks):
         action = policy.act(observation)
         before, (observation, _, fell, _, info) = observation, env.step(action)
         judged = task.step(before, observation, fell)
