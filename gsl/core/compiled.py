@@ -18,10 +18,10 @@ F = TypeVar("F", bound=Callable[..., object])
 
 
 def compiled(function: F) -> F:
-    """Compile a function when it is first called, or take it from the cache."""
+    """Compile a function when it is first called, or take it from the cache; threads may run it side by side."""
     if "NUMBA_CACHE_DIR" not in os.environ:
         numba.config.CACHE_DIR = _folder()  # type: ignore[attr-defined]
-    return numba.njit(cache=True)(function)  # type: ignore[return-value]
+    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[return-value]
 
 
 @cache

@@ -32,6 +32,7 @@ def seen(
     return float((1.0 - share) * newer + share * older)
 
 
+@compiled
 def first_history(motion: np.ndarray, step: float) -> np.ndarray:
     """Return the history of joints that have moved at constant speed, shape (REMEMBERED, 2, n_motors).
 
@@ -39,7 +40,8 @@ def first_history(motion: np.ndarray, step: float) -> np.ndarray:
         motion: Positions [rad] and velocities [rad/s] now, shape (2, n_motors).
         step: Physics period [s].
     """
-    ages = step * np.arange(REMEMBERED, 0, -1)
-    return np.stack(
-        [motion[0] - ages[:, None] * motion[1], np.broadcast_to(motion[1], (REMEMBERED, motion.shape[1]))], axis=1
-    )
+    history = np.empty((REMEMBERED, 2, motion.shape[1]))
+    for k in range(REMEMBERED):
+        history[k, 0] = motion[0] - (REMEMBERED - k) * step * motion[1]
+        history[k, 1] = motion[1]
+    return history
