@@ -141,6 +141,16 @@ def with_mass(link: Link, mass: float, com: np.ndarray, inertia: np.ndarray) -> 
     return replace(link, mass=total, com=joint_com, inertia=np.sum(moved, axis=0))
 
 
+def carrier(robot: Robot, link: str, point: np.ndarray) -> tuple[str, np.ndarray]:
+    """Return the link that a link is welded to by fixed joints, if any, and a point of it in that one's axes [m]."""
+    fixed = {joint.child: joint for joint in robot.joints if joint.fixed_at is not None}
+    while link in fixed:
+        joint = fixed[link]
+        point = joint.origin + rotation(joint.axis, joint.fixed_at or 0.0) @ point
+        link = joint.parent
+    return link, point
+
+
 def lumped(robot: Robot) -> Robot:
     """Return the same robot with every fixed joint's child welded into its parent."""
     links, joints = dict(robot.links), list(robot.joints)

@@ -16,8 +16,8 @@ class CoulombFriction:
     """Friction of constant size.
 
     Signature: a lag of constant size with the sign of the speed, flat tops at reversals, a band of static errors of
-    +-torque / kp. Confused with backlash, a dead band and load-dependent friction; triangles at three speeds (the error
-    does not depend on speed) and under two loads tell them apart.
+    +-torque / kp. Confused with backlash, a dead band, stiction and load-dependent friction; triangles at three speeds
+    (the error does not depend on speed) and under two loads tell them apart.
     """
 
     kind: ClassVar[str] = "servo"

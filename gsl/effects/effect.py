@@ -10,10 +10,12 @@ import difflib
 import importlib
 import pkgutil
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
+from gsl.core.body import Link
 from gsl.core.plant import Plant
 from gsl.core.validation import make
 from gsl.errors import ConfigError
@@ -97,3 +99,22 @@ def scope(plant: Plant, joints: Scope) -> np.ndarray:
         near = difflib.get_close_matches(str(error.args[0]), known, 1)
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(known)}"
         raise ConfigError("joints", f"the {plant.robot.name} has no joint or group '{error.args[0]}'; {hint}") from None
+
+
+def link_named(plant: Plant, name: str) -> Link:
+    """Return a link of the robot.
+
+    Raises:
+        ConfigError: if it has none of that name.
+    """
+    links = plant.robot.links
+    if name not in links:
+        near = difflib.get_close_matches(name, links, 1)
+        hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(links)}"
+        raise ConfigError("link", f"the {plant.robot.name} has no link '{name}'; {hint}")
+    return links[name]
+
+
+def with_link(plant: Plant, link: Link) -> Plant:
+    """Return the plant with another link of the same name."""
+    return replace(plant, robot=replace(plant.robot, links={**plant.robot.links, link.name: link}))

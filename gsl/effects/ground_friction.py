@@ -13,8 +13,8 @@ from gsl.core.setting import component, setting
 class GroundFriction:
     """Coefficient of friction under the feet.
 
-    Signature: slip of the stance foot, drift in yaw; nothing in the air. Confused with ground compliance; a ladder of
-    push-offs tells them apart.
+    Signature: slip of the stance foot, drift in yaw; nothing in the air and nothing while standing. Confused with
+    ground compliance and uneven ground; a ladder of push-offs tells them apart: it slips beyond one size.
     """
 
     kind: ClassVar[str] = "contact"

@@ -18,7 +18,8 @@ class ServoGain:
     """Factors on the proportional and the derivative gain.
 
     Signature: kp changes the static error under load and the rise time, kd the overshoot. Confused with viscous
-    friction (kd), gravity and link mass (kp); loaded against unloaded holds tell them apart.
+    friction (kd), gravity, link mass and gain fade (kp); loaded against unloaded holds, a joint without torque, and the
+    same pose early and late tell them apart.
     """
 
     kind: ClassVar[str] = "servo"

@@ -15,12 +15,13 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class TorqueLimit:
     """A weak (worn, hot, badly fed) motor.
 
-    Signature: clipped acceleration in large fast steps and under load, nothing in small ones. Confused with supply sag
-    and load-dependent friction; a ladder of step sizes, one joint against all at once, tell them apart.
+    Signature: clipped acceleration in large fast steps and under load, nothing in small ones. Confused with supply sag,
+    load-dependent friction, duty loss and target smoothing; a ladder of step sizes and of loads, one joint against all
+    at once, tell them apart.
     """
 
     kind: ClassVar[str] = "servo"
-    rank: ClassVar[int] = 8
+    rank: ClassVar[int] = 7
 
     factor: Annotated[float, setting("factor on the torque limit", gt=0, lower=0.2, upper=1.2,
                                      source="estimate; a NAO's stiffness scales the current limit")]  # fmt: skip

@@ -18,10 +18,11 @@ from gsl.core.layout import Layout
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
 from gsl.effects.effect import applied, built
-from gsl.errors import ConfigError, GslError
+from gsl.errors import GslError
 from gsl.robots.catalogue import robot
 from gsl.worlds.engine import Engine, Physics, Reading
-from gsl.worlds.servo import COMMANDS
+from gsl.worlds.fits import check_periods, check_plant
+from gsl.worlds.ground import random_heights
 from gsl.worlds.start import Start, resting
 
 FALLEN_TILT = 0.5  # cosine of the tilt beyond which the robot has fallen
@@ -41,16 +42,9 @@ class BulletWorld:
     settle: Annotated[float, setting("time the start posture is held before the episode", unit="s", ge=0)] = 0.5
 
     def __post_init__(self) -> None:
-        """Refuse periods that do not fit and effects that do not exist."""
-        ratio = self.period / self.step
-        if abs(ratio - round(ratio)) > 1e-9 or ratio < 1.0:
-            raise ConfigError("period", f"{self.period} s is not a multiple of the physics step {self.step} s")
-        latest = (COMMANDS - 1) * self.period
-        if self.plant.servo.delay.max() > latest + 1e-9:
-            given = f"{self.plant.servo.delay.max():g}"
-            raise ConfigError(
-                "effects.command_latency.delay", f"at most {latest:g} s fit {COMMANDS - 1} periods", given=given
-            )
+        """Refuse periods that do not fit, and effects that do not exist or do not fit them."""
+        check_periods(self.step, self.period)
+        check_plant(self.plant, self.step, self.period)
 
     @cached_property
     def plant(self) -> Plant:
@@ -91,7 +85,7 @@ class BulletEnv(gymnasium.Env):
         """Start anew: at rest in a posture, or in a measured state.
 
         Args:
-            seed: Of the start noise and of every sensor noise.
+            seed: Of the start noise, of an uneven ground and of every sensor noise.
             options: `posture`, desired joint positions at the start [rad], shape (n_joints,), by default all zero;
                 or `start`, a `Start` to take up as it is, without noise or settling.
         """
@@ -102,7 +96,7 @@ class BulletEnv(gymnasium.Env):
             physics = Physics(self.world.step, self.world.iterations, self.world.period, self.world.floating)
             self._engine = Engine(self._plant, physics)
         before = 0 if options.get("start") else round(self.world.settle / self.world.period)
-        self._engine.load(start.reading, start.commands, -before * self.world.period)
+        self._engine.load(start.reading, start.commands, -before * self.world.period, self._surface())
         reading = self._engine.read()
         for _ in range(before):
             self._engine.run(start.commands[0])
@@ -155,7 +149,14 @@ class BulletEnv(gymnasium.Env):
         rest[8:12], rest[12:15] = reading.quaternion, reading.velocity
         return observation
 
+    def _surface(self) -> np.ndarray | None:
+        """Draw the heights of an uneven ground; it has randomness of its own, so that no other noise changes."""
+        if not self.world.floating or self._plant.contact.roughness == 0.0:
+            return None
+        return random_heights(self._plant.contact, self.np_random.spawn(1)[0])
+
     def _at_rest(self, posture: np.ndarray) -> Start:
         targets = posture[self._drive]
         positions = targets + self.world.start_noise * self.np_random.standard_normal(self._n)[self._drive]
+        positions = np.clip(positions, self._plant.servo.lower_stop, self._plant.servo.upper_stop)
         return resting(self._robot, positions, targets, floating=self.world.floating)

@@ -7,6 +7,7 @@ import numpy as np
 from gsl.core.compiled import compiled
 
 TOOTH_STIFFNESS = 300.0  # of the gear teeth in contact, if there is play [N·m/rad]: an estimate
+STIFFEST = 1e-3  # compliance below which a spring counts as rigid, for at 2 ms it would not be stable [rad/(N·m)]
 ROTOR_SHARE = 0.7  # of the armature that is beyond the play; the rest moves with the output and keeps 2 ms stable
 SUBSTEPS = 8
 DAMPING = 0.2  # of the teeth or the spring, as a share of sqrt(stiffness · inertia)

@@ -19,15 +19,12 @@ from gsl.robots.urdf import principal_axes, urdf
 from gsl.worlds.base_frame import base_motion
 from gsl.worlds.bullet_c import NO_HANDLE, client_handle
 from gsl.worlds.control_period import Drive, first_memory, in_c, in_python, read_joints
+from gsl.worlds.ground import PLANE, lay
+from gsl.worlds.pushes import aimed, apply_push, overlap
 from gsl.worlds.rotor import carried_inertia, rotors
 from gsl.worlds.servo import ROTOR, encoder_motion, first_state, packed
 
 NOTHING = -1  # Bullet's number of a robot that is not loaded yet
-# The visual keeps Bullet from preparing to draw the plane at every load, which takes half a millisecond.
-_GROUND = """<robot name="ground"><link name="ground"><inertial><mass value="0"/>
-<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial>
-<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>
-<collision><geometry><plane normal="0 0 1"/></geometry></collision></link></robot>"""
 
 
 @dataclass(frozen=True)
@@ -78,7 +75,8 @@ class Engine:
     """One client of Bullet in DIRECT mode that holds one robot; `load` removes it and loads it anew every time.
 
     With the robot go its contacts, motors and friction, and the ground has no state: a rollout has the same bits as in
-    a client that was reset, which would take more time than the loading itself (tests/test_bullet.py).
+    a client that was reset, which would take more time than the loading itself (tests/test_bullet.py). An uneven ground
+    is another one every time, and everything is loaded anew.
 
     Args:
         plant: What to simulate.
@@ -105,16 +103,17 @@ class Engine:
         self.plant, self.physics, self.robot = plant, physics, lumped(plant.robot)
         self.handle = client_handle(pybullet.__file__, self.client)
         servo = packed(plant.servo, plant.robot.supply_voltage)
-        armature = plant.servo.armature - servo[ROTOR]  # what is beyond the play turns on its own
-        rotor = rotors(self.robot, armature, floating=physics.floating)
+        armature = plant.servo.armature - servo[ROTOR]
+        rotor = rotors(self.robot, armature, floating=physics.floating, apart=servo[ROTOR])
         self._loaded = _heavier(self.robot, carried_inertia(self.robot, rotor.carried))
         self._inertia = {name: principal_axes(link.inertia)[0].tolist() for name, link in self._loaded.links.items()}
         base = self._loaded.links[self.robot.base]
         axes = np.ascontiguousarray(principal_axes(base.inertia)[1])
         self._drive, self._base_com = Drive.of(servo, rotor, axes), base.com
+        self._pushes = aimed(plant, self._loaded)
         self._link_from_inertial = Rotation.from_matrix(axes.T).as_quat().tolist()
         self._folder = tempfile.TemporaryDirectory(prefix="gsl-")
-        for name, text in (("robot", urdf(self._loaded, visuals=False)), ("ground", _GROUND)):
+        for name, text in (("robot", urdf(self._loaded, visuals=False)), ("ground", PLANE)):
             Path(self._folder.name, f"{name}.urdf").write_text(text)
 
     def close(self) -> None:
@@ -122,17 +121,20 @@ class Engine:
         self.bullet.disconnect(self.client)
         self._folder.cleanup()
 
-    def load(self, reading: Reading, commands: np.ndarray, clock: float = 0.0) -> None:
+    def load(
+        self, reading: Reading, commands: np.ndarray, clock: float = 0.0, heights: np.ndarray | None = None
+    ) -> None:
         """Start from nothing in a measured state.
 
         Args:
             reading: Where the robot is and how it moves; forces are what follows, not what is set.
             commands: Targets so far, newest first [rad], shape (k, n_motors); the oldest one stands for all before.
             clock: Time since the episode began [s], negative before it.
+            heights: Of an uneven ground, its middle where the robot is, see `ground.random_heights`.
         """
         b, client, physics = self.bullet, self.client, self.physics
-        if self.body == NOTHING:
-            self._begin()
+        if self.body == NOTHING or heights is not None:
+            self._begin(heights, *reading.place[:2].tolist())
         else:
             b.removeBody(self.body, client)
         self.body = b.loadURDF(
@@ -153,7 +155,7 @@ class Engine:
             b.resetBaseVelocity(self.body, centre.tolist(), spin.tolist(), client)
         self._start(commands, clock)
 
-    def _begin(self) -> None:
+    def _begin(self, heights: np.ndarray | None, x: float, y: float) -> None:
         """Set up an empty world with its ground."""
         b, client, physics = self.bullet, self.client, self.physics
         b.resetSimulation(physicsClientId=client)
@@ -165,9 +167,8 @@ class Engine:
             physicsClientId=client,
         )
         b.setGravity(*self.plant.gravity.tolist(), physicsClientId=client)
-        if physics.floating:
-            ground = b.loadURDF(f"{self._folder.name}/ground.urdf", physicsClientId=client)
-            b.changeDynamics(ground, -1, lateralFriction=self.plant.contact.ground_friction, physicsClientId=client)
+        plane = f"{self._folder.name}/ground.urdf"
+        self._ground = lay(b, client, plane, self.plant.contact, heights, x, y) if physics.floating else ()
 
     def run(self, targets: np.ndarray) -> None:
         """Hold motor `targets` [rad], shape (n_motors,), for one control period."""
@@ -202,21 +203,10 @@ class Engine:
 
     def _outside(self, motion: np.ndarray, time: float) -> np.ndarray:
         """Push the robot's links and return the joint torques of a user's own effect [N·m], shape (n_motors,)."""
-        b, client = self.bullet, self.client
-        for push in self.plant.pushes:
-            if push.start <= time < push.end:
-                centre = self._centre_of_mass(self.links[push.link])
-                b.applyExternalForce(
-                    self.body, self.links[push.link], push.force.tolist(), centre, b.WORLD_FRAME, client
-                )
+        for push in self._pushes:
+            if share := overlap(push.push, time, self.physics.step):
+                apply_push(self.bullet, self.client, self.body, self.links, push, share)
         return np.zeros(len(self.joints)) if self.plant.hook is None else self.plant.hook(motion, time)
-
-    def _centre_of_mass(self, link: int) -> Sequence[float]:
-        """Return where a link's centre of mass is, in world axes [m]."""
-        b, body, client = self.bullet, self.body, self.client
-        if link < 0:
-            return b.getBasePositionAndOrientation(body, client)[0]
-        return b.getLinkState(body, link, computeForwardKinematics=True, physicsClientId=client)[0]
 
     def _joint_motion(self) -> np.ndarray:
         motion = np.empty((2, len(self.joints)))
@@ -229,8 +219,8 @@ class Engine:
 
     def _foot_force(self) -> tuple[float, ...]:
         force = dict.fromkeys(self._feet, 0.0)
-        if self.physics.floating:
-            for contact in self.bullet.getContactPoints(self.body, 0, physicsClientId=self.client):
+        for ground in self._ground:
+            for contact in self.bullet.getContactPoints(self.body, ground, physicsClientId=self.client):
                 if contact[3] in force:
                     force[contact[3]] += contact[9]
         return tuple(force.values())

@@ -54,15 +54,16 @@ class Rotors:
     axis: np.ndarray
 
 
-def rotors(robot: Robot, armature: np.ndarray, *, floating: bool) -> Rotors:
+def rotors(robot: Robot, armature: np.ndarray, *, floating: bool, apart: np.ndarray | float = 0.0) -> Rotors:
     """Prepare the compensation for a robot without fixed joints.
 
     Args:
         robot: With its true link inertias.
         armature: Rotor inertia at the output [kg·m²], shape (n_motors,).
         floating: Whether the base is free to move.
+        apart: Further rotor inertia, which turns on its own behind play or a spring [kg·m²], shape (n_motors,).
     """
-    carried = LINK_SHARE * np.array([robot.joint(name).armature for name in robot.motors])
+    carried = LINK_SHARE * (armature + apart)
     surplus = _carried_matrix(robot, carried) - np.diag(np.r_[np.zeros(3), armature])
     return Rotors(
         carried,

@@ -20,7 +20,7 @@ import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.plant import Servo
-from gsl.worlds.drive_train import ROTOR_SHARE, limited, through_gear
+from gsl.worlds.drive_train import ROTOR_SHARE, STIFFEST, limited, through_gear
 from gsl.worlds.encoder import REMEMBERED, first_history, seen
 
 BRISTLE = 1e-3  # deflection at which dry friction slips [rad]: below an encoder's noise, stable at 2 ms with our rotors
@@ -60,7 +60,7 @@ def packed(servo: Servo, supply_voltage: float) -> np.ndarray:
         servo: The servos.
         supply_voltage: Of the common supply without load [V].
     """
-    two_masses = (servo.play > 0.0) | (servo.compliance > 0.0)
+    two_masses = (servo.play > 0.0) | (servo.compliance >= STIFFEST)
     rotor = np.where(two_masses, ROTOR_SHARE * servo.armature, 0.0)
     rows = (
         servo.kp, servo.kd, servo.limit, servo.no_load_speed, servo.coulomb, servo.viscous, servo.stribeck,

@@ -1,0 +1,174 @@
+"""Attribution: which effects, switched on and fitted on training windows, explain the held-out ones.
+
+Forward selection with a beam over screenings and joint fits, then a drop-one pass: every set of effects competes
+against smaller ones on windows that no fit has seen, nuisances refitted for each and their cost counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsl.diagnosis import nuisance
+from gsl.diagnosis.candidates import Candidate, switched_on
+from gsl.diagnosis.fit import Build, Fit, projected, refined, sensitivities
+from gsl.diagnosis.replay import Bench, Effects
+from gsl.diagnosis.residual import loss
+from gsl.diagnosis.screen import Ground, Screening, best_of, screened
+
+WIDTH = 8  # leads that are fitted after a screening
+BEAM = 2  # sets of effects that are continued
+ROUNDS = 3
+DOMINANT, LOCAL = 0.25, 2  # share of the excess that makes a joint a suspect, and how many there are at most
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of effects with everything fitted, and what it costs where it was not fitted.
+
+    Attributes:
+        candidates: Its effects; empty for calibration alone.
+        parameters: Of each effect.
+        fit: On the training windows.
+        costs: Robust cost of the held-out residuals, shape (n_held_out_records,).
+        counts: Residuals in each of these records, shape (n_held_out_records,).
+    """
+
+    candidates: tuple[Candidate, ...]
+    parameters: tuple[np.ndarray, ...]
+    fit: Fit
+    costs: np.ndarray
+    counts: np.ndarray
+
+    @property
+    def effects(self) -> Effects:
+        """As a world's `effects:` mapping."""
+        return switched_on(self.candidates, self.parameters)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of its effects, in order of selection."""
+        return tuple(candidate.effect for candidate in self.candidates)
+
+    @property
+    def cost(self) -> float:
+        """Held-out cost, that of the nuisances included."""
+        return float(self.costs.sum()) + nuisance.cost(self.fit.nuisances)
+
+    @property
+    def level(self) -> float:
+        """Held-out cost of one residual: about 1 where only noise is left."""
+        return float(self.costs.sum() / self.counts.sum())
+
+
+@dataclass(frozen=True)
+class Arena:
+    """Where hypotheses compete.
+
+    Attributes:
+        train: Windows of the training records.
+        held_out: Windows of the others.
+        library: The candidates.
+        scopes: Names of scopes and their joints, each of shape (n_joints,).
+        tick: Called whenever some work is done.
+    """
+
+    train: Bench
+    held_out: Bench
+    library: tuple[Candidate, ...]
+    scopes: Mapping[str, np.ndarray]
+    tick: Callable[[], None]
+
+    def calibration(self) -> Hypothesis:
+        """Return the hypothesis without an effect."""
+        return self.fitted((), np.zeros(0), nuisance.none(self.train.joints))
+
+    def fitted(self, candidates: tuple[Candidate, ...], start: np.ndarray, at: np.ndarray) -> Hypothesis:
+        """Fit a set of effects from a start and score it."""
+        sizes = np.cumsum([len(candidate.free) for candidate in candidates])[:-1]
+
+        def parted(values: np.ndarray) -> tuple[np.ndarray, ...]:
+            return tuple(np.split(values, sizes)) if candidates else ()
+
+        def build(values: np.ndarray) -> Effects:
+            return switched_on(candidates, parted(values))
+
+        bounds = np.hstack([candidate.bounds for candidate in candidates]) if candidates else np.zeros((2, 0))
+        fit = refined(self.train, build, start, bounds, at, rounds=ROUNDS)
+        return self._scored(candidates, parted(fit.parameters), fit, build)
+
+    def _scored(
+        self, candidates: tuple[Candidate, ...], parameters: tuple[np.ndarray, ...], fit: Fit, build: Build
+    ) -> Hypothesis:
+        z = self.held_out.residual(build(fit.parameters), fit.nuisances)
+        size, record = self.held_out.comparison.used(z.shape[1]).sum(), self.held_out.pieces.record
+        names = np.unique(record)
+        costs = np.array([loss(z[record == name]).sum() for name in names])
+        self.tick()
+        return Hypothesis(candidates, parameters, fit, costs, np.array([size * (record == k).sum() for k in names]))
+
+    def ground(self, base: Hypothesis) -> Ground:
+        """Return where a screening on top of a hypothesis starts: without its nuisances, which hide what is missing."""
+        at, effects = nuisance.none(self.train.joints), base.effects
+        z = self.train.residual(effects, at)
+        slopes = sensitivities(self.train, effects, at, z)
+        best, costs = projected(z, slopes, at)
+        return Ground(effects, at, z, slopes, costs, best)
+
+    def successors(self, base: Hypothesis, width: int = WIDTH) -> tuple[list[Hypothesis], Screening]:
+        """Return hypotheses with one effect more than `base`, best first, and the screening that led to them."""
+        ground = self.ground(base)
+        used = {(candidate.effect, candidate.scope) for candidate in base.candidates}
+        local = [one.on(joint) for joint in self._dominant(ground) for one in self.library if one.on_joints]
+        screening = screened(self.train, ground, (*self.library, *local), self.scopes, self.tick)
+        leads = [lead for lead in screening.leads if (lead.candidate.effect, lead.candidate.scope) not in used]
+        start = np.concatenate([np.zeros(0), *base.parameters])
+        found = [
+            self.fitted((*base.candidates, lead.candidate), np.r_[start, lead.parameters], lead.nuisances)
+            for lead in best_of(leads, width)
+        ]
+        return sorted(found, key=lambda one: one.cost), screening
+
+    def _dominant(self, ground: Ground) -> list[str]:
+        """Return the joints in which most of what calibration leaves lies: there every effect is tried alone."""
+        used = self.train.comparison.used(ground.residual.shape[1]) * len(ground.residual)
+        excess = np.maximum(0.0, ground.costs - used)
+        order = np.argsort(excess)[::-1][:LOCAL]
+        joints = [name for name, mask in self.scopes.items() if mask.sum() == 1 and name not in ("all",)]
+        return [joints[k] for k in order if excess[k] > DOMINANT * excess.sum()]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """How much less one hypothesis costs than another, over held-out records.
+
+    Attributes:
+        value: In units of cost.
+        low: Lower 95 % bound by bootstrap over records.
+        high: Upper bound.
+        wins: Share of the bootstrap samples in which it is positive.
+    """
+
+    value: float
+    low: float
+    high: float
+    wins: float
+
+
+def gain(better: Hypothesis, worse: Hypothesis, *, samples: int = 1000, seed: int = 0) -> Gain:
+    """Compare two hypotheses record by record; the difference of their nuisances' costs is in every sample."""
+    difference = worse.costs - better.costs
+    extra = nuisance.cost(worse.fit.nuisances) - nuisance.cost(better.fit.nuisances)
+    index = np.random.default_rng(seed).integers(0, len(difference), (samples, len(difference)))
+    totals = difference[index].sum(axis=1) + extra
+    low, high = np.quantile(totals, [0.025, 0.975])
+    return Gain(float(difference.sum() + extra), float(low), float(high), float((totals > 0.0).mean()))
+
+
+def scopes_of(groups: Mapping[str, Sequence[str]], joints: Sequence[str]) -> dict[str, np.ndarray]:
+    """Return all joints, the robot's groups and each joint as scopes, each of shape (n_joints,)."""
+    everything = {"all": tuple(joints), **groups, **{joint: (joint,) for joint in joints}}
+    masks = {name: np.array([joint in members for joint in joints]) for name, members in everything.items()}
+    return {name: mask for name, mask in masks.items() if mask.any()}

@@ -1,0 +1,195 @@
+"""Candidates: every effect of the library with everything of it that can be chosen, read from the effects' settings.
+
+A parameter whose documented range holds a value that does nothing is a strength: it is searched from there outwards.
+The others (a velocity, say) are shapes: searched over their range. Links, axes and sides are candidates of their own.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from gsl.core.body import Robot, lumped
+from gsl.core.setting import REQUIRED, Setting, settings_of
+from gsl.diagnosis.replay import Effects
+from gsl.effects.effect import effect_class, names
+
+ONE_SIDED = (0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)  # shares of the way from doing nothing to the end of the range
+DENSE = (0.02, 0.05, 0.1, 0.15, 0.22, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0)  # where joints shake: minima are narrow there
+TWO_SIDED = (0.05, 0.15, 0.35, 0.65, 1.0)
+PAIRED = (0.2, 0.6)  # where two strengths are searched together
+SHAPES = (0.0, 0.3, 1.0)
+PROBE = 0.1  # share of the range at which an effect that acts in proportion is probed
+BEYOND = 1.5  # how far past its documented range a strength is fitted; there it loses its claim to the name
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect, what is fixed of it, and what is free.
+
+    Attributes:
+        effect: Its name.
+        fixed: What was chosen: link, side, and the scope `joints` if it acts on joints.
+        free: Names of the parameters to fit.
+        neutral: Their values that do nothing (shapes: the middle of the range), shape (p,).
+        documented: Lower and upper ends of their documented ranges, shape (2, p).
+        bounds: Within which they are fitted, shape (2, p).
+        grid: Values for a screening, shape (g, p); none if the log answers in proportion.
+    """
+
+    effect: str
+    fixed: Mapping[str, Any]
+    free: tuple[str, ...]
+    neutral: np.ndarray
+    documented: np.ndarray
+    bounds: np.ndarray
+    grid: np.ndarray
+
+    @property
+    def probes(self) -> np.ndarray:
+        """Steps of the parameters that show what an effect in proportion does, shape (p,)."""
+        return PROBE * (self.documented[1] - self.neutral)
+
+    @property
+    def on_joints(self) -> bool:
+        """Whether it has a scope of joints."""
+        return "joints" in self.fixed
+
+    @property
+    def scope(self) -> str:
+        """Where it acts, in a word."""
+        return str(self.fixed.get("joints", self.fixed.get("link", "")))
+
+    def on(self, joints: str) -> Candidate:
+        """Return the same on other joints."""
+        return replace(self, fixed={**self.fixed, "joints": joints})
+
+    def entry(self, parameters: np.ndarray) -> dict[str, Any]:
+        """Return the parameters of a world's `effects:` entry."""
+        return {**self.fixed, **dict(zip(self.free, parameters.tolist(), strict=True))}
+
+    def claims_its_name(self, parameters: np.ndarray) -> bool:
+        """Whether the parameters are inside their documented range."""
+        slack = 0.02 * (self.documented[1] - self.documented[0])
+        return bool(((parameters >= self.documented[0] - slack) & (parameters <= self.documented[1] + slack)).all())
+
+
+def switched_on(chosen: Sequence[Candidate], parameters: Sequence[np.ndarray]) -> Effects:
+    """Return the `effects:` mapping of several candidates."""
+    effects: dict[str, list[dict[str, Any]]] = {}
+    for candidate, values in zip(chosen, parameters, strict=True):
+        effects.setdefault(candidate.effect, []).append(candidate.entry(values))
+    return effects
+
+
+def library(
+    robot: Robot,
+    without: Sequence[str] = (),
+    known: Mapping[str, Mapping[str, Any]] | None = None,
+    *,
+    dense: bool = False,
+) -> tuple[Candidate, ...]:
+    """Return all candidates, those on joints with the scope `all`.
+
+    Args:
+        robot: Whose links can be chosen.
+        without: Effects that are left out.
+        known: Values of parameters that a look at the log has found already, by effect.
+        dense: Whether the grids of the strengths are fine.
+    """
+    shares = DENSE if dense else ONE_SIDED
+    moving = [joint.child for joint in lumped(robot).joints]
+    return tuple(
+        made
+        for name in names()
+        if name not in without
+        for made in _of(name, moving, (known or {}).get(name, {}), shares)
+    )
+
+
+def _of(name: str, links: Sequence[str], given: Mapping[str, Any], shares: Sequence[float]) -> list[Candidate]:
+    target: Any = effect_class(name)
+    known, hints = settings_of(target), get_type_hints(target)
+    choices: list[list[tuple[str, Any]]] = []
+    if "joints" in known:
+        choices.append([("joints", "all")])
+    if "link" in known:
+        choices.append([("link", link) for link in links])
+    for field, hint in hints.items():
+        if get_origin(hint) is Literal:
+            choices.append([(field, value) for value in get_args(hint)])
+    ranges = {key: value for key, value in known.items() if value.lower is not None and value.upper is not None}
+    numbers = {key: value for key, value in ranges.items() if key not in given}
+    proportional = target.kind in ("body", "environment") and "joints" not in known
+    strengths = [key for key, value in numbers.items() if _neutral(value) is not None]
+    shapes = [key for key in numbers if key not in strengths]
+    pairs = [tuple(strengths)] if len(strengths) == 2 else []
+    subsets = [(key,) for key in strengths] + pairs if strengths else [()]
+    rest = {key: _neutral(numbers[key]) for key in strengths}
+    return [
+        _candidate(
+            name,
+            {**{key: value for key, value in rest.items() if key not in subset}, **given, **dict(chosen)},
+            {key: numbers[key] for key in (*subset, *shapes)},
+            strengths=subset,
+            one_sided=shares,
+            proportional=proportional,
+        )
+        for subset in subsets
+        for chosen in itertools.product(*choices)
+    ]
+
+
+def _candidate(
+    name: str,
+    fixed: Mapping[str, Any],
+    free: Mapping[str, Setting],
+    *,
+    strengths: Sequence[str],
+    one_sided: Sequence[float],
+    proportional: bool,
+) -> Candidate:
+    documented = np.array([(known.lower, known.upper) for known in free.values()], dtype=float).T
+    neutral = np.array([_start(known) for known in free.values()])
+    bounds = np.array([_bounds(known) for known in free.values()]).T
+    shares = (PAIRED, PAIRED) if len(strengths) > 1 else (one_sided, TWO_SIDED)
+    axes = [_axis(known, shares, strength=key in strengths) for key, known in free.items()]
+    grid = np.empty((0, len(free))) if proportional else np.array(list(itertools.product(*axes)))
+    return Candidate(name, fixed, tuple(free), neutral, documented, bounds, grid)
+
+
+def _neutral(known: Setting) -> float | None:
+    """Return the value of a parameter that does nothing, None for a shape."""
+    assert known.lower is not None and known.upper is not None
+    default = None if known.default is REQUIRED else known.default
+    possible = (0.0, 1.0) if default is None else (default,)
+    return next((value for value in possible if value in (0.0, 1.0) and known.lower <= value <= known.upper), None)
+
+
+def _start(setting: Setting) -> float:
+    neutral = _neutral(setting)
+    assert setting.lower is not None and setting.upper is not None
+    return 0.5 * (setting.lower + setting.upper) if neutral is None else neutral
+
+
+def _bounds(setting: Setting) -> tuple[float, float]:
+    neutral, lower, upper = _neutral(setting), setting.lower, setting.upper
+    assert lower is not None and upper is not None
+    if neutral is None:
+        return lower, upper
+    return (0.5 * lower if lower >= 0.0 else BEYOND * lower), neutral + BEYOND * (upper - neutral)
+
+
+def _axis(setting: Setting, shares: tuple[Sequence[float], Sequence[float]], *, strength: bool) -> list[float]:
+    lower, upper = setting.lower, setting.upper
+    assert lower is not None and upper is not None
+    if not strength:
+        wide = lower > 0.0 and upper > 10.0 * lower
+        return [lower * (upper / lower) ** share if wide else lower + share * (upper - lower) for share in SHAPES]
+    start = _start(setting)
+    ends = [end for end in (lower, upper) if abs(end - start) > 1e-12]
+    return [start + share * (end - start) for end in ends for share in shares[len(ends) - 1]]

@@ -1,0 +1,181 @@
+"""The diagnosis of one log: calibrate, localise, attribute, test oneself, judge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gsl.core.body import Robot
+from gsl.core.plant import Plant
+from gsl.core.trajectory import Batch
+from gsl.diagnosis import nuisance
+from gsl.diagnosis.attribute import Arena, Hypothesis, scopes_of
+from gsl.diagnosis.candidates import library
+from gsl.diagnosis.experiment import Experiment, experiment
+from gsl.diagnosis.replay import Effects, InTheAir
+from gsl.diagnosis.select import Selection, Thresholds, selected
+from gsl.diagnosis.self_test import Trial, duels, null_gains
+from gsl.diagnosis.verdict import Verdict, judged
+from gsl.effects.effect import applied, built, effect_class, names
+
+NOISE_COST = 0.96  # robust cost of a residual that is noise and nothing else
+GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best gain of chance it has to be
+RIVALS = 3  # hypotheses that duel, at most
+ON_GROUND = ("contact",)  # kinds of effects that a robot in the air cannot show
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a diagnosis works.
+
+    Attributes:
+        without: Effects that are not candidates.
+        most: Effects at once.
+        duels: Simulated logs for each surviving cause; 0 tests nothing.
+        nulls: Simulated logs without an effect.
+        threads: That replay side by side.
+        clocks: Whether commands and measurements have one clock; else latency is not claimed.
+    """
+
+    without: tuple[str, ...] = ()
+    most: int = 3
+    duels: int = 2
+    nulls: int = 3
+    threads: int = 2
+    clocks: bool = True
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """The nominal as a reference log has it.
+
+    Attributes:
+        effects: Which the reference shows already.
+        nuisances: Shape (4, n_joints).
+        error: What is left of the model's error [rad], shape (n_joints,).
+    """
+
+    effects: Effects
+    nuisances: np.ndarray
+    error: np.ndarray
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All that a diagnosis found.
+
+    Attributes:
+        experiment: The log.
+        simulator: As the user has it, calibrated on the reference if there is one.
+        arena: Where hypotheses competed.
+        selection: What came of it.
+        verdict: What can be said.
+        null_gains: What chance gained in simulated logs.
+        trials: Duels of the surviving causes in simulated logs.
+        baseline: From the reference, if there is one.
+    """
+
+    experiment: Experiment
+    simulator: InTheAir
+    arena: Arena
+    selection: Selection
+    verdict: Verdict
+    null_gains: tuple[float, ...]
+    trials: tuple[Trial, ...]
+    baseline: Baseline | None
+
+
+def diagnosed(
+    log: Batch,
+    robot: Robot,
+    plant: Plant,
+    step: float,
+    options: Options,
+    tick: Callable[[], None],
+    *,
+    reference: Batch | None = None,
+    known_nulls: Sequence[float] | None = None,
+) -> Findings:
+    """Diagnose a log of a robot in the air.
+
+    Args:
+        log: Checked against the contract; of `robot`.
+        robot: Without fixed joints.
+        plant: The simulator.
+        step: Its physics period [s].
+        options: How.
+        tick: Called whenever some work is done.
+        reference: A log without the effect, on which the nominal is calibrated first.
+        known_nulls: What chance gained on these commands in this world, if it is known already.
+    """
+    baseline = None if reference is None else calibrated_on(reference, robot, plant, step, options, tick)
+    found = experiment(log, robot)
+    if baseline is not None:
+        plant = nuisance.calibrated(applied(plant, built(baseline.effects)), baseline.nuisances)
+        found = found.with_model_error(baseline.error)
+    arena = arena_of(found, plant, step, options, tick)
+    nulls = tuple(known_nulls or ())
+    if options.nulls and not nulls:
+        nulls = tuple(null_gains(found, arena, arena.calibration(), options.nulls, tick))
+    thresholds = Thresholds(gain=max(GAIN, CHANCE * max(nulls, default=0.0)))
+    selection = selected(arena, thresholds, most=options.most)
+    survivors = _survivors(selection)
+    trials = tuple(duels(found, arena, survivors, options.duels, tick)) if options.duels else ()
+    verdict = judged(selection, _expected(selection, trials), _margins(trials, survivors))
+    return Findings(found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline)
+
+
+def arena_of(found: Experiment, plant: Plant, step: float, options: Options, tick: Callable[[], None]) -> Arena:
+    """Return where hypotheses on a log compete."""
+    simulator = found.simulator(plant, step, options.threads)
+    hidden = [name for name in names() if getattr(effect_class(name), "kind", "") in ON_GROUND]
+    hidden += [] if options.clocks else ["command_latency"]
+    shaking = bool(found.comparison.shaking.any())
+    candidates = library(found.robot, (*options.without, *hidden, "external_push"), dense=shaking)
+    scopes = scopes_of(found.robot.groups, found.joints)
+    return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick)
+
+
+def calibrated_on(
+    reference: Batch, robot: Robot, plant: Plant, step: float, options: Options, tick: Callable[[], None]
+) -> Baseline:
+    """Fit the nominal to a log without the effect: whatever is found there belongs to the nominal from now on."""
+    found = experiment(reference, robot)
+    arena = arena_of(found, plant, step, replace(options, without=()), tick)
+    chosen = selected(arena, Thresholds(), most=options.most).chosen
+    z = arena.held_out.residual(chosen.effects, chosen.fit.nuisances)
+    left = np.sqrt(np.maximum(0.0, np.mean(np.minimum(z**2, 25.0), axis=(0, 1)) - 1.0))
+    return Baseline(chosen.effects, chosen.fit.nuisances, left * found.comparison.floor)
+
+
+def _survivors(found: Selection) -> list[Hypothesis]:
+    """Return the chosen hypothesis and the best ones of as many effects with other names."""
+    chosen, survivors = found.chosen, [found.chosen]
+    if not chosen.candidates:
+        return survivors
+    for one in found.tried:
+        other = set(one.names) not in [set(kept.names) for kept in survivors]
+        near = one.cost - chosen.cost < max(200.0, 0.1 * (found.none.cost - chosen.cost))
+        if len(one.candidates) == len(chosen.candidates) and other and near and len(survivors) < RIVALS:
+            survivors.append(one)
+    return survivors
+
+
+def _expected(found: Selection, trials: Sequence[Trial]) -> float:
+    """Return what a residual costs where the chosen hypothesis is the truth."""
+    levels = [trial.level for trial in trials if trial.truth == found.chosen.names]
+    return max(NOISE_COST, float(np.mean(levels))) if levels else NOISE_COST
+
+
+def _margins(trials: Sequence[Trial], survivors: Sequence[Hypothesis]) -> list[tuple[str, float]]:
+    """Return how much the difference of costs to each rival varies where the chosen hypothesis is the truth."""
+    own = [trial.costs for trial in trials if trial.truth == survivors[0].names]
+    if len(own) < 2:
+        return []
+    spread = np.std([[cost - costs[0] for cost in costs[1:]] for costs in own], axis=0, ddof=1)
+    return [
+        (next((name for name in one.names if name not in survivors[0].names), one.names[-1]), float(value))
+        for one, value in zip(survivors[1:], spread, strict=True)
+    ]

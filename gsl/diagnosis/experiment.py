@@ -1,0 +1,106 @@
+"""An experiment: a log cut into windows, its noise floor, and which part is for fitting and which for checking."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gsl.core.body import Robot
+from gsl.core.plant import Plant
+from gsl.core.trajectory import Batch
+from gsl.diagnosis.noise_floor import NoiseFloor, noise_floor
+from gsl.diagnosis.records import Pieces, Record, pieces, records
+from gsl.diagnosis.replay import Bench, InTheAir
+from gsl.diagnosis.residual import Comparison, comparison
+
+WARM_UP, SCORED = 0.4, 0.6  # of a window [s]: shorter warm-ups bias friction, whose state a log does not show
+FIT_WINDOWS = 20  # windows that a fit uses, spread over the training records
+STILL = 1e-6  # a command that moves less rests [rad]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A log ready for counterfactuals.
+
+    Attributes:
+        robot: Whose log it is.
+        records: Its trajectories.
+        pieces: All windows.
+        noise: The noise floor.
+        comparison: How replays are compared with it.
+        train: Windows for fitting, shape (n_train,).
+        held_out: Windows for checking, shape (n_held_out,).
+        period: Control period [s].
+        by_record: Whether whole records are held out; else parts of one, which is weaker.
+    """
+
+    robot: Robot
+    records: tuple[Record, ...]
+    pieces: Pieces
+    noise: NoiseFloor
+    comparison: Comparison
+    train: np.ndarray
+    held_out: np.ndarray
+    period: float
+    by_record: bool
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the logged joints."""
+        return self.robot.controlled
+
+    def simulator(self, plant: Plant, step: float, threads: int) -> InTheAir:
+        """Return what replays the log's commands in a plant."""
+        return InTheAir(plant, fitting_step(step, self.period), self.period, threads)
+
+    def bench(self, simulator: InTheAir, part: str) -> Bench:
+        """Return the windows of a part, `train` (thinned), `held_out` or `all`, with a simulator."""
+        chosen = {
+            "train": _spread(self.train, FIT_WINDOWS),
+            "held_out": self.held_out,
+            "all": np.arange(len(self.pieces)),
+        }
+        return Bench(simulator, self.pieces.chosen(chosen[part]), self.comparison)
+
+    def with_model_error(self, error: np.ndarray) -> Experiment:
+        """Return the experiment with a floor that holds a known error of the model, [rad], shape (n_joints,)."""
+        return replace(self, comparison=replace(self.comparison, floor=np.hypot(self.comparison.floor, error)))
+
+
+def experiment(batch: Batch, robot: Robot) -> Experiment:
+    """Prepare a log.
+
+    Args:
+        batch: Of this robot, with records long enough for a window.
+        robot: Whose motors follow.
+    """
+    found, period = records(batch, robot), batch.control_period
+    warm_up, scored = round(WARM_UP / period), round(SCORED / period)
+    noise = noise_floor(found, robot.encoder_step)
+    cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
+    commands = cut.windows.commands[:, : warm_up + scored, : len(robot.controlled)]
+    held, by_record = _held_out(found, cut)
+    how = comparison(cut, noise, np.ptp(commands, axis=1) < STILL)
+    return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
+
+
+def fitting_step(step: float, period: float) -> float:
+    """Return the physics period nearest to `step` that divides the control period [s]."""
+    return period / max(1, round(period / step))
+
+
+def _held_out(found: Sequence[Record], cut: Pieces) -> tuple[np.ndarray, bool]:
+    """Hold out every second motion, in the order of the names, so that variants part; repeats stay together."""
+    motions: dict[bytes, list[int]] = {}
+    for index in sorted(range(len(found)), key=lambda k: (found[k].name, k)):
+        motions.setdefault(np.round(found[index].targets, 6).tobytes(), []).append(index)
+    if len(motions) > 1:
+        held = [index for k, group in enumerate(motions.values()) if k % 2 for index in group]
+        return np.isin(cut.record, held), True
+    return np.arange(len(cut)) % 2 == 1, False
+
+
+def _spread(index: np.ndarray, most: int) -> np.ndarray:
+    return index[np.unique(np.linspace(0, len(index) - 1, min(most, len(index))).round().astype(int))]

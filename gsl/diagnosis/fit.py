@@ -1,0 +1,188 @@
+"""Fits of an effect's parameters together with the nuisances: robust least squares with a ridge on the nuisances.
+
+A screening asks many values of one effect: there the nuisances answer linearly, by sensitivities that were taken once.
+A refinement takes all derivatives by finite differences where it stands (Levenberg-Marquardt).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsl.diagnosis import nuisance
+from gsl.diagnosis.replay import Bench, Effects
+from gsl.diagnosis.residual import loss, weight
+
+REWEIGHTINGS = 2
+DAMPINGS = (0.0, 1.0, 30.0)  # of a step, as shares of the diagonal; the first that descends is taken
+FACTORS = (1.2, 1.08)  # of a parameter, in a search where joints shake
+ENOUGH = 1e-3  # relative descent at which a fit ends
+
+Build = Callable[[np.ndarray], Effects]
+
+
+def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarray) -> np.ndarray:
+    """Return derivatives of the residuals to each joint's own nuisances, shape (4, W, scored, n_joints).
+
+    All joints are probed at once: a joint's answer to its neighbours' probes counts as its own.
+
+    Args:
+        bench: The log.
+        effects: That are switched on.
+        at: Nuisances, shape (4, n_joints).
+        base: Residuals there.
+    """
+    columns = []
+    for row, probe in enumerate(nuisance.PROBES):
+        moved = at.copy()
+        moved[row] += probe
+        columns.append((bench.residual(effects, moved) - base) / probe)
+    return np.array(columns)
+
+
+def projected(z: np.ndarray, slopes: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the best nuisances, shape (4, n_joints), and each joint's cost with them, shape (n_joints,).
+
+    Args:
+        z: Residuals with nuisances `at`, shape (W, scored, n_joints).
+        slopes: From `sensitivities`.
+        at: Nuisances, shape (4, n_joints).
+    """
+    flat = z.reshape(-1, z.shape[2])
+    columns = slopes.reshape(len(slopes), -1, z.shape[2])
+    precision, best, left = 1.0 / nuisance.SIZES**2, at, flat
+    for _ in range(REWEIGHTINGS):
+        w = weight(left)
+        matrix = np.einsum("amj,mj,bmj->jab", columns, w, columns, optimize=True) + np.diag(precision)
+        right = -np.einsum("amj,mj->ja", columns, w * flat) - precision * at.T
+        best = nuisance.bounded(at + np.linalg.solve(matrix, right[..., None])[..., 0].T)
+        left = flat + np.einsum("amj,aj->mj", columns, best - at)
+    return best, loss(left).sum(axis=0) + ((best / nuisance.SIZES[:, None]) ** 2).sum(axis=0)
+
+
+def proportional(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return the best parameters of effects in proportion to them, nuisances free, shape (p,).
+
+    Args:
+        z: Residuals without the effects, nuisances `at`, shape (W, scored, n_joints).
+        own: Derivatives to the parameters, shape (p, W, scored, n_joints).
+        slopes: From `sensitivities`.
+        at: Nuisances, shape (4, n_joints).
+    """
+    theta = np.zeros(len(own))
+    for _ in range(REWEIGHTINGS):
+        best, _ = projected(z + np.einsum("a,awsj->wsj", theta, own), slopes, at)
+        left = z + np.einsum("a,awsj->wsj", theta, own) + np.einsum("awsj,aj->wsj", slopes, best - at)
+        matrix, right = _normal(left, own, slopes, best)
+        theta = theta + np.linalg.solve(matrix, right)[: len(own)]
+    return theta
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Parameters and nuisances at the best point found.
+
+    Attributes:
+        parameters: Of the effects, shape (p,).
+        nuisances: Shape (4, n_joints).
+        cost: Robust cost of the residuals and of the nuisances.
+        covariance: Of the parameters, nuisances free, shape (p, p).
+    """
+
+    parameters: np.ndarray
+    nuisances: np.ndarray
+    cost: float
+    covariance: np.ndarray
+
+
+def refined(
+    bench: Bench, build: Build, start: np.ndarray, bounds: np.ndarray, at: np.ndarray, *, rounds: int = 3
+) -> Fit:
+    """Descend from a start.
+
+    Args:
+        bench: Training windows.
+        build: From parameters to effects.
+        start: Parameters, shape (p,).
+        bounds: Lower and upper, shape (2, p).
+        at: Nuisances to begin with, shape (4, n_joints).
+        rounds: Steps at most.
+    """
+    theta, n = np.clip(start, *bounds), at
+    z = bench.residual(build(theta), n)
+    total, matrix = float(loss(z).sum()) + nuisance.cost(n), np.eye(len(theta))
+    for _ in range(rounds):
+        slopes = sensitivities(bench, build(theta), n, z)
+        own = _own_slopes(bench, build, theta, bounds, n, z)
+        matrix, right = _normal(z, own, slopes, n)
+        for damping in DAMPINGS:
+            step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
+            new_theta = np.clip(theta + step[: len(theta)], *bounds)
+            new_n = nuisance.bounded(n + step[len(theta) :].reshape(n.shape))
+            new_z = bench.residual(build(new_theta), new_n)
+            new_total = float(loss(new_z).sum()) + nuisance.cost(new_n)
+            if new_total < total:
+                break
+        else:
+            break
+        gained, theta, n, z, total = (total - new_total) / total, new_theta, new_n, new_z, new_total
+        if gained < ENOUGH:
+            break
+    covariance = np.linalg.inv(matrix)[: len(theta), : len(theta)]
+    if bench.comparison.shaking.any() and len(theta):
+        theta, total = _searched(bench, build, theta, bounds, n, total)
+    return Fit(theta, n, total, covariance)
+
+
+def _searched(
+    bench: Bench, build: Build, theta: np.ndarray, bounds: np.ndarray, n: np.ndarray, total: float
+) -> tuple[np.ndarray, float]:
+    """Go on without derivatives, which mean little where joints shake: factor by factor, as long as the cost falls."""
+    for k, factor in [(k, factor) for factor in FACTORS for k in range(len(theta))]:
+        for direction in (factor, 1.0 / factor):
+            while True:
+                moved = theta.copy()
+                moved[k] = np.clip(theta[k] * direction, *bounds[:, k])
+                new = float(loss(bench.residual(build(moved), n)).sum()) + nuisance.cost(n)
+                if new >= total:
+                    break
+                theta, total = moved, new
+    return theta, total
+
+
+def _own_slopes(
+    bench: Bench, build: Build, theta: np.ndarray, bounds: np.ndarray, n: np.ndarray, z: np.ndarray
+) -> np.ndarray:
+    """Return derivatives to the parameters, shape (p, W, scored, n_joints), probed towards the inside of the bounds."""
+    columns = []
+    for k in range(len(theta)):
+        probe = 0.02 * (bounds[1, k] - bounds[0, k])
+        probe = -probe if theta[k] + probe > bounds[1, k] else probe
+        moved = theta.copy()
+        moved[k] += probe
+        columns.append((bench.residual(build(moved), n) - z) / probe)
+    return np.array(columns).reshape(len(theta), *z.shape)
+
+
+def _normal(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normal equations of (parameters, nuisances), of shapes (p + 4 n, p + 4 n) and (p + 4 n,)."""
+    p, joints = len(own), z.shape[2]
+    w, size = weight(z), p + n.size
+    matrix, right = np.zeros((size, size)), np.zeros(size)
+    weighted = own * w
+    matrix[:p, :p] = np.einsum("awsj,bwsj->ab", weighted, own)
+    right[:p] = -np.einsum("awsj,wsj->a", weighted, z)
+    cross = np.einsum("awsj,bwsj->abj", weighted, slopes).reshape(p, n.size)
+    matrix[:p, p:], matrix[p:, :p] = cross, cross.T
+    blocks = np.einsum("awsj,wsj,bwsj->abj", slopes, w, slopes, optimize=True)
+    for a in range(len(slopes)):
+        for b in range(len(slopes)):
+            at_a, at_b = p + a * joints + np.arange(joints), p + b * joints + np.arange(joints)
+            matrix[at_a, at_b] = blocks[a, b]
+    precision = np.repeat(1.0 / nuisance.SIZES**2, joints)
+    matrix[range(p, size), range(p, size)] += precision
+    matrix[range(p), range(p)] += 1e-9 * np.abs(np.diag(matrix)[:p]) + 1e-12
+    right[p:] = -np.einsum("awsj,wsj->aj", slopes, w * z).ravel() - precision * n.ravel()
+    return matrix, right

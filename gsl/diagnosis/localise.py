@@ -1,0 +1,150 @@
+"""Where the gap lies: the simulator's excess over the floor by joint, regime, horizon and side of the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsl.core.body import Robot
+from gsl.diagnosis.experiment import Experiment
+from gsl.diagnosis.replay import InTheAir
+
+REST, FAST = 0.01, 0.12  # shares of the no-load speed: slower is rest, faster is fast
+REVERSAL = 0.06  # before and after a change of direction [s]
+LOADED, SATURATED = 0.4, 1.0  # shares of the torque limit that the nominal servo would want
+SAMPLES = 400  # of the bootstrap over records
+REGIMES = ("all", "rest", "slow", "fast", "reversal", "high_load", "saturated", "early", "late")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What one joint does in one regime.
+
+    Attributes:
+        joint, regime: Which.
+        share: Of the whole excess.
+        low, high: 95 % interval, by bootstrap over records.
+        rms: Of the residuals in units of the floor.
+        named: Whether the lower bound of rms is above the floor.
+    """
+
+    joint: str
+    regime: str
+    share: float
+    low: float
+    high: float
+    rms: float
+    named: bool
+
+
+def cells(found: Experiment, z: np.ndarray, regimes: Mapping[str, np.ndarray]) -> list[Cell]:
+    """Return the excess of every joint in every regime.
+
+    Args:
+        found: The log.
+        z: Residuals of all windows in units of the floor, shape (W, scored, n_joints).
+        regimes: Which residuals belong to each, shape (W, scored, n_joints).
+    """
+    record, names = found.pieces.record, np.unique(found.pieces.record)
+    sums = {key: _by_record(np.where(mask, z**2, 0.0), record) for key, mask in regimes.items()}
+    counts = {key: _by_record(mask.astype(float), record) for key, mask in regimes.items()}
+    index = np.random.default_rng(0).integers(0, len(names), (SAMPLES, len(names)))
+    index = np.vstack([np.arange(len(names)), index])
+    square = {key: sums[key][index].sum(axis=1) for key in regimes}
+    count = {key: counts[key][index].sum(axis=1) for key in regimes}
+    excess = {key: np.maximum(0.0, square[key] - count[key]) for key in regimes}
+    total = np.maximum(excess["all"].sum(axis=1), 1e-12)[:, None]
+    result = []
+    for key in regimes:
+        share = excess[key] / total
+        rms = np.sqrt(square[key] / np.maximum(count[key], 1.0))
+        low, high = np.quantile(share[1:], [0.025, 0.975], axis=0)
+        least = np.quantile(rms[1:], 0.025, axis=0)
+        enough = (counts[key] > 0).sum(axis=0) >= min(2, len(names))
+        result += [
+            Cell(
+                joint,
+                key,
+                float(share[0, j]),
+                float(low[j]),
+                float(high[j]),
+                float(rms[0, j]),
+                bool(least[j] > 1.0 and enough[j]),
+            )
+            for j, joint in enumerate(found.joints)
+        ]
+    return result
+
+
+def regimes(found: Experiment, simulator: InTheAir) -> dict[str, np.ndarray]:
+    """Return which residuals of all windows belong to which regime, shape (W, scored, n_joints) each."""
+    cut, servo, n = found.pieces, simulator.plant.servo, len(found.joints)
+    real = cut.real
+    speed = np.gradient(real, found.period, axis=1)
+    commands = cut.windows.commands[:, : real.shape[1], :n][:, ::-1]
+    wanted = np.abs(servo.kp[:n] * (commands - real)) / servo.limit[:n]
+    share = np.abs(_smooth(speed)) / servo.no_load_speed[:n]
+    tick = cut.tick[:, None] + np.arange(real.shape[1])
+    length = np.array([len(found.records[k]) for k in cut.record])[:, None]
+    masks = {
+        "all": np.ones(real.shape, dtype=bool),
+        "rest": share < REST,
+        "slow": (share >= REST) & (share < FAST),
+        "fast": share >= FAST,
+        "reversal": _reversals(_smooth(speed), share >= REST, round(REVERSAL / found.period)),
+        "high_load": wanted > LOADED,
+        "saturated": wanted > SATURATED,
+        "early": np.broadcast_to((tick < length / 3)[..., None], real.shape),
+        "late": np.broadcast_to((tick >= 2 * length / 3)[..., None], real.shape),
+    }
+    return {key: masks[key][:, cut.warm_up :] for key in REGIMES}
+
+
+def horizon(found: Experiment, told: np.ndarray) -> tuple[list[float], dict[str, list[float]]]:
+    """Return how the residuals grow from the measured state on: times [s] and rms in units of the floor, by joint."""
+    z = (told - found.pieces.real) / found.comparison.floor
+    rms = np.sqrt(np.nanmean(np.clip(z, -1e3, 1e3) ** 2, axis=0))
+    times = found.period * np.arange(1, z.shape[1] + 1)
+    return times.tolist(), {joint: rms[:, j].tolist() for j, joint in enumerate(found.joints)}
+
+
+def sides(found: Experiment, z: np.ndarray) -> list[dict[str, object]]:
+    """Return mirrored joints with the rms of each side and the chance that sides that are alike differ as much."""
+    names, result = found.joints, []
+    for left, right in mirrored(found.robot):
+        pair = [_by_record(z[..., [names.index(one)]] ** 2, found.pieces.record)[:, 0] for one in (left, right)]
+        per = found.pieces.record.size / max(1, len(pair[0])) * z.shape[1]
+        difference = pair[0] - pair[1]
+        flips = np.random.default_rng(0).choice([-1.0, 1.0], (SAMPLES, len(difference)))
+        p = float((np.abs(flips @ difference) >= abs(difference.sum()) - 1e-9).mean())
+        values = [float(np.sqrt(side.sum() / (per * len(side)))) for side in pair]
+        result.append({"pair": left[1:], "left": values[0], "right": values[1], "p": p})
+    return result
+
+
+def mirrored(robot: Robot) -> list[tuple[str, str]]:
+    """Return pairs of logged joints whose names differ by L and R at the beginning."""
+    names = robot.controlled
+    return [(name, "R" + name[1:]) for name in names if name.startswith("L") and "R" + name[1:] in names]
+
+
+def _by_record(values: np.ndarray, record: np.ndarray) -> np.ndarray:
+    """Sum over each record's windows, shape (n_records, n_joints)."""
+    return np.array([values[record == k].sum(axis=(0, 1)) for k in np.unique(record)])
+
+
+def _smooth(speed: np.ndarray) -> np.ndarray:
+    kernel = np.ones(3) / 3.0
+    return np.apply_along_axis(np.convolve, 1, speed, kernel, mode="same")
+
+
+def _reversals(speed: np.ndarray, moves: np.ndarray, reach: int) -> np.ndarray:
+    turned = np.zeros(speed.shape, dtype=bool)
+    turned[:, 1:] = (np.sign(speed[:, 1:]) != np.sign(speed[:, :-1])) & (moves[:, 1:] | moves[:, :-1])
+    near = turned.copy()
+    for k in range(1, reach + 1):
+        near[:, k:] |= turned[:, :-k]
+        near[:, :-k] |= turned[:, k:]
+    return near

@@ -1,0 +1,68 @@
+"""The noise floor: how far two logs of the same commands differ, or what the log's own roughness tells of that."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsl.diagnosis.records import Record
+
+SETTLED = 15  # ticks after which the start of an episode is forgotten
+QUIET = 0.3  # share of the ticks, those of the slowest commands, on which roughness is measured
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """What noise alone explains.
+
+    Attributes:
+        sd: Standard deviation of a measured position [rad], shape (n_joints,).
+        source: `repeats` or `estimated`.
+        pairs: Repeats that were compared.
+        resolution: Of the encoders [rad].
+    """
+
+    sd: np.ndarray
+    source: str
+    pairs: int
+    resolution: float
+
+
+def noise_floor(found: Sequence[Record], resolution: float) -> NoiseFloor:
+    """Measure the floor.
+
+    Args:
+        found: All records.
+        resolution: Of the encoders [rad]; the floor is at least what rounding makes, resolution / sqrt(12).
+    """
+    least = max(resolution / np.sqrt(12.0), 1e-5)
+    groups = [group for group in _repeats(found) if len(group) > 1]
+    if groups:
+        spread = [np.array([one.position[SETTLED:] for one in group]) for group in groups]
+        square = sum(part.var(axis=0, ddof=1).sum(axis=0) for part in spread) / sum(part.shape[1] for part in spread)
+        return NoiseFloor(
+            np.maximum(np.sqrt(square), least), "repeats", sum(len(group) - 1 for group in groups), resolution
+        )
+    return NoiseFloor(np.maximum(_roughness(found), least), "estimated", 0, resolution)
+
+
+def _repeats(found: Sequence[Record]) -> list[list[Record]]:
+    groups: dict[bytes, list[Record]] = defaultdict(list)
+    for one in found:
+        if len(one) > 2 * SETTLED:
+            groups[np.round(one.targets, 6).tobytes()].append(one)
+    return list(groups.values())
+
+
+def _roughness(found: Sequence[Record]) -> np.ndarray:
+    """Return the size of third differences where the motion is slow: that of white noise is sqrt(20) times its own."""
+    rough, speed = [], []
+    for one in found:
+        rough.append(np.diff(one.position, 3, axis=0) ** 2 / 20.0)
+        speed.append(np.abs(one.velocity[2:-1]))
+    all_rough, all_speed = np.vstack(rough), np.vstack(speed)
+    slow = all_speed <= np.quantile(all_speed, QUIET, axis=0)
+    return np.sqrt(np.array([np.mean(column[keep]) for column, keep in zip(all_rough.T, slow.T, strict=True)]))

@@ -1,0 +1,52 @@
+"""Nuisances: small deviations that every joint has, refitted for every candidate so that none can hide in them.
+
+Each has a prior size; what is fitted costs (shift / size)². The cost counts in every score: a cause that is itself a
+gain or a friction cannot be had for nothing here, and it cannot buy its name by what a calibration would do as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from gsl.core.plant import Plant
+
+NAMES = ("kp", "kd", "coulomb", "zero")
+SIZES = np.array([0.04, 0.07, 0.012, 0.004])  # relative, relative, [N·m], [rad]: spread of one make of servo (estimate)
+PROBES = np.array([0.05, 0.10, 0.02, 0.002])  # of the finite differences
+KP, KD, COULOMB, ZERO = range(4)
+
+
+def none(joints: int) -> np.ndarray:
+    """Return nuisances that do nothing, shape (4, n_joints)."""
+    return np.zeros((len(NAMES), joints))
+
+
+def cost(nuisances: np.ndarray) -> float:
+    """Return what nuisances, shape (4, n_joints), cost."""
+    return float(((nuisances / SIZES[:, None]) ** 2).sum())
+
+
+def bounded(nuisances: np.ndarray) -> np.ndarray:
+    """Return the nearest nuisances that are possible, shape (4, n_joints)."""
+    result = nuisances.copy()
+    result[KP], result[KD] = np.clip(result[KP], -0.8, 4.0), np.clip(result[KD], -0.9, 9.0)
+    return result
+
+
+def calibrated(plant: Plant, nuisances: np.ndarray) -> Plant:
+    """Return the plant with other gains, friction and log zeros; coupled motors have those of the joint they follow.
+
+    Args:
+        plant: Its first motors are the logged joints.
+        nuisances: Shape (4, n_joints).
+    """
+    wide = nuisances[:, plant.robot.drive]
+    servo = plant.servo
+    changed = plant.with_servo(
+        kp=servo.kp * (1.0 + wide[KP]),
+        kd=servo.kd * (1.0 + wide[KD]),
+        coulomb=np.maximum(0.0, servo.coulomb + wide[COULOMB]),
+    )
+    return replace(changed, sensors=replace(plant.sensors, bias=plant.sensors.bias + wide[ZERO]))

@@ -1,0 +1,71 @@
+"""Counterfactuals: what a simulator with other effects and nuisances says to the commands of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gsl.core.plant import Plant
+from gsl.diagnosis.nuisance import calibrated
+from gsl.diagnosis.records import Pieces
+from gsl.diagnosis.residual import Comparison
+from gsl.effects.effect import applied, built
+from gsl.worlds.held import Held, Windows
+
+Effects = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class InTheAir:
+    """Replays of a robot that is held, by the chain model.
+
+    Attributes:
+        plant: The simulator as the user has it.
+        step: Physics period [s].
+        period: Control period [s].
+        threads: That replay side by side.
+    """
+
+    plant: Plant
+    step: float
+    period: float
+    threads: int = 1
+    _pool: ThreadPoolExecutor = field(default_factory=ThreadPoolExecutor, repr=False, compare=False)
+
+    def told(self, effects: Effects, nuisances: np.ndarray, pieces: Pieces) -> np.ndarray:
+        """Return the replayed positions [rad], shape (W, T, n_joints); NaN where a replay diverges."""
+        held = Held.of(calibrated(applied(self.plant, built(effects)), nuisances), self.step, self.period)
+        shares = [slice(k, None, self.threads) for k in range(self.threads)]
+        parts = [Windows(*(np.ascontiguousarray(part[share]) for part in pieces.windows)) for share in shares]
+        result = np.empty((len(pieces), pieces.windows.length, len(self.plant.robot.motors)))
+        for share, told in zip(shares, self._pool.map(held.replay, parts), strict=True):
+            result[share] = told
+        return result[..., : nuisances.shape[1]]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A log on which counterfactuals compete.
+
+    Attributes:
+        simulator: What replays.
+        pieces: The log's windows.
+        comparison: How both are compared.
+    """
+
+    simulator: InTheAir
+    pieces: Pieces
+    comparison: Comparison
+
+    @property
+    def joints(self) -> int:
+        """Number of logged joints."""
+        return self.pieces.real.shape[2]
+
+    def residual(self, effects: Effects, nuisances: np.ndarray) -> np.ndarray:
+        """Return residuals in units of the floor, shape (W, scored, n_joints)."""
+        return self.comparison.residual(self.simulator.told(effects, nuisances, self.pieces), self.pieces)

@@ -1,0 +1,117 @@
+"""Residuals in units of the noise floor, what they cost, and how joints that shake are compared with their replay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsl.diagnosis.noise_floor import NoiseFloor
+from gsl.diagnosis.records import Pieces
+
+SCALE = 5.0  # beyond this many floors a residual counts less and less
+MEAN = 5  # ticks of the low pass
+BANDS = 4  # of the fast part's spectrum
+POWER_SD = (
+    0.6  # of the logarithm of a shaking joint's power in one window, measured on replays of shaking by its true cause
+)
+COLOURED = 0.4  # correlation of a resting joint's log with itself some ticks later: noise has none
+LAGS = 4
+MIN_RESTS = 3  # windows in which a joint rests that it takes to judge
+
+
+def loss(z: np.ndarray) -> np.ndarray:
+    """Return the robust cost of residuals: z² where they are small, logarithmic beyond SCALE (Cauchy)."""
+    return SCALE**2 * np.log1p((z / SCALE) ** 2)
+
+
+def weight(z: np.ndarray) -> np.ndarray:
+    """Return the weights with which least squares descend the robust cost."""
+    return 1.0 / (1.0 + (z / SCALE) ** 2)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How replays are compared with a log.
+
+    Attributes:
+        floor: Standard deviation that noise and a known model error explain [rad], shape (n_joints,).
+        shaking: Joints whose phase a log cannot carry, shape (n_joints,).
+    """
+
+    floor: np.ndarray
+    shaking: np.ndarray
+
+    def residual(self, told: np.ndarray, pieces: Pieces) -> np.ndarray:
+        """Return the residuals of the scored part, shape (W, scored, n_joints).
+
+        Args:
+            told: Replayed positions [rad], shape (W, T, n_joints).
+            pieces: With the measured ones.
+        """
+        sim, real = told[:, pieces.warm_up :], pieces.real[:, pieces.warm_up :]
+        z = (sim - real) / self.floor
+        if self.shaking.any():
+            z[..., self.shaking] = self._of_shaking(sim[..., self.shaking], real[..., self.shaking])
+        return np.clip(np.nan_to_num(z, nan=1e3), -1e3, 1e3)
+
+    def used(self, scored: int) -> np.ndarray:
+        """Return how many residuals of a window count for each joint, shape (n_joints,)."""
+        return np.where(self.shaking, scored // MEAN + BANDS, scored)
+
+    def _of_shaking(self, sim: np.ndarray, real: np.ndarray) -> np.ndarray:
+        """Slow parts as they are, fast parts by their power in each band; the rest of the rows is zero."""
+        floor, rows = self.floor[self.shaking], sim.shape[1] // MEAN
+        z = np.zeros_like(sim)
+        slow, fast = zip(*(_parted(x, rows) for x in (sim, real)), strict=True)
+        z[:, :rows] = (slow[0] - slow[1]) / (floor * np.sqrt(1.0 + fast[1] / floor**2 / MEAN)[:, None])
+        power = [_bands(x) for x in (sim, real)]
+        noise = floor**2  # the replay has none of it
+        z[:, rows : rows + BANDS] = np.log((power[0] + noise) / np.maximum(power[1], noise)) / POWER_SD
+        return z
+
+
+def _parted(x: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return means over MEAN ticks, shape (W, rows, n), and the mean square about them, shape (W, n)."""
+    blocks = x[:, : rows * MEAN].reshape(len(x), rows, MEAN, -1)
+    slow = blocks.mean(axis=2)
+    return slow, ((blocks - slow[:, :, None]) ** 2).mean(axis=(1, 2))
+
+
+def _bands(x: np.ndarray) -> np.ndarray:
+    """Return the mean power of the fast part by band, shape (W, BANDS, n): white noise has its variance in each."""
+    length = x.shape[1]
+    taper = np.hanning(length + 2)[1:-1, None]
+    taper = taper / np.sqrt((taper**2).mean())
+    spectrum = np.abs(np.fft.rfft((x - x.mean(axis=1, keepdims=True)) * taper, axis=1)) ** 2 / length
+    first = 2 * length // (2 * MEAN) // 2  # slower than this the means tell
+    edges = np.linspace(first, spectrum.shape[1], BANDS + 1).round().astype(int)
+    return np.stack([spectrum[:, a:b].mean(axis=1) for a, b in zip(edges[:-1], edges[1:], strict=True)], axis=1)
+
+
+def comparison(pieces: Pieces, noise: NoiseFloor, resting: np.ndarray) -> Comparison:
+    """Return how to compare, having looked which joints shake while their commands rest.
+
+    The floor of a joint that shakes is that of the calm ones: repeats of shaking differ by its phase, not by noise.
+
+    Args:
+        pieces: Of the log.
+        noise: Its floor.
+        resting: Whether each joint's command rests in each window, shape (W, n_joints).
+    """
+    real = pieces.real[:, pieces.warm_up :]
+    shaking = np.array([_shakes(real[rests, :, joint], noise.resolution) for joint, rests in enumerate(resting.T)])
+    calm = np.median(noise.sd[~shaking]) if not shaking.all() else 3.0 * noise.resolution
+    return Comparison(np.where(shaking, np.minimum(noise.sd, calm), noise.sd), shaking)
+
+
+def _shakes(rest: np.ndarray, resolution: float) -> bool:
+    """Whether a resting joint's log, shape (W, scored), moves by more than rounding and not as noise does."""
+    if len(rest) < MIN_RESTS:
+        return False
+    x = rest - rest.mean(axis=1, keepdims=True)
+    line = np.linspace(-1.0, 1.0, rest.shape[1])
+    x = x - np.outer(x @ line / (line @ line), line)
+    power = float((x**2).mean())
+    colour = max(abs(float((x[:, lag:] * x[:, :-lag]).mean())) for lag in range(1, LAGS + 1))
+    return power > resolution**2 and colour > COLOURED * power

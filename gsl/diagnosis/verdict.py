@@ -1,0 +1,124 @@
+"""The verdict: what the evidence allows to say, and with which probability."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsl.diagnosis.attribute import Hypothesis, gain
+from gsl.diagnosis.select import Selection
+
+ALIKE = (frozenset({"zero_offset", "sensor_bias"}),)  # in the air, by nature (the design's section 4)
+SEPARATED = 0.75  # probability below which two causes are not told apart
+BLUNT = 12.0  # least spread of a difference of costs, where no self-test has measured it
+COARSE = 0.12  # share of a difference of costs that an imperfect model makes
+FOREIGN, EXPLAINED = 1.2, 0.85  # remaining cost, and share explained, beyond which nothing of the library is the cause
+KNOWN_SOFT = 0.15
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One effect of the chosen hypothesis.
+
+    Attributes:
+        index: Its place there.
+        probability: That it is this effect.
+        rival: The effect that comes nearest in its place, if any.
+        value, low, high: Share of the excess that is gone with it, with 95 % interval.
+    """
+
+    index: int
+    probability: float
+    rival: str | None
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What can be said.
+
+    Attributes:
+        word: `no_gap`, `causes`, `inseparable` or `unknown`.
+        causes: Of the chosen hypothesis; empty for `no_gap`.
+        inseparable: Groups of effects that the log cannot tell apart.
+        explained: Share of the excess that the chosen hypothesis explains.
+        remaining: Its cost of a residual over that of noise.
+        known: Probability that nothing else is at work.
+    """
+
+    word: str
+    causes: tuple[Cause, ...]
+    inseparable: tuple[tuple[str, ...], ...]
+    explained: float
+    remaining: float
+    known: float
+
+
+def judged(found: Selection, expected: float, margins: Sequence[tuple[str, float]] = ()) -> Verdict:
+    """Judge a selection.
+
+    Args:
+        found: What attribution came to.
+        expected: Cost of a residual where only noise is left.
+        margins: Spread of the difference of costs to a rival, by the rival's effect, as a self-test measured it.
+    """
+    chosen, none = found.chosen, found.none
+    least = expected * float(none.counts.sum())
+    excess = max(none.cost - least, 1e-9)
+    explained = float(np.clip((none.cost - chosen.cost) / excess, 0.0, 1.0))
+    remaining = chosen.level / expected
+    if not chosen.candidates:
+        return Verdict("unknown" if remaining > FOREIGN else "no_gap", (), (), 0.0, remaining, 1.0)
+    spreads = dict(margins)
+    causes = tuple(_cause(found, k, excess, spreads) for k in range(len(chosen.candidates)))
+    known = _known(explained, remaining)
+    groups = [
+        (chosen.names[cause.index], cause.rival) for cause in causes if cause.rival and cause.probability < SEPARATED
+    ]
+    groups += [tuple(sorted(twins)) for twins in ALIKE if twins & set(chosen.names)]
+    unique = tuple(dict.fromkeys(tuple(sorted(set(group))) for group in groups))
+    scaled = tuple(Cause(c.index, c.probability * known, c.rival, c.value, c.low, c.high) for c in causes)
+    word = "unknown" if known < 0.5 else "inseparable" if unique else "causes"
+    return Verdict(word, scaled, unique, explained, remaining, known)
+
+
+def _known(explained: float, remaining: float) -> float:
+    """Return the probability that the library holds what is at work: much is left only where something is missing."""
+    missing = np.log(max(remaining, 1e-9)) / np.log(FOREIGN) - 1.0
+    unexplained = (EXPLAINED - explained) / (1.0 - EXPLAINED)
+    return float(1.0 / (1.0 + np.exp(min(missing, unexplained) / KNOWN_SOFT)))
+
+
+def _cause(found: Selection, k: int, excess: float, spreads: dict[str, float]) -> Cause:
+    chosen, effect = found.chosen, found.chosen.names[k]
+    rivals = [one for one in found.tried if len(one.candidates) <= len(chosen.candidates) and effect not in one.names]
+    fewer = min((one for one in rivals if len(one.candidates) < len(chosen.candidates)), key=_cost, default=found.none)
+    share = gain(chosen, fewer)
+    value, low, high = (float(np.clip(x / excess, 0.0, 1.0)) for x in (share.value, share.low, share.high))
+    best = min((one for one in rivals if len(one.candidates) == len(chosen.candidates)), key=_cost, default=None)
+    if best is None:
+        return Cause(k, 0.99, None, value, low, high)
+    other = next((name for name in best.names if name not in chosen.names), best.names[-1])
+    return Cause(k, _ahead(best, chosen, spreads.get(other)), other, value, low, high)
+
+
+def _ahead(rival: Hypothesis, chosen: Hypothesis, spread: float | None) -> float:
+    """Return the probability that the chosen one is the truth and not its rival, from how much less it costs."""
+    margin = rival.cost - chosen.cost
+    over_records = gain(chosen, rival)
+    noise = max(BLUNT, spread or 0.0, COARSE * abs(found_cost(rival) - found_cost(chosen)))
+    wide = max(noise, (over_records.high - over_records.low) / 4.0 * 0.5)
+    return float(np.clip(1.0 / (1.0 + np.exp(-2.0 * margin / wide)), 0.01, 0.99))
+
+
+def found_cost(one: Hypothesis) -> float:
+    """Return the held-out cost without that of the nuisances."""
+    return float(one.costs.sum())
+
+
+def _cost(one: Hypothesis) -> float:
+    return one.cost

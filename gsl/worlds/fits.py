@@ -1,0 +1,48 @@
+"""Whether a plant can be simulated with a world's periods: servos remember only so much, and play needs a rotor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gsl.core.plant import Plant
+from gsl.errors import ConfigError
+from gsl.worlds.encoder import REMEMBERED
+from gsl.worlds.servo import COMMANDS
+
+
+def check_periods(step: float, period: float) -> None:
+    """Refuse a control period that is not a multiple of the physics period, both in [s].
+
+    Raises:
+        ConfigError: if it is not.
+    """
+    ratio = period / step
+    if abs(ratio - round(ratio)) > 1e-9 or ratio < 1.0:
+        raise ConfigError("period", f"{period} s is not a multiple of the physics step {step} s")
+
+
+def check_plant(plant: Plant, step: float, period: float) -> None:
+    """Refuse a plant whose servos cannot be simulated.
+
+    Args:
+        plant: The robot with its effects.
+        step: Physics period [s].
+        period: Control period [s].
+
+    Raises:
+        ConfigError: if a delay is longer than what is remembered, or a joint has play and no rotor.
+    """
+    servo = plant.servo
+    _check_delay("command_latency", servo.delay.max(), COMMANDS - 1, period, "control periods")
+    _check_delay("sensor_delay", servo.sensor_delay.max(), REMEMBERED, step, "physics steps")
+    for name, size in (("backlash", servo.play), ("joint_compliance", servo.compliance)):
+        bare = (size > 0.0) & (servo.armature <= 0.0)
+        if bare.any():
+            joint = plant.robot.motors[int(np.argmax(bare))]
+            raise ConfigError(f"effects.{name}.joints", f"{joint} has no rotor; effects.armature.inertia gives it one")
+
+
+def _check_delay(name: str, delay: float, count: int, length: float, what: str) -> None:
+    if delay > count * length + 1e-9:
+        line = f"at most {count * length:g} s are remembered, {count} {what} of {length:g} s"
+        raise ConfigError(f"effects.{name}.delay", line, given=f"{delay:g}")
