@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -100,7 +100,8 @@ def execute(command: str, line: str, config: Mapping[str, Any], console: Console
     artifact = build_artifact(stage, config=settings, out=out, command=line, force=own.force, console=console)
     for told in account(artifact):
         console.table(*told)
-    return {"folder": out.as_posix(), "unchanged": artifact.unchanged, "metrics": artifact.metrics}
+    more: Callable[[Path], dict[str, Any]] = getattr(stage, "document", lambda folder: {})
+    return {"folder": out.as_posix(), "unchanged": artifact.unchanged, "metrics": artifact.metrics, **more(out)}
 
 
 def said(document: Mapping[str, Any]) -> str:

@@ -76,10 +76,10 @@ def judged(found: Selection, expected: float, margins: Sequence[tuple[str, float
     spreads = dict(margins)
     causes = tuple(_cause(found, k, excess, spreads) for k in range(len(chosen.candidates)))
     known = _known(explained, remaining)
-    groups = [
-        (chosen.names[cause.index], cause.rival) for cause in causes if cause.rival and cause.probability < SEPARATED
-    ]
-    groups += [tuple(sorted(twins)) for twins in ALIKE if twins & set(chosen.names)]
+    groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in ALIKE if twins & set(chosen.names)]
+    for cause in causes:
+        if cause.rival is not None and cause.probability < SEPARATED:
+            groups.append((chosen.names[cause.index], cause.rival))
     unique = tuple(dict.fromkeys(tuple(sorted(set(group))) for group in groups))
     scaled = tuple(Cause(c.index, c.probability * known, c.rival, c.value, c.low, c.high) for c in causes)
     word = "unknown" if known < 0.5 else "inseparable" if unique else "causes"

@@ -1,0 +1,208 @@
+"""The diagnosis as a document: what report.json holds, and what the page and the terminal show of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from gsl.core.body import Robot
+from gsl.core.setting import settings_of
+from gsl.diagnosis import nuisance
+from gsl.diagnosis.attribute import Hypothesis, gain
+from gsl.diagnosis.candidates import Candidate
+from gsl.diagnosis.diagnose import Findings
+from gsl.diagnosis.localise import cells, horizon, regimes, sides
+from gsl.diagnosis.shrinkage import shrinkage
+from gsl.diagnosis.verdict import Cause
+from gsl.effects.effect import effect_class
+
+RANKED = 12  # hypotheses that are listed
+REPLAYS, SHOWN = 6, 400  # pictures of replays, and their ticks at most
+WORDS = {
+    "no_gap": "The simulator and the robot agree as far as noise and a per-joint calibration can tell.",
+    "unknown": "There is a gap that no effect of the library explains.",
+}
+
+
+def document(found: Findings, **about: Any) -> dict[str, Any]:
+    """Return the whole document; `about` is what the caller knows besides: data, world_file, report, command, ..."""
+    exp, chosen, sim = found.experiment, found.selection.chosen, found.simulator
+    everything = exp.bench(sim, "all")
+    told = sim.told({}, nuisance.none(len(exp.joints)), exp.pieces)
+    z = exp.comparison.residual(told, exp.pieces)
+    times, growth = horizon(exp, told)
+    causes = [] if found.verdict.word in ("no_gap", "unknown") else [_cause(found, one) for one in found.verdict.causes]
+    after = everything.simulator.told(chosen.effects, chosen.fit.nuisances, exp.pieces)
+    places = [asdict(cell) for cell in cells(exp, z, regimes(exp, sim))]
+    return {
+        "verdict": found.verdict.word,
+        "summary": _summary(found, causes),
+        "causes": causes,
+        "suspects": [_cause(found, one) for one in found.verdict.causes] if found.verdict.word == "unknown" else [],
+        "inseparable": [list(group) for group in found.verdict.inseparable if causes],
+        "where": [place for place in places if place["named"] or place["regime"] == "all"],
+        "horizon": {"time": times, "rms": growth},
+        "sides": sides(exp, z),
+        "shrinkage": shrinkage(found, told, after),
+        "ranking": _ranking(found),
+        "calibration": _calibration(exp.joints, chosen.fit.nuisances),
+        "floor": {
+            "source": exp.noise.source,
+            "pairs": exp.noise.pairs,
+            "sd": dict(zip(exp.joints, exp.comparison.floor.tolist(), strict=True)),
+        },
+        "invisible": list(found.selection.screening.invisible),
+        "caveats": _caveats(found),
+        "next_experiment": None,
+        "policies": None,
+        "replays": _replays(found, told, after),
+        "self_test": _self_test(found),
+        **about,
+    }
+
+
+def _cause(found: Findings, one: Cause) -> dict[str, Any]:
+    chosen = found.selection.chosen
+    candidate, values = chosen.candidates[one.index], chosen.parameters[one.index]
+    first = sum(len(other.free) for other in chosen.candidates[: one.index])
+    sd = np.sqrt(np.maximum(0.0, np.diag(chosen.fit.covariance)))[first : first + len(values)]
+    return {
+        "effect": candidate.effect,
+        "joints": _joints(found.experiment.robot, candidate),
+        "scope": candidate.scope,
+        "fixed": {key: value for key, value in candidate.fixed.items() if key != "joints"},
+        "parameters": _parameters(candidate, values, sd * _widening(found)),
+        "probability": one.probability,
+        "gain": {"value": one.value, "low": one.low, "high": one.high},
+        "documented": candidate.claims_its_name(values),
+        "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
+    }
+
+
+def _widening(found: Findings) -> float:
+    """Return how much wider an interval is than noise alone makes it: what is left unexplained widens it."""
+    return float(2.0 * np.sqrt(max(1.0, found.verdict.remaining)))
+
+
+def _joints(robot: Robot, candidate: Candidate) -> list[str]:
+    if not candidate.on_joints:
+        return []
+    named = candidate.scope
+    members = robot.controlled if named == "all" else robot.groups.get(named, (named,))
+    return [name for name in members if name in robot.controlled]
+
+
+def _parameters(candidate: Candidate, values: np.ndarray, sd: np.ndarray) -> dict[str, Any]:
+    known = settings_of(effect_class(candidate.effect))
+    return {
+        name: {
+            "value": float(value),
+            "low": float(max(low, value - 1.96 * spread)),
+            "high": float(min(high, value + 1.96 * spread)),
+            "unit": known[name].unit,
+        }
+        for name, value, spread, low, high in zip(candidate.free, values, sd, *candidate.bounds, strict=True)
+    }
+
+
+def _ranking(found: Findings) -> list[dict[str, Any]]:
+    none, expected = found.selection.none, float(found.selection.none.counts.sum())
+    excess = max(none.cost - 0.96 * expected, 1e-9)
+    rows = []
+    for one in found.selection.tried[:RANKED]:
+        share = gain(one, none)
+        value, low, high = (float(np.clip(x / excess, -1.0, 1.0)) for x in (share.value, share.low, share.high))
+        rows.append(
+            {
+                "effects": list(one.names),
+                "scopes": [candidate.scope for candidate in one.candidates],
+                "parameters": _written(one),
+                "gain": {"value": value, "low": low, "high": high},
+                "level": one.level,
+                "probability": None,
+            }
+        )
+    return rows
+
+
+def _written(one: Hypothesis) -> str:
+    pairs = zip(one.candidates, one.parameters, strict=True)
+    return "; ".join(
+        ", ".join(f"{name} {value:.3g}" for name, value in zip(candidate.free, values, strict=True))
+        for candidate, values in pairs
+    )
+
+
+def _calibration(joints: Sequence[str], nuisances: np.ndarray) -> list[dict[str, Any]]:
+    return [
+        {"joint": joint, "kp": float(1.0 + kp), "kd": float(1.0 + kd), "coulomb": float(coulomb), "zero": float(zero)}
+        for joint, (kp, kd, coulomb, zero) in zip(joints, nuisances.T, strict=True)
+    ]
+
+
+def _caveats(found: Findings) -> list[str]:
+    exp, said = found.experiment, []
+    if exp.noise.source != "repeats":
+        said.append("No command was played twice: the noise floor is estimated from the roughness of the log.")
+    if not exp.by_record:
+        said.append("There is one trajectory only: every second part of it was held out, which is weak evidence.")
+    if exp.comparison.shaking.any():
+        names = ", ".join(name for name, shakes in zip(exp.joints, exp.comparison.shaking, strict=True) if shakes)
+        said.append(f"These joints shake while their commands rest and are judged by the spectrum: {names}.")
+    still = [name for k, name in enumerate(exp.joints) if max(np.ptp(r.targets[:, k]) for r in exp.records) < 1e-6]
+    if still:
+        said.append(
+            f"These joints are never commanded to move, so hardly anything can be said of them: {', '.join(still)}."
+        )
+    for index, candidate in enumerate(found.selection.chosen.candidates):
+        if not candidate.claims_its_name(found.selection.chosen.parameters[index]):
+            said.append(f"{candidate.effect} fits with values outside its documented range: its name is doubtful.")
+    if 0.0 < found.verdict.explained < 0.9 and found.verdict.word in ("causes", "inseparable"):
+        said.append(f"{1.0 - found.verdict.explained:.0%} of the excess remains: something else is at work as well.")
+    return said
+
+
+def _summary(found: Findings, causes: Sequence[Mapping[str, Any]]) -> str:
+    verdict = found.verdict
+    if verdict.word in WORDS and not causes:
+        return WORDS[verdict.word]
+    named = " and ".join(f"{one['effect']} ({one['scope'] or 'everywhere'})" for one in causes)
+    if verdict.word == "inseparable":
+        groups = "; ".join(" or ".join(group) for group in verdict.inseparable)
+        return f"The gap looks like {named}, but this log cannot tell apart: {groups}."
+    return f"The gap is caused by {named}, which explains {verdict.explained:.0%} of it on held-out data."
+
+
+def _replays(found: Findings, before: np.ndarray, after: np.ndarray) -> list[dict[str, Any]]:
+    """Return stretches of the held-out records in which the simulator is furthest off, one a joint."""
+    exp, n = found.experiment, len(found.experiment.joints)
+    cut, first = exp.pieces, exp.pieces.warm_up
+    held = exp.held_out
+    square = np.mean(((before - cut.real)[held, first:] / exp.comparison.floor) ** 2, axis=1)
+    worst = np.argsort(np.nan_to_num(square, nan=np.inf).max(axis=0))[::-1][:REPLAYS]
+    shown = []
+    for joint in worst:
+        record = cut.record[held[int(np.argmax(square[:, joint]))]]
+        windows = np.flatnonzero(cut.record == record)[: SHOWN // (cut.real.shape[1] - first)]
+        commands = cut.windows.commands[windows][:, : cut.real.shape[1], :n][:, ::-1]
+        parts = {"command": commands, "real": cut.real[windows], "before": before[windows], "after": after[windows]}
+        lines = {key: part[:, first:, joint].ravel().tolist() for key, part in parts.items()}
+        ticks = (cut.tick[windows][:, None] + first + 1 + np.arange(cut.real.shape[1] - first)).ravel()
+        times = (exp.period * ticks).tolist()
+        shown.append({"record": exp.records[record].name, "joint": exp.joints[joint], "time": times, **lines})
+    return shown
+
+
+def _self_test(found: Findings) -> dict[str, Any] | None:
+    if not found.null_gains and not found.trials:
+        return None
+    counts: dict[tuple[str, str], int] = {}
+    for trial in found.trials:
+        key = (" + ".join(trial.truth) or "no effect", " + ".join(trial.answer) or "no effect")
+        counts[key] = counts.get(key, 0) + 1
+    confusions = [{"truth": truth, "answer": answer, "count": count} for (truth, answer), count in counts.items()]
+    cases = len(found.null_gains) + len(found.trials)
+    return {"cases": cases, "null_gain": max(found.null_gains, default=None), "confusions": confusions}

@@ -1,0 +1,87 @@
+"""Shrinkage: how far the held-out gap goes down with the diagnosed effects, beside what a learned residual reaches."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gsl.diagnosis.ceiling import learned_residual
+from gsl.diagnosis.diagnose import Findings
+from gsl.diagnosis.localise import regimes
+
+SAMPLES = 1000
+NOTHING = 0.02  # of an excess in squared floors: below it there is nothing to shrink
+
+
+def shrinkage(found: Findings, before: np.ndarray, after: np.ndarray) -> dict[str, Any]:
+    """Return the gap before and after, in floors, and the share of the excess that is gone, on held-out windows.
+
+    Args:
+        found: The diagnosis.
+        before: Replays of the simulator as it was [rad], shape (W, T, n_joints).
+        after: Replays with the diagnosed effects and the calibration.
+    """
+    exp, held = found.experiment, found.experiment.held_out
+    none = found.selection.none
+    told = {"before": before, "after": after, "calibration": found.simulator.told({}, none.fit.nuisances, exp.pieces)}
+    z = {key: exp.comparison.residual(values, exp.pieces) for key, values in told.items()}
+    used = exp.comparison.used(z["before"].shape[1])
+    mean = {key: _mean_square(values[held], used) for key, values in z.items()}
+    fraction, low, high = _fraction(z["before"][held], z["after"][held], exp.pieces.record[held], used)
+    return {
+        "floor": 1.0,
+        **{key: float(np.sqrt(value.mean())) for key, value in mean.items()},
+        "fraction": fraction,
+        "low": low,
+        "high": high,
+        "ceiling_fraction": _ceiling(found, before, z["before"][held], used),
+        "by_joint": [
+            {"joint": joint, "before": float(np.sqrt(mean["before"][k])), "after": float(np.sqrt(mean["after"][k]))}
+            for k, joint in enumerate(exp.joints)
+        ],
+        "by_regime": _by_regime(found, z),
+    }
+
+
+def _mean_square(z: np.ndarray, used: np.ndarray) -> np.ndarray:
+    return (z**2).sum(axis=(0, 1)) / (used * len(z))
+
+
+def _excess(z: np.ndarray, used: np.ndarray) -> float:
+    return float(np.average(_mean_square(z, used), weights=used)) - 1.0
+
+
+def _fraction(
+    before: np.ndarray, after: np.ndarray, record: np.ndarray, used: np.ndarray
+) -> tuple[float | None, float | None, float | None]:
+    """Return the share of the excess that is gone, with its 95 % interval by bootstrap over records."""
+    if _excess(before, used) < NOTHING:
+        return None, None, None
+    names = np.unique(record)
+    sums = np.array([[(z[record == k] ** 2).sum() for k in names] for z in (before, after)])
+    counts = np.array([(record == k).sum() * used.sum() for k in names])
+    index = np.random.default_rng(0).integers(0, len(names), (SAMPLES, len(names)))
+    index = np.vstack([np.arange(len(names)), index])
+    excess = sums[:, index].sum(axis=2) - counts[index].sum(axis=1)
+    shares = 1.0 - np.maximum(excess[1], 0.0) / np.maximum(excess[0], 1e-9)
+    low, high = np.quantile(shares[1:], [0.025, 0.975])
+    return float(shares[0]), float(low), float(high)
+
+
+def _ceiling(found: Findings, before: np.ndarray, z: np.ndarray, used: np.ndarray) -> float | None:
+    """Return the share of the excess that a learned residual takes away; None if there is none or joints shake."""
+    if _excess(z, used) < NOTHING or found.experiment.comparison.shaking.any() or not np.isfinite(before).all():
+        return None
+    learned = learned_residual(found.experiment, before)
+    return 1.0 - max(0.0, _excess(learned, used)) / _excess(z, used)
+
+
+def _by_regime(found: Findings, z: dict[str, np.ndarray]) -> list[dict[str, Any]]:
+    exp, rows = found.experiment, []
+    for name, mask in regimes(exp, found.simulator).items():
+        part = mask[exp.held_out]
+        if part.sum() > 50:
+            values = {key: float(np.sqrt(np.mean(z[key][exp.held_out][part] ** 2))) for key in ("before", "after")}
+            rows.append({"regime": name, **values})
+    return rows

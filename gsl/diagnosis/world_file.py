@@ -1,0 +1,56 @@
+"""The diagnosed world: the simulator's configuration with what was found switched on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from gsl.diagnosis import nuisance
+from gsl.diagnosis.diagnose import Findings
+from gsl.diagnosis.replay import Effects
+
+DIGITS = 6
+
+
+def diagnosed_effects(found: Findings) -> dict[str, Any]:
+    """Return what the simulator lacks: the reference's findings, the diagnosed effects, then the calibration.
+
+    Every entry is one of a world's `effects:`; the calibration comes joint by joint.
+    """
+    joints, chosen = found.experiment.joints, found.selection.chosen
+    parts = [chosen.effects, calibration(joints, chosen.fit.nuisances)]
+    if found.baseline is not None:
+        parts = [found.baseline.effects, calibration(joints, found.baseline.nuisances), *parts]
+    return joined(parts)
+
+
+def calibration(joints: Sequence[str], nuisances: np.ndarray) -> Effects:
+    """Return nuisances, shape (4, n_joints), as effects of single joints."""
+    rows = {joint: nuisances[:, k] for k, joint in enumerate(joints)}
+    return {
+        "servo_gain": [
+            {"kp": 1.0 + row[nuisance.KP], "kd": 1.0 + row[nuisance.KD], "joints": joint} for joint, row in rows.items()
+        ],
+        "coulomb_friction": [
+            {"torque": row[nuisance.COULOMB], "joints": joint}
+            for joint, row in rows.items()
+            if row[nuisance.COULOMB] > 0.0
+        ],
+        "sensor_bias": [{"bias": row[nuisance.ZERO], "joints": joint} for joint, row in rows.items()],
+    }
+
+
+def joined(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return several `effects:` mappings as one, numbers rounded to what a file should show."""
+    whole: dict[str, list[Any]] = {}
+    for part in parts:
+        for name, entries in part.items():
+            listed = entries if isinstance(entries, list | tuple) else [entries]
+            whole.setdefault(name, []).extend(_rounded(entry) for entry in listed)
+    return {name: entries for name, entries in whole.items() if entries}
+
+
+def _rounded(entry: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: round(float(value), DIGITS) if isinstance(value, float) else value for key, value in entry.items()}

@@ -1,0 +1,143 @@
+"""Diagnose: where a simulator's gap to recorded trajectories lies, which effect causes it, how far it shrinks."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+import yaml
+
+from gsl.core.body import lumped
+from gsl.core.described import described
+from gsl.core.setting import component, setting
+from gsl.core.trajectory import Batch
+from gsl.diagnosis.diagnose import Findings, Options, diagnosed
+from gsl.diagnosis.document import document
+from gsl.diagnosis.verify import in_bullet
+from gsl.diagnosis.world_file import diagnosed_effects, joined
+from gsl.report.diagnosis import report_html
+from gsl.stages.logs import check_log, log_files, read_logs
+from gsl.storage import documents
+from gsl.worlds.bullet import BulletWorld
+
+REPORT, PAGE, WORLD = "report.json", "report.html", "world/diagnosed.yaml"
+
+
+@component
+class Diagnose:
+    """Reads trajectories, sets every effect of the library against them, and says what the evidence allows."""
+
+    kind: ClassVar[str] = "diagnose"
+
+    real: Annotated[str, setting("trajectories: a run, a parquet file or a folder of them", min_length=1)]
+    sim: Annotated[BulletWorld, setting("the simulator that disagrees with them")]
+    reference: Annotated[str | None, setting("trajectories without the effect, to calibrate the simulator first")] = (
+        None
+    )
+    without: Annotated[tuple[str, ...], setting("effects that are left out of the library")] = ()
+    clocks: Annotated[
+        Literal["synchronised", "unsynchronised"],
+        setting("whether commands and measurements share a clock; if not, latency is not claimed"),
+    ] = "synchronised"
+    most: Annotated[int, setting("effects at once, at most", ge=1, le=4)] = 3
+    duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
+    nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
+    workers: Annotated[int, setting("threads that replay; -1 takes all cores")] = -1
+    seed: Annotated[int, setting("of all randomness", ge=0)] = 1
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the files that are read."""
+        named = {"real": self.real, **({"reference": self.reference} if self.reference else {})}
+        found: dict[str, Path] = {}
+        for role, reference in named.items():
+            files = log_files(reference)
+            found |= {role if len(files) == 1 else f"{role}.{k}": path for k, path in enumerate(files)}
+        return found
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write report.json, report.html and the diagnosed world."""
+        begin = time.perf_counter()
+        robot = lumped(self.sim.plant.robot)
+        logs = {role: self._read(role) for role in ("real", "reference") if getattr(self, role)}
+        with console.progress(0, "diagnosing") as progress:
+            found = diagnosed(
+                logs["real"],
+                robot,
+                self.sim.plant,
+                self.sim.step,
+                self._options(),
+                _ticking(progress.advance),
+                reference=logs.get("reference"),
+            )
+        return self._written(found, logs["real"], folder, time.perf_counter() - begin)
+
+    def document(self, folder: Path) -> dict[str, Any]:
+        """Return what --json shows of an artifact: the report without its curves."""
+        report: dict[str, Any] = json.loads((folder / REPORT).read_text(encoding="utf-8"))
+        bulky = ("replays", "horizon")
+        shown = {key: value for key, value in report.items() if key not in bulky}
+        paths = {"world_file": folder / WORLD, "report": folder / PAGE}
+        return shown | {key: path.as_posix() for key, path in paths.items() if report[key]}
+
+    def _read(self, role: str) -> Batch:
+        batch = read_logs(getattr(self, role))
+        check_log(batch, lumped(self.sim.plant.robot), getattr(self, role))
+        return batch
+
+    def _options(self) -> Options:
+        from joblib import cpu_count
+
+        threads = self.workers if self.workers > 0 else cpu_count()
+        return Options(self.without, self.most, self.duels, self.nulls, threads, self.clocks == "synchronised")
+
+    def _written(self, found: Findings, batch: Batch, folder: Path, seconds: float) -> Mapping[str, Any]:
+        named = found.verdict.word in ("causes", "inseparable")
+        told = document(
+            found,
+            verified=in_bullet(found, iterations=self.sim.iterations) if named else None,
+            world_file=WORLD,
+            report=PAGE,
+            data=self._data(found, batch),
+            seconds=seconds,
+            command=f"gsl diagnose real={self.real}",
+        )
+        documents.write_json(folder / REPORT, told)
+        (folder / PAGE).write_text(report_html(told), encoding="utf-8")
+        (folder / WORLD).parent.mkdir()
+        (folder / WORLD).write_text(self._world(found, told["summary"]), encoding="utf-8")
+        return {
+            "verdict": told["verdict"],
+            "causes": [one["effect"] for one in told["causes"]],
+            "before": told["shrinkage"]["before"],
+            "after": told["shrinkage"]["after"],
+            "fraction": told["shrinkage"]["fraction"],
+        }
+
+    def _data(self, found: Findings, batch: Batch) -> dict[str, Any]:
+        exp = found.experiment
+        held = {int(k) for k in exp.pieces.record[exp.held_out]}
+        return {
+            "robot": exp.robot.name,
+            "sim": self.sim.robot,
+            "records": len(exp.records),
+            "seconds": sum(len(one) for one in exp.records) * exp.period,
+            "train": len(exp.records) - len(held) if exp.by_record else len(exp.records),
+            "held_out": len(held),
+            "windows": len(exp.pieces),
+            "source": self.real,
+            "reference": self.reference,
+            "engine": "chain",
+        }
+
+    def _world(self, found: Findings, summary: str) -> str:
+        config = described(self.sim)
+        config["effects"] = joined([config["effects"], diagnosed_effects(found)])
+        text = yaml.safe_dump(documents.plain(config), sort_keys=False, allow_unicode=True)
+        return f"# {summary}\n# The simulator with it switched on, and calibrated joint by joint.\n{text}"
+
+
+def _ticking(advance: Callable[[], None]) -> Callable[[], None]:
+    return lambda: advance()

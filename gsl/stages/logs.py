@@ -1,0 +1,97 @@
+"""Logs for a diagnosis: finding them, reading several as one, and refusing what cannot be diagnosed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from gsl.core.body import Robot
+from gsl.core.trajectory import Batch
+from gsl.diagnosis.experiment import SCORED, WARM_UP
+from gsl.errors import GslError, TrajectoryError
+from gsl.stages.training import data_file
+from gsl.storage.trajectories import read
+
+MOVES = 1e-4  # a command that changes less is constant [rad]
+BEYOND = 0.35  # measured past a joint's limits by more than this is another unit or another robot [rad]
+
+
+def log_files(reference: str) -> list[Path]:
+    """Return the trajectory files that a run, a file or a folder of parquet files stands for.
+
+    Raises:
+        ArtifactError: if there are none.
+    """
+    folder = Path(reference)
+    if folder.is_dir() and not (folder / "manifest.json").exists():
+        files = sorted(folder.glob("*.parquet"))
+        if files:
+            return files
+    return [data_file(reference)]
+
+
+def read_logs(reference: str) -> Batch:
+    """Return the trajectories of all files as one batch.
+
+    Raises:
+        TrajectoryError: if a file breaks the contract, or is of another robot or rate than the first.
+    """
+    files = log_files(reference)
+    batches = [read(path) for path in files]
+    first = batches[0]
+    for path, other in zip(files[1:], batches[1:], strict=True):
+        if other.joints != first.joints or abs(other.control_period - first.control_period) > 1e-9:
+            raise TrajectoryError(path, f"has other joints or another control period than {files[0].name}")
+    labels = [label for batch in batches for label in (batch.metadata.get("episodes") or [{}] * len(batch))]
+    episodes = tuple(episode for batch in batches for episode in batch.episodes)
+    return replace(first, episodes=episodes, metadata={**first.metadata, "episodes": labels})
+
+
+def check_log(batch: Batch, robot: Robot, name: str) -> None:
+    """Refuse a log that cannot be diagnosed as one of a robot in the air.
+
+    Raises:
+        GslError: with what is wrong and what to do.
+    """
+    if set(batch.joints) != set(robot.controlled):
+        missing = [joint for joint in robot.controlled if joint not in batch.joints]
+        other = [joint for joint in batch.joints if joint not in robot.controlled]
+        told = f"lacks {missing[0]}" if missing else f"has {other[0]}, which the {robot.name} has not"
+        raise GslError(f"{name}: a log of another robot? It {told}; choose the simulator with sim=")
+    if any(_walks(episode.sensors) for episode in batch.episodes):
+        raise GslError(
+            f"{name}: the robot stands or walks on the ground here; diagnose logs of a robot held in the air"
+        )
+    longest = max(len(episode) for episode in batch.episodes) * batch.control_period
+    if longest < WARM_UP + SCORED:
+        raise GslError(
+            f"{name}: too short, its longest trajectory lasts {longest:.2g} s; {WARM_UP + SCORED:g} s are needed"
+        )
+    if all(np.ptp(episode.action, axis=0).max() < MOVES for episode in batch.episodes):
+        raise GslError(
+            f"{name}: no command ever changes, so nothing shows; play a motion, see `gsl collect task=excite`"
+        )
+    _check_units(batch, robot, name)
+
+
+def _walks(sensors: object) -> bool:
+    """Whether feet carry load in a good part of an episode."""
+    forces = [values for key, values in getattr(sensors, "items", dict)() if key.startswith("foot_force")]
+    return bool(forces) and float(np.mean(np.sum(forces, axis=0) > 1.0)) > 0.2
+
+
+def _check_units(batch: Batch, robot: Robot, name: str) -> None:
+    for k, joint in enumerate(batch.joints):
+        limits = robot.joint(joint)
+        for what in ("action", "position"):
+            values = np.concatenate([getattr(episode, what)[:, k] for episode in batch.episodes])
+            worst = float(max(limits.lower - values.min(), values.max() - limits.upper))
+            if worst > BEYOND:
+                far = values[np.argmax(np.abs(values))]
+                hint = "are these degrees?" if abs(far) > 2.0 * np.pi else "is the zero or the sign another?"
+                raise GslError(
+                    f"{name}: {what}.{joint} reaches {far:.3g}, beyond the joint's limits "
+                    f"[{limits.lower:.2f}, {limits.upper:.2f}] rad; {hint}"
+                )
