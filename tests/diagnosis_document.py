@@ -61,6 +61,8 @@ def servo_gain(joint: str = "LKneePitch") -> dict[str, Any]:
     return {
         "effect": "servo_gain",
         "joints": [joint],
+        "scope": joint,
+        "fixed": {},
         "parameters": {
             "kp": {"value": 0.57, "low": 0.55, "high": 0.6, "unit": ""},
             "kd": {"value": 0.81, "low": 0.7, "high": 0.92, "unit": ""},
@@ -72,11 +74,28 @@ def servo_gain(joint: str = "LKneePitch") -> dict[str, Any]:
     }
 
 
+def zero_offset() -> dict[str, Any]:
+    """A cause that is an angle, on a group of joints that has a name."""
+    return {
+        "effect": "zero_offset",
+        "joints": list(NAO[:10]),
+        "scope": "legs",
+        "fixed": {},
+        "parameters": {"offset": {"value": 0.0175, "low": 0.0157, "high": 0.0192, "unit": "rad"}},
+        "probability": 0.6,
+        "gain": {"value": 0.9, "low": 0.8, "high": 0.95},
+        "documented": True,
+        "meaning": "A joint that was calibrated wrongly, in the servo: it stands elsewhere than it was told.",
+    }
+
+
 def latency() -> dict[str, Any]:
     """A cause with one parameter, outside its documented range."""
     return {
         "effect": "command_latency",
-        "joints": ["all"],
+        "joints": list(NAO),
+        "scope": "all",
+        "fixed": {},
         "parameters": {"delay": {"value": 0.0312, "low": 0.029, "high": 0.0335, "unit": "s"}},
         "probability": 0.999,
         "gain": {"value": 0.14, "low": 0.1, "high": 0.19},
@@ -141,7 +160,7 @@ def document(joints: tuple[str, ...] = NAO, *, causes: int = 2) -> dict[str, Any
             "correlation_before": 0.4,
             "correlation_after": 0.9,
         },
-        "world_file": "runs/worn/diagnose/world.yaml",
+        "world_file": "runs/worn/diagnose/world/diagnosed.yaml",
         "report": "runs/worn/diagnose/report.html",
         "data": {
             "robot": "nao",
@@ -165,6 +184,7 @@ def document(joints: tuple[str, ...] = NAO, *, causes: int = 2) -> dict[str, Any
                 {"truth": "command_latency", "answer": "sensor_delay", "count": 1},
             ],
         },
+        "verified": {"windows": 12, "chain_rms_mrad": 0.31, "rms": 1.07},
         "seconds": 42.0,
         "command": "gsl diagnose real=runs/worn/collect_real sim=nao_ideal",
     }
@@ -197,7 +217,7 @@ def inseparable() -> dict[str, Any]:
     return found | {
         "verdict": "inseparable",
         "summary": summary,
-        "causes": [],
+        "causes": [zero_offset()],
         "inseparable": [["zero_offset", "sensor_bias"]],
     }
 
@@ -212,6 +232,7 @@ def unknown() -> dict[str, Any]:
         "verdict": "unknown",
         "summary": summary,
         "causes": [],
+        "suspects": [servo_gain()],
         "ranking": ranking,
         "shrinkage": shrinkage,
         "next_experiment": None,

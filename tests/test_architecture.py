@@ -14,9 +14,10 @@ MAY_IMPORT = {
     "core": (),
     "effects": ("core",),
     **{room: ("core", "effects", *COMPONENTS) for room in COMPONENTS},
+    "diagnosis": ("core", "effects", *COMPONENTS),
     "storage": ("core", "effects", *COMPONENTS),
     "report": ("core", "effects", *COMPONENTS),
-    "stages": ("core", "effects", *COMPONENTS, "storage", "report"),
+    "stages": ("core", "effects", *COMPONENTS, "diagnosis", "storage", "report"),
 }
 ANYWHERE = ("errors", "console")
 COMPOSING = ("composer", "config_errors", "known_settings", "multirun")

@@ -72,14 +72,14 @@ class Arena:
         held_out: Windows of the others.
         library: The candidates.
         scopes: Names of scopes and their joints, each of shape (n_joints,).
-        tick: Called whenever some work is done.
+        tick: Called with a phase when it begins, and with an empty word whenever some work is done.
     """
 
     train: Bench
     held_out: Bench
     library: tuple[Candidate, ...]
     scopes: Mapping[str, np.ndarray]
-    tick: Callable[[], None]
+    tick: Callable[[str], None]
 
     def calibration(self) -> Hypothesis:
         """Return the hypothesis without an effect."""
@@ -106,7 +106,7 @@ class Arena:
         size, record = self.held_out.comparison.used(z.shape[1]).sum(), self.held_out.pieces.record
         names = np.unique(record)
         costs = np.array([loss(z[record == name]).sum() for name in names])
-        self.tick()
+        self.tick("")
         return Hypothesis(candidates, parameters, fit, costs, np.array([size * (record == k).sum() for k in names]))
 
     def ground(self, base: Hypothesis) -> Ground:
@@ -136,7 +136,9 @@ class Arena:
         used = self.train.comparison.used(ground.residual.shape[1]) * len(ground.residual)
         excess = np.maximum(0.0, ground.costs - used)
         order = np.argsort(excess)[::-1][:LOCAL]
-        joints = [name for name, mask in self.scopes.items() if mask.sum() == 1 and name not in ("all",)]
+        joints = [name for name, mask in self.scopes.items() if mask.sum() == 1]
+        if len(joints) < len(excess):
+            return []
         return [joints[k] for k in order if excess[k] > DOMINANT * excess.sum()]
 
 
@@ -167,8 +169,11 @@ def gain(better: Hypothesis, worse: Hypothesis, *, samples: int = 1000, seed: in
     return Gain(float(difference.sum() + extra), float(low), float(high), float((totals > 0.0).mean()))
 
 
-def scopes_of(groups: Mapping[str, Sequence[str]], joints: Sequence[str]) -> dict[str, np.ndarray]:
-    """Return all joints, the robot's groups and each joint as scopes, each of shape (n_joints,)."""
-    everything = {"all": tuple(joints), **groups, **{joint: (joint,) for joint in joints}}
+def scopes_of(
+    groups: Mapping[str, Sequence[str]], joints: Sequence[str], *, apart: bool = True
+) -> dict[str, np.ndarray]:
+    """Return all joints, the robot's groups and, if joints are `apart`, each joint as scopes: shapes (n_joints,)."""
+    single = {joint: (joint,) for joint in joints} if apart else {}
+    everything = {"all": tuple(joints), **groups, **single}
     masks = {name: np.array([joint in members for joint in joints]) for name, members in everything.items()}
     return {name: mask for name, mask in masks.items() if mask.any()}

@@ -92,6 +92,7 @@ def library(
     known: Mapping[str, Mapping[str, Any]] | None = None,
     *,
     dense: bool = False,
+    floating: bool = False,
 ) -> tuple[Candidate, ...]:
     """Return all candidates, those on joints with the scope `all`.
 
@@ -99,10 +100,11 @@ def library(
         robot: Whose links can be chosen.
         without: Effects that are left out.
         known: Values of parameters that a look at the log has found already, by effect.
+        floating: Whether the base is loaded, and no limb: their masses are found in the air.
         dense: Whether the grids of the strengths are fine.
     """
     shares = DENSE if dense else ONE_SIDED
-    moving = [joint.child for joint in lumped(robot).joints]
+    moving = [robot.base] if floating else [joint.child for joint in lumped(robot).joints]
     return tuple(
         made
         for name in names()

@@ -45,12 +45,14 @@ def learned_residual(found: Experiment, told: np.ndarray, *, seed: int = 0) -> n
 def _samples(found: Experiment, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return inputs, shape (W, scored, n_inputs), and what is to be predicted, shape (W, scored, n_joints)."""
     cut, first = found.pieces, found.pieces.warm_up
-    commands = cut.windows.commands[:, : told.shape[1], : told.shape[2]][:, ::-1]
-    behind = commands - told
-    lagged = [behind[:, first - lag : behind.shape[1] - lag] for lag in LAGS]
+    joints = len(found.joints)
+    commands = cut.windows.commands[:, : told.shape[1], :joints][:, ::-1]
+    behind = commands - told[..., :joints]
+    lagged = [behind[:, first - lag : behind.shape[1] - lag] for lag in LAGS if lag <= first]
     speed = np.gradient(told, axis=1)[:, first:]
     targets = np.clip((cut.real - told) / found.comparison.floor, -CLIP, CLIP)[:, first:]
-    return np.concatenate([*lagged, speed, told[:, first:], np.sign(speed)], axis=2), targets
+    place = told[:, first:] - np.where(np.arange(told.shape[2]) < joints, 0.0, told[:, first : first + 1])
+    return np.concatenate([*lagged, speed, place, np.sign(speed)], axis=2), targets
 
 
 def _flat(inputs: np.ndarray, targets: np.ndarray) -> Samples:

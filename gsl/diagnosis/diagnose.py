@@ -13,8 +13,9 @@ from gsl.core.trajectory import Batch
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Arena, Hypothesis, scopes_of
 from gsl.diagnosis.candidates import library
-from gsl.diagnosis.experiment import Experiment, experiment
-from gsl.diagnosis.replay import Effects, InTheAir
+from gsl.diagnosis.experiment import Experiment, experiment, fitting_step
+from gsl.diagnosis.on_ground import Walking, restart_error
+from gsl.diagnosis.replay import Effects, Simulator
 from gsl.diagnosis.select import Selection, Thresholds, selected
 from gsl.diagnosis.self_test import Trial, duels, null_gains
 from gsl.diagnosis.verdict import Verdict, judged
@@ -23,6 +24,8 @@ from gsl.effects.effect import applied, built, effect_class, names
 NOISE_COST = 0.96  # robust cost of a residual that is noise and nothing else
 GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best gain of chance it has to be
 RIVALS = 3  # hypotheses that duel, at most
+ON_FOOT = 0.1  # share of the cost that chance gains on the ground, where no log can be simulated: measured on walks
+RESTARTS = 40  # windows that measure what a log does not show of a walk
 ON_GROUND = ("contact",)  # kinds of effects that a robot in the air cannot show
 
 
@@ -78,7 +81,7 @@ class Findings:
     """
 
     experiment: Experiment
-    simulator: InTheAir
+    simulator: Simulator
     arena: Arena
     selection: Selection
     verdict: Verdict
@@ -93,12 +96,13 @@ def diagnosed(
     plant: Plant,
     step: float,
     options: Options,
-    tick: Callable[[], None],
+    tick: Callable[[str], None],
     *,
     reference: Batch | None = None,
+    walking: bool = False,
     known_nulls: Sequence[float] | None = None,
 ) -> Findings:
-    """Diagnose a log of a robot in the air.
+    """Diagnose a log.
 
     Args:
         log: Checked against the contract; of `robot`.
@@ -106,40 +110,53 @@ def diagnosed(
         plant: The simulator.
         step: Its physics period [s].
         options: How.
-        tick: Called whenever some work is done.
+        tick: Called with a phase when it begins, and with an empty word whenever some work is done.
+        walking: Whether the robot is on the ground.
         reference: A log without the effect, on which the nominal is calibrated first.
         known_nulls: What chance gained on these commands in this world, if it is known already.
     """
+    if reference is not None:
+        tick("calibrating the simulator on the reference")
     baseline = None if reference is None else calibrated_on(reference, robot, plant, step, options, tick)
-    found = experiment(log, robot)
+    found = experiment(log, robot, walking=walking)
+    if walking:
+        simulator = Walking(plant, fitting_step(step, found.period), found.period, workers=options.threads)
+        spread = found.pieces.chosen(np.arange(0, len(found.pieces), max(1, len(found.pieces) // RESTARTS)))
+        found = found.with_model_error(restart_error(simulator, spread))
     if baseline is not None:
         plant = nuisance.calibrated(applied(plant, built(baseline.effects)), baseline.nuisances)
         found = found.with_model_error(baseline.error)
     arena = arena_of(found, plant, step, options, tick)
     nulls = tuple(known_nulls or ())
-    if options.nulls and not nulls:
+    if options.nulls and not nulls and not walking:
+        tick("self-test: what chance gains on these commands")
         nulls = tuple(null_gains(found, arena, arena.calibration(), options.nulls, tick))
-    thresholds = Thresholds(gain=max(GAIN, CHANCE * max(nulls, default=0.0)))
+    chance = ON_FOOT if walking else 0.0
+    thresholds = Thresholds(gain=max(GAIN, CHANCE * max(nulls, default=0.0)), share=chance)
+    tick("trying the library on the log")
     selection = selected(arena, thresholds, most=options.most)
     survivors = _survivors(selection)
-    trials = tuple(duels(found, arena, survivors, options.duels, tick)) if options.duels else ()
+    tick("self-test: can the causes that are left be told apart")
+    trials = tuple(duels(found, arena, survivors, options.duels, tick)) if options.duels and not walking else ()
     verdict = judged(selection, _expected(selection, trials), _margins(trials, survivors))
     return Findings(found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline)
 
 
-def arena_of(found: Experiment, plant: Plant, step: float, options: Options, tick: Callable[[], None]) -> Arena:
+def arena_of(found: Experiment, plant: Plant, step: float, options: Options, tick: Callable[[str], None]) -> Arena:
     """Return where hypotheses on a log compete."""
     simulator = found.simulator(plant, step, options.threads)
-    hidden = [name for name in names() if getattr(effect_class(name), "kind", "") in ON_GROUND]
+    contact = () if found.walking else ON_GROUND
+    hidden = [name for name in names() if getattr(effect_class(name), "kind", "") in contact]
     hidden += [] if options.clocks else ["command_latency"]
     shaking = bool(found.comparison.shaking.any())
-    candidates = library(found.robot, (*options.without, *hidden, "external_push"), dense=shaking)
-    scopes = scopes_of(found.robot.groups, found.joints)
+    without = (*options.without, *hidden, "external_push")
+    candidates = library(found.robot, without, dense=shaking, floating=found.walking)
+    scopes = scopes_of({} if found.walking else found.robot.groups, found.channels, apart=not found.walking)
     return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick)
 
 
 def calibrated_on(
-    reference: Batch, robot: Robot, plant: Plant, step: float, options: Options, tick: Callable[[], None]
+    reference: Batch, robot: Robot, plant: Plant, step: float, options: Options, tick: Callable[[str], None]
 ) -> Baseline:
     """Fit the nominal to a log without the effect: whatever is found there belongs to the nominal from now on."""
     found = experiment(reference, robot)

@@ -31,7 +31,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
     """Return the whole document; `about` is what the caller knows besides: data, world_file, report, command, ..."""
     exp, chosen, sim = found.experiment, found.selection.chosen, found.simulator
     everything = exp.bench(sim, "all")
-    told = sim.told({}, nuisance.none(len(exp.joints)), exp.pieces)
+    told = sim.told({}, nuisance.none(len(exp.channels)), exp.pieces)
     z = exp.comparison.residual(told, exp.pieces)
     times, growth = horizon(exp, told)
     causes = [] if found.verdict.word in ("no_gap", "unknown") else [_cause(found, one) for one in found.verdict.causes]
@@ -48,11 +48,11 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "sides": sides(exp, z),
         "shrinkage": shrinkage(found, told, after),
         "ranking": _ranking(found),
-        "calibration": _calibration(exp.joints, chosen.fit.nuisances),
+        "calibration": _calibration(exp.joints, chosen.fit.nuisances[:, : len(exp.joints)]),
         "floor": {
             "source": exp.noise.source,
             "pairs": exp.noise.pairs,
-            "sd": dict(zip(exp.joints, exp.comparison.floor.tolist(), strict=True)),
+            "sd": dict(zip(exp.channels, exp.comparison.floor.tolist(), strict=True)),
         },
         "invisible": list(found.selection.screening.invisible),
         "caveats": _caveats(found),
@@ -150,7 +150,7 @@ def _caveats(found: Findings) -> list[str]:
     if not exp.by_record:
         said.append("There is one trajectory only: every second part of it was held out, which is weak evidence.")
     if exp.comparison.shaking.any():
-        names = ", ".join(name for name, shakes in zip(exp.joints, exp.comparison.shaking, strict=True) if shakes)
+        names = ", ".join(name for name, shakes in zip(exp.channels, exp.comparison.shaking, strict=True) if shakes)
         said.append(f"These joints shake while their commands rest and are judged by the spectrum: {names}.")
     still = [name for k, name in enumerate(exp.joints) if max(np.ptp(r.targets[:, k]) for r in exp.records) < 1e-6]
     if still:
@@ -181,7 +181,7 @@ def _replays(found: Findings, before: np.ndarray, after: np.ndarray) -> list[dic
     exp, n = found.experiment, len(found.experiment.joints)
     cut, first = exp.pieces, exp.pieces.warm_up
     held = exp.held_out
-    square = np.mean(((before - cut.real)[held, first:] / exp.comparison.floor) ** 2, axis=1)
+    square = np.mean((((before - cut.real) / exp.comparison.floor)[held, first:, :n]) ** 2, axis=1)
     worst = np.argsort(np.nan_to_num(square, nan=np.inf).max(axis=0))[::-1][:REPLAYS]
     shown = []
     for joint in worst:

@@ -11,11 +11,22 @@ from gsl.core.body import Robot
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.noise_floor import NoiseFloor, noise_floor
-from gsl.diagnosis.records import Pieces, Record, pieces, records
-from gsl.diagnosis.replay import Bench, InTheAir
+from gsl.diagnosis.on_ground import Walking
+from gsl.diagnosis.records import BASE, Pieces, Record, pieces, records
+from gsl.diagnosis.replay import Bench, InTheAir, Simulator
 from gsl.diagnosis.residual import Comparison, comparison
 
 WARM_UP, SCORED = 0.4, 0.6  # of a window [s]: shorter warm-ups bias friction, whose state a log does not show
+ON_GROUND = (0.1, 0.2)  # the same for a walk, where replays part soon
+WALKS = 200  # windows of walks that are looked at, spread over all
+LEAST = {
+    "x": 1e-3,
+    "y": 1e-3,
+    "z": 1e-3,
+    "roll": 2e-3,
+    "pitch": 2e-3,
+    "yaw": 2e-3,
+}  # floor of the base [m], [rad]: estimate
 FIT_WINDOWS = 20  # windows that a fit uses, spread over the training records
 STILL = 1e-6  # a command that moves less rests [rad]
 
@@ -51,11 +62,23 @@ class Experiment:
         """Names of the logged joints."""
         return self.robot.controlled
 
-    def simulator(self, plant: Plant, step: float, threads: int) -> InTheAir:
+    @property
+    def walking(self) -> bool:
+        """Whether the robot is on the ground."""
+        return self.records[0].base is not None
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of what is compared: the joints, and the base if it moves."""
+        return (*self.joints, *BASE) if self.walking else self.joints
+
+    def simulator(self, plant: Plant, step: float, threads: int) -> Simulator:
         """Return what replays the log's commands in a plant."""
+        if self.walking:
+            return Walking(plant, fitting_step(step, self.period), self.period, workers=threads)
         return InTheAir(plant, fitting_step(step, self.period), self.period, threads)
 
-    def bench(self, simulator: InTheAir, part: str) -> Bench:
+    def bench(self, simulator: Simulator, part: str) -> Bench:
         """Return the windows of a part, `train` (thinned), `held_out` or `all`, with a simulator."""
         chosen = {
             "train": _spread(self.train, FIT_WINDOWS),
@@ -69,20 +92,34 @@ class Experiment:
         return replace(self, comparison=replace(self.comparison, floor=np.hypot(self.comparison.floor, error)))
 
 
-def experiment(batch: Batch, robot: Robot) -> Experiment:
+def experiment(batch: Batch, robot: Robot, *, walking: bool = False) -> Experiment:
     """Prepare a log.
 
     Args:
         batch: Of this robot, with records long enough for a window.
         robot: Whose motors follow.
+        walking: Whether it is on the ground.
     """
-    found, period = records(batch, robot), batch.control_period
+    found, period = records(batch, robot, walking=walking), batch.control_period
+    if walking:
+        return _on_ground(found, robot, period)
     warm_up, scored = round(WARM_UP / period), round(SCORED / period)
     noise = noise_floor(found, robot.encoder_step)
     cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
     commands = cut.windows.commands[:, : warm_up + scored, : len(robot.controlled)]
     held, by_record = _held_out(found, cut)
     how = comparison(cut, noise, np.ptp(commands, axis=1) < STILL)
+    return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
+
+
+def _on_ground(found: tuple[Record, ...], robot: Robot, period: float) -> Experiment:
+    warm_up, scored = (round(part / period) for part in ON_GROUND)
+    cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
+    cut = cut.chosen(_spread(np.arange(len(cut)), WALKS))
+    joints = np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
+    noise = noise_floor(found, robot.encoder_step, np.r_[joints, list(LEAST.values())])
+    held, by_record = _held_out(found, cut)
+    how = Comparison(noise.sd, np.zeros(len(noise.sd), dtype=bool))
     return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
 
 

@@ -34,6 +34,8 @@ def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarr
         at: Nuisances, shape (4, n_joints).
         base: Residuals there.
     """
+    if not bench.simulator.calibrates:
+        return np.zeros((len(nuisance.PROBES), *base.shape))
     columns = []
     for row, probe in enumerate(nuisance.PROBES):
         moved = at.copy()

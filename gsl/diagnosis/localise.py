@@ -9,13 +9,14 @@ import numpy as np
 
 from gsl.core.body import Robot
 from gsl.diagnosis.experiment import Experiment
-from gsl.diagnosis.replay import InTheAir
+from gsl.diagnosis.replay import Simulator
 
 REST, FAST = 0.01, 0.12  # shares of the no-load speed: slower is rest, faster is fast
 REVERSAL = 0.06  # before and after a change of direction [s]
 LOADED, SATURATED = 0.4, 1.0  # shares of the torque limit that the nominal servo would want
 SAMPLES = 400  # of the bootstrap over records
-REGIMES = ("all", "rest", "slow", "fast", "reversal", "high_load", "saturated", "early", "late")
+OF_ALL = ("all", "early", "late", "after_contact")  # regimes to which the base belongs
+CONTACT = 0.08  # after a foot has touched the ground [s]
 
 
 @dataclass(frozen=True)
@@ -73,15 +74,15 @@ def cells(found: Experiment, z: np.ndarray, regimes: Mapping[str, np.ndarray]) -
                 float(rms[0, j]),
                 bool(least[j] > 1.0 and enough[j]),
             )
-            for j, joint in enumerate(found.joints)
+            for j, joint in enumerate(found.channels)
         ]
     return result
 
 
-def regimes(found: Experiment, simulator: InTheAir) -> dict[str, np.ndarray]:
+def regimes(found: Experiment, simulator: Simulator) -> dict[str, np.ndarray]:
     """Return which residuals of all windows belong to which regime, shape (W, scored, n_joints) each."""
     cut, servo, n = found.pieces, simulator.plant.servo, len(found.joints)
-    real = cut.real
+    real = cut.real[..., :n]
     speed = np.gradient(real, found.period, axis=1)
     commands = cut.windows.commands[:, : real.shape[1], :n][:, ::-1]
     wanted = np.abs(servo.kp[:n] * (commands - real)) / servo.limit[:n]
@@ -99,7 +100,39 @@ def regimes(found: Experiment, simulator: InTheAir) -> dict[str, np.ndarray]:
         "early": np.broadcast_to((tick < length / 3)[..., None], real.shape),
         "late": np.broadcast_to((tick >= 2 * length / 3)[..., None], real.shape),
     }
-    return {key: masks[key][:, cut.warm_up :] for key in REGIMES}
+    if found.walking:
+        masks |= _phases(found)
+    wide = {key: _widened(mask, len(found.channels), key) for key, mask in masks.items()}
+    return {key: mask[:, cut.warm_up :] for key, mask in wide.items()}
+
+
+def _widened(mask: np.ndarray, channels: int, key: str) -> np.ndarray:
+    """Add columns for the base, which belongs to the regimes that are of the whole robot."""
+    if mask.shape[2] == channels:
+        return mask
+    whole = mask.any(axis=2, keepdims=True) if key in OF_ALL else np.zeros((*mask.shape[:2], 1), dtype=bool)
+    return np.concatenate([mask, np.repeat(whole, channels - mask.shape[2], axis=2)], axis=2)
+
+
+def _phases(found: Experiment) -> dict[str, np.ndarray]:
+    """Return when each leg stands, swings, and has just touched the ground, by the feet; arms belong to none."""
+    cut, shape = found.pieces, (*found.pieces.real.shape[:2], len(found.joints))
+    masks = {key: np.zeros(shape, dtype=bool) for key in ("stance", "swing", "after_contact")}
+    legs = found.robot.groups.get("legs", ())
+    reach = round(CONTACT / found.period)
+    for w, (record, tick) in enumerate(zip(cut.record, cut.tick, strict=True)):
+        feet = found.records[record].feet
+        if feet is None:
+            continue
+        landed = feet & ~np.vstack([np.ones((1, 2), dtype=bool), feet[:-1]])
+        recent = np.array([landed[max(0, k - reach) : k + 1].any(axis=0) for k in range(len(feet))])
+        rows = slice(tick + 1, tick + 1 + shape[1])
+        for j, joint in enumerate(found.joints):
+            if joint in legs:
+                side = int(joint.startswith("R"))
+                masks["stance"][w, :, j], masks["swing"][w, :, j] = feet[rows, side], ~feet[rows, side]
+                masks["after_contact"][w, :, j] = recent[rows, side]
+    return masks
 
 
 def horizon(found: Experiment, told: np.ndarray) -> tuple[list[float], dict[str, list[float]]]:
@@ -107,7 +140,7 @@ def horizon(found: Experiment, told: np.ndarray) -> tuple[list[float], dict[str,
     z = (told - found.pieces.real) / found.comparison.floor
     rms = np.sqrt(np.nanmean(np.clip(z, -1e3, 1e3) ** 2, axis=0))
     times = found.period * np.arange(1, z.shape[1] + 1)
-    return times.tolist(), {joint: rms[:, j].tolist() for j, joint in enumerate(found.joints)}
+    return times.tolist(), {joint: rms[:, j].tolist() for j, joint in enumerate(found.channels)}
 
 
 def sides(found: Experiment, z: np.ndarray) -> list[dict[str, object]]:

@@ -31,17 +31,18 @@ class NoiseFloor:
     resolution: float
 
 
-def noise_floor(found: Sequence[Record], resolution: float) -> NoiseFloor:
+def noise_floor(found: Sequence[Record], resolution: float, least: np.ndarray | None = None) -> NoiseFloor:
     """Measure the floor.
 
     Args:
         found: All records.
         resolution: Of the encoders [rad]; the floor is at least what rounding makes, resolution / sqrt(12).
+        least: Least floor of each channel instead, shape (n_channels,).
     """
-    least = max(resolution / np.sqrt(12.0), 1e-5)
+    least = np.array(max(resolution / np.sqrt(12.0), 1e-5)) if least is None else least
     groups = [group for group in _repeats(found) if len(group) > 1]
     if groups:
-        spread = [np.array([one.position[SETTLED:] for one in group]) for group in groups]
+        spread = [np.array([one.measured[SETTLED:] for one in group]) for group in groups]
         square = sum(part.var(axis=0, ddof=1).sum(axis=0) for part in spread) / sum(part.shape[1] for part in spread)
         return NoiseFloor(
             np.maximum(np.sqrt(square), least), "repeats", sum(len(group) - 1 for group in groups), resolution
@@ -61,8 +62,8 @@ def _roughness(found: Sequence[Record]) -> np.ndarray:
     """Return the size of third differences where the motion is slow: that of white noise is sqrt(20) times its own."""
     rough, speed = [], []
     for one in found:
-        rough.append(np.diff(one.position, 3, axis=0) ** 2 / 20.0)
-        speed.append(np.abs(one.velocity[2:-1]))
+        rough.append(np.diff(one.measured, 3, axis=0) ** 2 / 20.0)
+        speed.append(np.abs(np.gradient(one.measured, axis=0)[2:-1]))
     all_rough, all_speed = np.vstack(rough), np.vstack(speed)
     slow = all_speed <= np.quantile(all_speed, QUIET, axis=0)
     return np.sqrt(np.array([np.mean(column[keep]) for column, keep in zip(all_rough.T, slow.T, strict=True)]))

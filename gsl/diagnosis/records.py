@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import savgol_filter
+from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Robot
-from gsl.core.trajectory import Batch
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.core.transitions import usable
 from gsl.worlds.held import Windows
 from gsl.worlds.servo import COMMANDS
 
+BASE = ("base.x", "base.y", "base.z", "base.roll", "base.pitch", "base.yaw")
+LOADED = 3.0  # on a foot that stands [N]
 SMOOTHER = 7  # ticks of the cubic that tells a window's first velocity
 
 
@@ -25,32 +30,79 @@ class Record:
         targets: Of the motors [rad], shape (T, n_motors).
         position: Measured before each command and after the last one [rad], shape (T + 1, n_joints).
         velocity: Slope of a smoother through the positions [rad/s], shape (T + 1, n_joints).
+        base: Of a robot on the ground: place [m] and roll, pitch, yaw [rad] as in BASE, quaternion, velocity in world
+            axes [m/s], angular velocity in base axes [rad/s], shape (T + 1, 16); None in the air.
+        feet: Whether the left and the right foot carry load, shape (T + 1, 2), if it was logged.
     """
 
     name: str
     targets: np.ndarray
     position: np.ndarray
     velocity: np.ndarray
+    base: np.ndarray | None = None
+    feet: np.ndarray | None = None
 
     def __len__(self) -> int:
         """Control periods T."""
         return len(self.targets)
 
+    @property
+    def measured(self) -> np.ndarray:
+        """Joints, and the base's place and angles if it moves, shape (T + 1, n_channels)."""
+        return self.position if self.base is None else np.hstack([self.position, self.base[:, : len(BASE)]])
 
-def records(batch: Batch, robot: Robot) -> tuple[Record, ...]:
-    """Return a batch's trajectories as records, in order.
+
+def records(batch: Batch, robot: Robot, *, walking: bool = False) -> tuple[Record, ...]:
+    """Return a batch's trajectories as records, in order, each up to its fall.
 
     Args:
         batch: Its joints are the robot's controlled ones.
         robot: Whose motors follow.
+        walking: Whether the base moves and is logged.
     """
     labels = batch.metadata.get("episodes") or []
     names = [str(label.get("policy", "")) for label in labels] if len(labels) == len(batch) else [""] * len(batch)
-    drive = robot.drive
+    order = [batch.joints.index(joint) for joint in robot.controlled]
     return tuple(
-        Record(name, episode.action[:, drive], episode.position, slope(episode.position, batch.control_period))
+        _record(name, episode, order, robot, batch.control_period, walking=walking)
         for name, episode in zip(names, batch.episodes, strict=True)
     )
+
+
+def _record(
+    name: str, episode: Trajectory, order: Sequence[int], robot: Robot, period: float, *, walking: bool
+) -> Record:
+    ticks = usable(episode)
+    position = episode.position[: ticks + 1, order]
+    base = _base(episode, period)[: ticks + 1] if walking else None
+    feet = _columns(episode, "foot_force", ("left", "right"))[: ticks + 1] > LOADED if _has_feet(episode) else None
+    return Record(name, episode.action[:ticks][:, order][:, robot.drive], position, slope(position, period), base, feet)
+
+
+def _has_feet(episode: Trajectory) -> bool:
+    return "foot_force.left" in episode.sensors
+
+
+def _base(episode: Trajectory, period: float) -> np.ndarray:
+    """Return the base columns of a record; velocities are the log's own, else slopes."""
+    place = _columns(episode, "base.position", "xyz")
+    quaternion = _columns(episode, "base.orientation", "xyzw")
+    turn = Rotation.from_quat(quaternion)
+    angles = np.unwrap(turn.as_euler("ZYX")[:, ::-1], axis=0)
+    logged = "base.velocity.x" in episode.sensors
+    velocity = _columns(episode, "base.velocity", "xyz") if logged else slope(place, period)
+    gyro = _columns(episode, "gyro", "xyz") if "gyro.x" in episode.sensors else _spin(turn, period)
+    return np.hstack([place, angles, quaternion, velocity, gyro])
+
+
+def _columns(episode: Trajectory, name: str, axes: Sequence[str]) -> np.ndarray:
+    return np.stack([episode.sensors[f"{name}.{axis}"] for axis in axes], axis=1)
+
+
+def _spin(turn: Rotation, period: float) -> np.ndarray:
+    """Return the angular velocity in base axes from one tick to the next [rad/s], shape (T + 1, 3)."""
+    steps = (turn[:-1].inv() * turn[1:]).as_rotvec() / period
+    return np.vstack([steps, steps[-1:]])
 
 
 def slope(position: np.ndarray, period: float) -> np.ndarray:
@@ -59,19 +111,37 @@ def slope(position: np.ndarray, period: float) -> np.ndarray:
     return savgol_filter(position, length, min(3, length - 1), deriv=1, delta=period, axis=0, mode="interp")
 
 
+class OnGround(NamedTuple):
+    """Windows of a robot on the ground; see `held.Windows` for the first three.
+
+    Attributes:
+        base: At the beginning, as in `Record`, shape (W, 16).
+    """
+
+    commands: np.ndarray
+    motion: np.ndarray
+    clock: np.ndarray
+    base: np.ndarray
+
+    @property
+    def length(self) -> int:
+        """Control periods of a window, T."""
+        return self.commands.shape[1] - COMMANDS + 1
+
+
 @dataclass(frozen=True)
 class Pieces:
     """Windows of records and what was measured in them.
 
     Attributes:
-        windows: To replay.
-        real: Positions after each control period [rad], shape (W, T, n_joints).
+        windows: To replay; on the ground with the base at the beginning.
+        real: Measured after each control period, shape (W, T, n_channels): joints [rad], then BASE if it moves.
         record: Index of each window's record, shape (W,).
         tick: Control period at which each begins, shape (W,).
         warm_up: Control periods at the beginning that are not scored.
     """
 
-    windows: Windows
+    windows: Windows | OnGround
     real: np.ndarray
     record: np.ndarray
     tick: np.ndarray
@@ -83,7 +153,7 @@ class Pieces:
 
     def chosen(self, index: np.ndarray) -> Pieces:
         """Return some of the windows."""
-        windows = Windows(*(part[index] for part in self.windows))
+        windows = type(self.windows)(*(part[index] for part in self.windows))
         return Pieces(windows, self.real[index], self.record[index], self.tick[index], self.warm_up)
 
 
@@ -98,14 +168,16 @@ def pieces(found: Sequence[Record], robot: Robot, period: float, *, warm_up: int
         scored: Control periods that are.
     """
     drive, length = robot.drive, warm_up + scored
-    commands, motion, real, record, tick = [], [], [], [], []
+    commands, motion, real, record, tick, base = [], [], [], [], [], []
     for index, one in enumerate(found):
         padded = np.vstack([np.repeat(one.targets[:1], COMMANDS, axis=0), one.targets])
         for start in range(0, len(one) - length + 1, scored):
             commands.append(padded[start + 1 : start + COMMANDS + length][::-1])
             motion.append([one.position[start, drive], one.velocity[start, drive]])
-            real.append(one.position[start + 1 : start + 1 + length])
+            real.append(one.measured[start + 1 : start + 1 + length])
+            base.append(None if one.base is None else one.base[start])
             record.append(index)
             tick.append(start)
-    windows = Windows(np.array(commands), np.array(motion), period * np.array(tick, dtype=float))
+    parts = np.array(commands), np.array(motion), period * np.array(tick, dtype=float)
+    windows = Windows(*parts) if base[0] is None else OnGround(*parts, np.array(base))
     return Pieces(windows, np.array(real), np.array(record), np.array(tick), warm_up)

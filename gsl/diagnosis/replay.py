@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -34,6 +34,7 @@ class InTheAir:
     step: float
     period: float
     threads: int = 1
+    calibrates = True
     _pool: ThreadPoolExecutor = field(default_factory=ThreadPoolExecutor, repr=False, compare=False)
 
     def told(self, effects: Effects, nuisances: np.ndarray, pieces: Pieces) -> np.ndarray:
@@ -47,6 +48,31 @@ class InTheAir:
         return result[..., : nuisances.shape[1]]
 
 
+class Simulator(Protocol):
+    """Something that replays windows.
+
+    Attributes:
+        calibrates: Whether nuisances are fitted in its replays.
+    """
+
+    calibrates: bool
+
+    @property
+    def plant(self) -> Plant:
+        """The simulator as the user has it."""
+
+    @property
+    def step(self) -> float:
+        """Physics period [s]."""
+
+    @property
+    def period(self) -> float:
+        """Control period [s]."""
+
+    def told(self, effects: Effects, nuisances: np.ndarray, pieces: Pieces) -> np.ndarray:
+        """Return what replays say, shape (W, T, n_channels)."""
+
+
 @dataclass(frozen=True)
 class Bench:
     """A log on which counterfactuals compete.
@@ -57,13 +83,13 @@ class Bench:
         comparison: How both are compared.
     """
 
-    simulator: InTheAir
+    simulator: Simulator
     pieces: Pieces
     comparison: Comparison
 
     @property
     def joints(self) -> int:
-        """Number of logged joints."""
+        """Number of logged joints, base channels included."""
         return self.pieces.real.shape[2]
 
     def residual(self, effects: Effects, nuisances: np.ndarray) -> np.ndarray:

@@ -70,7 +70,7 @@ def screened(
     ground: Ground,
     candidates: Iterable[Candidate],
     scopes: Mapping[str, np.ndarray],
-    console: Callable[[], None],
+    tick: Callable[[str], None],
 ) -> Screening:
     """Try every candidate on top of what is switched on.
 
@@ -79,7 +79,7 @@ def screened(
         ground: Where to start.
         candidates: Those on joints may have any scope; `all` is read out for every scope in `scopes`.
         scopes: Names of scopes and their joints, each of shape (n_joints,).
-        console: Called after each candidate.
+        tick: Called with an empty word after each candidate.
     """
     leads: list[Lead] = []
     seen: dict[str, float] = {}
@@ -89,7 +89,7 @@ def screened(
         seen[candidate.effect] = max(trace, seen.get(candidate.effect, 0.0))
         if trace > 0.0:
             leads += _leads(candidate, grid, (costs, nuisances), ground, scopes)
-        console()
+        tick("")
     leads.sort(key=lambda lead: lead.cost)
     return Screening(tuple(leads), tuple(sorted(name for name, trace in seen.items() if trace <= INVISIBLE)))
 

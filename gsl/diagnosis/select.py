@@ -20,10 +20,12 @@ class Thresholds:
     Attributes:
         gain: Of a first effect over calibration alone.
         further: Of a further effect.
+        share: Of the cost of what stands, that any effect has to explain.
     """
 
     gain: float = 20.0
     further: float = 20.0
+    share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def selected(arena: Arena, thresholds: Thresholds, *, most: int = 3) -> Selectio
     none = arena.calibration()
     singles, screening = arena.successors(none)
     tried, chosen = [none, *singles], none
-    if singles and _stands(singles[0], none, thresholds.gain):
+    if singles and _stands(singles[0], none, max(thresholds.gain, thresholds.share * none.cost)):
         chosen = singles[0]
         beam = _distinct(singles)
         while len(chosen.candidates) < most:
@@ -80,7 +82,8 @@ def _stands(one: Hypothesis, other: Hypothesis, least: float) -> bool:
 
 def _least(thresholds: Thresholds, standing: Hypothesis) -> float:
     """Return what a further effect has to gain over what stands."""
-    return max(thresholds.further, LEAST_SHARE * max(0.0, standing.cost - float(standing.counts.sum())))
+    floor = max(thresholds.further, thresholds.share * standing.cost)
+    return max(floor, LEAST_SHARE * max(0.0, standing.cost - float(standing.counts.sum())))
 
 
 def _distinct(singles: list[Hypothesis]) -> list[Hypothesis]:

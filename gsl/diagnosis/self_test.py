@@ -81,7 +81,9 @@ def relogged(found: Experiment, arena: Arena, effects: Hypothesis, rng: np.rando
     return replace(arena, train=benches[0], held_out=benches[1])
 
 
-def null_gains(found: Experiment, arena: Arena, none: Hypothesis, count: int, tick: Callable[[], None]) -> list[float]:
+def null_gains(
+    found: Experiment, arena: Arena, none: Hypothesis, count: int, tick: Callable[[str], None]
+) -> list[float]:
     """Return the best gains over calibration in logs without an effect."""
     gains = []
     for trial in range(count):
@@ -89,12 +91,12 @@ def null_gains(found: Experiment, arena: Arena, none: Hypothesis, count: int, ti
         base = fake.calibration()
         singles, _ = fake.successors(base, 4)
         gains.append(base.cost - singles[0].cost if singles else 0.0)
-        tick()
+        tick("")
     return gains
 
 
 def duels(
-    found: Experiment, arena: Arena, rivals: Sequence[Hypothesis], count: int, tick: Callable[[], None]
+    found: Experiment, arena: Arena, rivals: Sequence[Hypothesis], count: int, tick: Callable[[str], None]
 ) -> list[Trial]:
     """Return what comes of logs whose truth is one of the rivals, each `count` times, when the rivals are fitted."""
     trials = []
@@ -105,7 +107,7 @@ def duels(
             winner = min(fits, key=lambda one: one.cost)
             costs = tuple(one.cost for one in fits)
             trials.append(Trial(truth.names, winner.names, costs, fits[k].level))
-            tick()
+            tick("")
     return trials
 
 

@@ -38,7 +38,7 @@ def shrinkage(found: Findings, before: np.ndarray, after: np.ndarray) -> dict[st
         "ceiling_fraction": _ceiling(found, before, z["before"][held], used),
         "by_joint": [
             {"joint": joint, "before": float(np.sqrt(mean["before"][k])), "after": float(np.sqrt(mean["after"][k]))}
-            for k, joint in enumerate(exp.joints)
+            for k, joint in enumerate(exp.channels)
         ],
         "by_regime": _by_regime(found, z),
     }

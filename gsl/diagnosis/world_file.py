@@ -20,7 +20,7 @@ def diagnosed_effects(found: Findings) -> dict[str, Any]:
     Every entry is one of a world's `effects:`; the calibration comes joint by joint.
     """
     joints, chosen = found.experiment.joints, found.selection.chosen
-    parts = [chosen.effects, calibration(joints, chosen.fit.nuisances)]
+    parts = [chosen.effects, calibration(joints, chosen.fit.nuisances[:, : len(joints)])]
     if found.baseline is not None:
         parts = [found.baseline.effects, calibration(joints, found.baseline.nuisances), *parts]
     return joined(parts)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from gsl.report.diagnosis_text import summary_lines
 from gsl.stages.headline import Unit, falls, unit_of
 from gsl.stages.measured import cells, columns
 from gsl.storage.artifact import Artifact
@@ -27,7 +28,8 @@ def account(artifact: Artifact) -> list[Told]:
     """Return the results of an artifact; of an unknown kind or of another version's, its metrics by name."""
     tell = _TELLERS.get(artifact.manifest.kind)
     try:
-        return [tell(artifact.folder, artifact.metrics, unit_of(artifact))] if tell else [_plain(artifact)]
+        told = tell(artifact.folder, artifact.metrics, unit_of(artifact)) if tell else _plain(artifact)
+        return [told] if isinstance(told, Told) else told
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return [_plain(artifact)]
 
@@ -175,8 +177,18 @@ def _worst(by_joint: Mapping[str, float]) -> str:
     return f"{joint} {by_joint[joint]:.2f}°"
 
 
-_TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told]] = {
+def _diagnose(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> list[Told]:
+    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    paths = {key: (folder / report[key]).as_posix() for key in ("world_file", "report")}
+    return [
+        Told(part[0], tuple(part[1]), [tuple(row) for row in part[2]], part[3])
+        for part in summary_lines(report | paths)
+    ]
+
+
+_TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told | list[Told]]] = {
     "collect": _collect,
+    "diagnose": _diagnose,
     "train_forward": _train_forward,
     "train_inverse": _train_inverse,
     "optimize": _optimize,

@@ -12,6 +12,7 @@ import yaml
 
 from gsl.core.body import lumped
 from gsl.core.described import described
+from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import Findings, Options, diagnosed
@@ -19,7 +20,7 @@ from gsl.diagnosis.document import document
 from gsl.diagnosis.verify import in_bullet
 from gsl.diagnosis.world_file import diagnosed_effects, joined
 from gsl.report.diagnosis import report_html
-from gsl.stages.logs import check_log, log_files, read_logs
+from gsl.stages.logs import check_log, log_files, on_ground, read_logs
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
 
@@ -62,16 +63,16 @@ class Diagnose:
         begin = time.perf_counter()
         robot = lumped(self.sim.plant.robot)
         logs = {role: self._read(role) for role in ("real", "reference") if getattr(self, role)}
-        with console.progress(0, "diagnosing") as progress:
-            found = diagnosed(
-                logs["real"],
-                robot,
-                self.sim.plant,
-                self.sim.step,
-                self._options(),
-                _ticking(progress.advance),
-                reference=logs.get("reference"),
-            )
+        found = diagnosed(
+            logs["real"],
+            robot,
+            self.sim.plant,
+            self.sim.step,
+            self._options(),
+            _telling(console),
+            reference=logs.get("reference"),
+            walking=on_ground(logs["real"]),
+        )
         return self._written(found, logs["real"], folder, time.perf_counter() - begin)
 
     def document(self, folder: Path) -> dict[str, Any]:
@@ -94,10 +95,10 @@ class Diagnose:
         return Options(self.without, self.most, self.duels, self.nulls, threads, self.clocks == "synchronised")
 
     def _written(self, found: Findings, batch: Batch, folder: Path, seconds: float) -> Mapping[str, Any]:
-        named = found.verdict.word in ("causes", "inseparable")
+        checked = found.verdict.word in ("causes", "inseparable") and not found.experiment.walking
         told = document(
             found,
-            verified=in_bullet(found, iterations=self.sim.iterations) if named else None,
+            verified=in_bullet(found, iterations=self.sim.iterations) if checked else None,
             world_file=WORLD,
             report=PAGE,
             data=self._data(found, batch),
@@ -129,7 +130,7 @@ class Diagnose:
             "windows": len(exp.pieces),
             "source": self.real,
             "reference": self.reference,
-            "engine": "chain",
+            "engine": "bullet" if exp.walking else "chain",
         }
 
     def _world(self, found: Findings, summary: str) -> str:
@@ -139,5 +140,6 @@ class Diagnose:
         return f"# {summary}\n# The simulator with it switched on, and calibrated joint by joint.\n{text}"
 
 
-def _ticking(advance: Callable[[], None]) -> Callable[[], None]:
-    return lambda: advance()
+def _telling(console: Any) -> Callable[[str], None]:
+    """Return what says a phase on the console; without one it only looks whether the user has had enough."""
+    return lambda phase: console.status(phase) if phase else checkpoint()

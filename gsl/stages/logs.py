@@ -50,7 +50,7 @@ def read_logs(reference: str) -> Batch:
 
 
 def check_log(batch: Batch, robot: Robot, name: str) -> None:
-    """Refuse a log that cannot be diagnosed as one of a robot in the air.
+    """Refuse a log that cannot be diagnosed.
 
     Raises:
         GslError: with what is wrong and what to do.
@@ -60,10 +60,8 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
         other = [joint for joint in batch.joints if joint not in robot.controlled]
         told = f"lacks {missing[0]}" if missing else f"has {other[0]}, which the {robot.name} has not"
         raise GslError(f"{name}: a log of another robot? It {told}; choose the simulator with sim=")
-    if any(_walks(episode.sensors) for episode in batch.episodes):
-        raise GslError(
-            f"{name}: the robot stands or walks on the ground here; diagnose logs of a robot held in the air"
-        )
+    if on_ground(batch) and not all("base.orientation.w" in episode.sensors for episode in batch.episodes):
+        raise GslError(f"{name}: a walk needs base.position and base.orientation columns; or log the robot in the air")
     longest = max(len(episode) for episode in batch.episodes) * batch.control_period
     if longest < WARM_UP + SCORED:
         raise GslError(
@@ -74,6 +72,11 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
             f"{name}: no command ever changes, so nothing shows; play a motion, see `gsl collect task=excite`"
         )
     _check_units(batch, robot, name)
+
+
+def on_ground(batch: Batch) -> bool:
+    """Whether the robot stands or walks on the ground in a log, as its feet tell."""
+    return any(_walks(episode.sensors) for episode in batch.episodes)
 
 
 def _walks(sensors: object) -> bool:

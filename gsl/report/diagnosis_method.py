@@ -1,0 +1,160 @@
+"""What a diagnosis rests on: data, noise floor, calibration, its own test, and what it cannot see."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from gsl.report.diagnosis_answers import OUTSIDE
+from gsl.report.diagnosis_html import Html, Part, bullets, element, section, table
+from gsl.report.diagnosis_verdict import cause_name, undocumented
+from gsl.report.diagnosis_words import NONE, Document, entries, finite, level, listed, name, part, said, short
+
+_ENGINES = {"chain": "chain model, robot in the air", "bullet": "Bullet, with the ground"}
+
+
+def caveats(document: Document) -> Html | None:
+    """Return what to be careful with."""
+    given = [str(caveat) for caveat in entries(document, "caveats")]
+    told: list[Part] = [
+        f"{cause_name(cause)} is {OUTSIDE}."
+        for cause in undocumented(document)
+        if not any(str(cause.get("effect")) in caveat for caveat in given)
+    ]
+    told += given
+    unseen = entries(document, "invisible")
+    if unseen:
+        told.append(f"This log cannot show: {listed([name(effect) for effect in unseen], most=99)}.")
+    return section("Caveats", bullets(told))
+
+
+def calibration(document: Document) -> Html | None:
+    """Return every joint's own small deviations."""
+    rows = [
+        (
+            said(one, "joint"),
+            _scaled(one.get("kp"), 1.0, decimals=3),
+            _scaled(one.get("kd"), 1.0, decimals=3),
+            _scaled(one.get("coulomb"), 1.0, decimals=4),
+            _scaled(one.get("zero"), 180.0 / math.pi, decimals=2),
+        )
+        for one in entries(document, "calibration")
+    ]
+    columns = ("joint", "kp, factor", "kd, factor", "Coulomb friction, added [N·m]", "zero of the log [°]")
+    note = (
+        "Small deviations that every robot has; they were refitted for every explanation, so that none hides in them."
+    )
+    return section("Calibration", table(columns, rows) if rows else None, note=note)
+
+
+def noise_floor(document: Document) -> Html | None:
+    """Return the noise of each joint's log."""
+    found = part(document, "floor")
+    rows = [
+        (str(joint), _scaled(sd, 1000.0, decimals=2), _scaled(sd, 180.0 / math.pi, decimals=3))
+        for joint, sd in part(found, "sd").items()
+    ]
+    pairs = found.get("pairs")
+    if found.get("source") == "repeats":
+        note = f"Measured: {pairs or 'some'} repeats of the same commands, and how far their logs differ."
+    else:
+        note = "Estimated from the roughness of the log: no motion was repeated. Repeats would make it sure."
+    return section("Noise floor", table(("joint", "sd [mrad]", "sd [°]"), rows) if rows else None, note=note)
+
+
+def _scaled(value: object, factor: float, *, decimals: int) -> str:
+    number = finite(value)
+    return NONE if number is None else f"{round(factor * number, decimals) + 0.0:.{decimals}f}".replace("-", "−")
+
+
+def policies(document: Document) -> Html | None:
+    """Return what policies are worth in real, in simulation and with the effects."""
+    found = part(document, "policies")
+    rows = [
+        (said(one, "name"), *(short(one.get(key)) for key in ("real", "sim", "with_effects")))
+        for one in entries(found, "rows")
+    ]
+    before, after = (found.get(f"correlation_{when}") for when in ("before", "after"))
+    told = f"Rank correlation with the real robot: {short(before, 2)} before, {short(after, 2)} with the effects."
+    return section(
+        "Policies",
+        table(("policy", "real", "simulator", "with the effects"), rows) if rows else None,
+        element("p", told) if finite(before) is not None or finite(after) is not None else None,
+    )
+
+
+def self_test(document: Document) -> Html | None:
+    """Return how the diagnosis did on simulated logs whose cause it was not told."""
+    found = part(document, "self_test")
+    rows = [
+        (name(one.get("truth") or NONE), _answer(one), said(one, "count"))
+        for one in sorted(entries(found, "confusions"), key=lambda one: said(one, "truth"))
+    ]
+    gain = finite(found.get("null_gain"))
+    null = (
+        f" Where nothing was wrong, chance still seemed to save up to {short(gain)} units of cost."
+        if gain is not None
+        else ""
+    )
+    return section(
+        "Self-test",
+        table(("true cause", "answer", "cases"), rows) if rows else None,
+        element("p", f"{found.get('cases') or len(rows)} simulated logs of the same commands and noise.{null}")
+        if found
+        else None,
+    )
+
+
+def _answer(one: Document) -> Html:
+    told = name(one.get("answer") or NONE)
+    return element("span", told) if one.get("answer") == one.get("truth") else element("strong", f"{told} ✗")
+
+
+def method(document: Document) -> Html | None:
+    """Return the data, the split and the command."""
+    data = part(document, "data")
+    told = [*_data(data), *_made(document)]
+    shown = [(title, entry) for title, entry in told if entry]
+    pairs = [part for title, entry in shown for part in (element("dt", title), element("dd", entry))]
+    note = (
+        "Recorded commands are replayed in the simulator in short windows: it starts where the robot was, some ticks "
+        "are not scored, the next ones are. Whatever was fitted was fitted on the training records only."
+    )
+    return section("How this was measured", element("dl", *pairs) if pairs else None, note=note)
+
+
+def _data(data: Document) -> Iterable[tuple[str, Part]]:
+    yield "robot", str(data.get("robot") or "")
+    yield "simulator", str(data.get("sim") or "")
+    yield "real data", _budget(data)
+    yield "split", _counted(data, (("train", "records to fit"), ("held_out", "held out"), ("windows", "windows")))
+    yield "recorded in", str(data.get("source") or "")
+    yield "reference", str(data.get("reference") or "")
+    engine = str(data.get("engine") or "")
+    yield "replayed by", _ENGINES.get(engine, engine)
+
+
+def _verified(found: Document) -> str:
+    if not found:
+        return ""
+    windows, apart = found.get("windows"), short(found.get("chain_rms_mrad"), 2)
+    return f"{windows or 'some'} windows: {apart} mrad from the chain model, {level(found.get('rms'))} the noise floor"
+
+
+def _budget(data: Document) -> str:
+    seconds = finite(data.get("seconds"))
+    told = _counted(data, (("records", "records"),))
+    return ", ".join(filter(None, [told, f"{seconds:.0f} s of motion" if seconds is not None else ""]))
+
+
+def _counted(data: Document, keys: Sequence[tuple[str, str]]) -> str:
+    return ", ".join(f"{data[key]} {words}" for key, words in keys if data.get(key) is not None)
+
+
+def _made(document: Document) -> Iterable[tuple[str, Part]]:
+    seconds, command = finite(document.get("seconds")), document.get("command")
+    yield "command", element("code", str(command)) if command else None
+    yield "the answer in Bullet", _verified(part(document, "verified"))
+    yield "took", f"{seconds:.0f} s" if seconds is not None else ""
+    world = document.get("world_file")
+    yield "corrected simulator", element("code", str(world)) if world else None

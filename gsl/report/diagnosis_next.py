@@ -1,0 +1,96 @@
+"""What to do after a diagnosis: a sentence and, where there is one, a command line each."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import PurePosixPath
+from typing import NamedTuple
+
+from gsl.report.diagnosis_verdict import verdict
+from gsl.report.diagnosis_words import Document, entries, listed, name, part
+
+
+class Step(NamedTuple):
+    """Something to do.
+
+    Attributes:
+        why: What it is and what it is good for.
+        command: To type, if there is one; several are lines.
+        more: What only the page has room for.
+    """
+
+    why: str
+    command: str = ""
+    more: str = ""
+
+
+def steps(document: Document) -> list[Step]:
+    """Return what to do, most important first: the document's `commands` if it has some."""
+    given = entries(document, "commands")
+    if given:
+        return [Step(str(one.get("why") or ""), str(one.get("command") or "")) for one in given]
+    first = {"no_gap": _as_it_is, "causes": _corrected, "inseparable": _either, "unknown": _learned}[verdict(document)]
+    experiment = _experiment(document)
+    return [*experiment, first(document)] if verdict(document) == "inseparable" else [first(document), *experiment]
+
+
+def _as_it_is(document: Document) -> Step:
+    return Step(
+        "Train in the simulator as it is: as far as this log shows, it is the robot.", "gsl optimize grounding=none"
+    )
+
+
+def _corrected(document: Document) -> Step:
+    return Step(f"Train in the simulator with the effects switched on{_place(document)}.", _training(document))
+
+
+def _either(document: Document) -> Step:
+    told = "Until then train with one of them on: whichever it is, it predicts as well"
+    return Step(f"{told}{_place(document)}.", _training(document))
+
+
+def _place(document: Document) -> str:
+    world = document.get("world_file")
+    if not world:
+        return ""
+    return f" ({world})" if _folder(document) != "." else f" ({world}, in the folder of this report)"
+
+
+def _folder(document: Document) -> str:
+    """The folder of configuration in which the corrected world lies, nothing if it is not one."""
+    path = PurePosixPath(str(document.get("world_file") or ""))
+    return str(path.parent.parent) if path.parent.name == "world" and path.suffix == ".yaml" else ""
+
+
+def _training(document: Document) -> str:
+    folder, world = _folder(document), PurePosixPath(str(document.get("world_file"))).stem
+    chosen = f"--config-dir {shlex.quote(folder)} {shlex.quote(f'world={world}')}"
+    return f"gsl optimize {chosen} grounding=none name=diagnosed" if folder else ""
+
+
+def _learned(document: Document) -> Step:
+    return Step("Let a grounding learn what no effect explains, and check it.", "gsl iterate grounding=gat")
+
+
+def _experiment(document: Document) -> list[Step]:
+    wanted = part(document, "next_experiment")
+    if not wanted:
+        return []
+    pairs = [listed([name(effect) for effect in pair], "from") for pair in wanted.get("separates") or []]
+    aim = f" to tell {listed(pairs)}" if pairs else ""
+    play = f"Play {wanted.get('excitation') or 'the next experiment'} on the robot{aim}"
+    file, more = wanted.get("file"), str(wanted.get("why") or "")
+    if not file:
+        return [Step(f"{play}.", more=more)]
+    lines = (f"gsl collect task=excite {shlex.quote(f'policy.file={file}')} name=next", _again(document))
+    return [Step(f"{play}, and diagnose again.", "\n".join(lines), more)]
+
+
+def _again(document: Document) -> str:
+    """The same diagnosis of what the next experiment records."""
+    try:
+        given = shlex.split(str(document.get("command") or ""))
+    except ValueError:
+        given = []
+    kept = [word for word in given[2:] if not word.startswith(("real=", "name=", "out=", "force="))]
+    return shlex.join(["gsl", "diagnose", "real=next/collect_real", *kept, "name=next"])

@@ -1,0 +1,51 @@
+"""Replays of the worst joints: command, real robot, simulator as it was, simulator with the effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from gsl.report.diagnosis_curves import Curve, line_chart
+from gsl.report.diagnosis_html import Html, element, section
+from gsl.report.diagnosis_words import Document, entries, finite, said, short
+
+SHOWN = 6
+_LINES = (
+    ("command", "command", "command"),
+    ("real", "robot", "real"),
+    ("before", "simulator as it was", "before"),
+    ("after", "simulator with the effects", "after"),
+)
+
+
+def replays(document: Document) -> Html | None:
+    """Return the replays, angles in degrees."""
+    drawn = [_replay(one) for one in entries(document, "replays")[:SHOWN]]
+    note = "Held-out records; at every jump the simulator is put where the robot was, then it hears only the commands."
+    return section("Replays", *drawn, note=note)
+
+
+def _replay(one: Document) -> Html | None:
+    time, real = one.get("time") or [], _degrees(one.get("real"))
+    curves = [Curve(label, kind, time, _degrees(one.get(key))) for key, label, kind in _LINES if one.get(key)]
+    chart = line_chart(curves, x="time [s]", y=f"{said(one, 'joint')} [°]")
+    if chart is None:
+        return None
+    distances = [
+        f"{short(distance, 2)}° {label}"
+        for key, label in (("before", "from the robot as it was"), ("after", "with the effects"))
+        if (distance := _rms(_degrees(one.get(key)), real)) is not None
+    ]
+    title = f"{said(one, 'joint')} in {said(one, 'record')}" + (f": {', '.join(distances)}" if distances else "")
+    return element("div", element("h3", title), chart, class_="replay")
+
+
+def _degrees(angles: Sequence[Any] | None) -> list[float | None]:
+    numbers = [finite(angle) for angle in angles or []]
+    return [None if number is None else math.degrees(number) for number in numbers]
+
+
+def _rms(first: Sequence[float | None], second: Sequence[float | None]) -> float | None:
+    squares = [(a - b) ** 2 for a, b in zip(first, second, strict=False) if a is not None and b is not None]
+    return math.sqrt(sum(squares) / len(squares)) if squares else None

@@ -1,0 +1,104 @@
+"""A diagnosis as a terminal shows it: a few small tables, the answer first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from gsl.report.diagnosis_next import steps
+from gsl.report.diagnosis_verdict import (
+    alternatives,
+    cause_name,
+    comparison_sentence,
+    headline,
+    nearest,
+    places,
+    shrinkage_sentence,
+    undocumented,
+)
+from gsl.report.diagnosis_words import (
+    Document,
+    between,
+    entries,
+    interval,
+    level,
+    name,
+    part,
+    probability,
+    share,
+    value,
+)
+
+CAUSES, JOINTS = 5, 5  # rows at most
+
+
+class Told(NamedTuple):
+    """A table with its title and what is said below it: the arguments of the console's `table`."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str | None = None
+
+
+def summary_lines(document: Document) -> list[Told]:
+    """Return what a terminal shows: what was found, where, and what to do next."""
+    where = _where(document)
+    return [_causes(document), *([where] if where.rows else []), _next(document)]
+
+
+def _causes(document: Document) -> Told:
+    summary = str(document.get("summary") or "") or None
+    rows = [*_found(document)]
+    if not rows:
+        alike = [("either", alternatives(group)) for group in entries(document, "inseparable")]
+        alike += [("nearest", nearest(document))] if nearest(document) else []
+        return Told(headline(document), ("", ""), [*alike, *_shrinkage(document)], summary)
+    columns = ("cause", "parameter", "value", "95 % interval", "probability", "explains")
+    caption = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
+    caption += [f"{cause_name(cause)}: outside its documented range" for cause in undocumented(document)]
+    more = [f"and {len(rows) - CAUSES} more, in the report"] if len(rows) > CAUSES else []
+    told = "\n".join([*more, *filter(None, [summary]), *caption])
+    return Told(headline(document), columns, rows[:CAUSES], told or None)
+
+
+def _found(document: Document) -> Iterator[tuple[str, ...]]:
+    for cause in entries(document, "causes"):
+        first = cause_name(cause)
+        last = probability(cause.get("probability")), share(part(cause, "gain").get("value"))
+        for key, fitted in (part(cause, "parameters") or {"": {}}).items():
+            shown = (name(key), value(fitted or {}), interval(fitted or {})) if key else ("", "", "")
+            yield first, *shown, *last
+            first, last = "", ("", "")
+
+
+def _shrinkage(document: Document) -> list[tuple[str, str]]:
+    sentences = {"gap": shrinkage_sentence(document), "beside": comparison_sentence(document)}
+    return [(key, told) for key, told in sentences.items() if told]
+
+
+def _where(document: Document) -> Told:
+    found = places(document)
+    rows = [
+        (
+            place.joint,
+            share(place.cell.get("share")),
+            between(place.cell, share),
+            level(place.cell.get("rms")),
+            place.when,
+        )
+        for place in found[:JOINTS]
+    ]
+    columns = ("joint", "share of the excess", "95 % interval", "gap / noise", "most when")
+    more = f" (and {len(found) - JOINTS} more joints)" if len(found) > JOINTS else ""
+    shrinks = shrinkage_sentence(document) if entries(document, "causes") else None
+    return Told(f"where the gap is{more}", columns, rows, shrinks)
+
+
+def _next(document: Document) -> Told:
+    files = {"report": "report", "world_file": "corrected simulator"}
+    rows = [(words, str(document[key])) for key, words in files.items() if document.get(key)]
+    told = [
+        line for step in steps(document) for line in (step.why, *(f"    {one}" for one in step.command.splitlines()))
+    ]
+    return Told("what next", ("", ""), rows or [("report", "report.html")], "\n".join(told))

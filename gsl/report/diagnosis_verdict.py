@@ -1,0 +1,164 @@
+"""What a diagnosis says in sentences: the verdict, where the gap lies, how far it shrinks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from gsl.report.diagnosis_words import (
+    NONE,
+    Document,
+    between,
+    entries,
+    finite,
+    level,
+    listed,
+    name,
+    part,
+    probability,
+    regime,
+    said,
+    scope,
+    share,
+)
+
+VERDICTS = ("no_gap", "causes", "inseparable", "unknown")
+
+
+def verdict(document: Document) -> str:
+    """Return one of the verdicts; what is not one is `unknown`."""
+    given = document.get("verdict")
+    return given if given in VERDICTS else "unknown"
+
+
+def headline(document: Document) -> str:
+    """Return the verdict in a line."""
+    return {"no_gap": _no_gap, "causes": _causes, "inseparable": _inseparable, "unknown": _unknown}[verdict(document)](
+        document
+    )
+
+
+def _no_gap(document: Document) -> str:
+    return "No gap beyond the noise"
+
+
+def _causes(document: Document) -> str:
+    found = [cause_name(cause) for cause in entries(document, "causes")]
+    if not found:
+        return "There is a gap, and its cause was found"
+    return f"{'Cause' if len(found) == 1 else f'{len(found)} causes'} found: {listed(found)}"
+
+
+def _inseparable(document: Document) -> str:
+    groups = [alternatives(group) for group in entries(document, "inseparable")]
+    told = "There is a gap, but this log cannot tell its possible causes apart"
+    return f"{told}: {listed(groups, most=3)}" if groups else told
+
+
+def _unknown(document: Document) -> str:
+    if document.get("verdict") != "unknown":
+        return "No verdict"
+    return "There is a gap, and no effect that we know explains it"
+
+
+def cause_name(cause: Document) -> str:
+    """Return an effect, where it acts, and what else was chosen of it (the side of a joint's limit, say)."""
+    given = cause.get("scope")
+    acts = scope(cause.get("joints") if given is None else given)
+    chosen = [
+        f"{name(key)} {one}" for key, one in part(cause, "fixed").items() if isinstance(one, str) and one != given
+    ]
+    told = " of ".join(filter(None, [name(cause.get("effect") or NONE), acts]))
+    return f"{told} ({', '.join(chosen)})" if chosen else told
+
+
+def nearest(document: Document) -> str:
+    """Return the effects that come nearest where none explains the gap; nothing if there are none."""
+    return listed([cause_name(cause) for cause in entries(document, "suspects")])
+
+
+def alternatives(group: Sequence[str]) -> str:
+    """Return effects of which one log cannot say which it is."""
+    return listed([name(effect) for effect in group], "or")
+
+
+def sureness(cause: Document) -> str:
+    """Return how sure a cause is and what it explains."""
+    gain = part(cause, "gain")
+    told = []
+    if finite(cause.get("probability")) is not None:
+        told.append(f"{probability(cause['probability'])} sure")
+    if finite(gain.get("value")) is not None:
+        bounds = between(gain, share)
+        told.append(f"explains {share(gain['value'])} of the gap" + (f" ({bounds})" if bounds else ""))
+    return ", ".join(told)
+
+
+def undocumented(document: Document) -> list[Document]:
+    """Return the causes with a parameter outside its documented range."""
+    return [cause for cause in entries(document, "causes") if cause.get("documented") is False]
+
+
+class Place(NamedTuple):
+    """A joint that stands out of the noise.
+
+    Attributes:
+        joint: Its name.
+        cell: As a whole, if that stands out, else its worst regime.
+        when: Its worst regime in words, nothing if there is none.
+    """
+
+    joint: str
+    cell: Document
+    when: str
+
+
+def places(document: Document) -> list[Place]:
+    """Return the joints that stand out of the noise, worst first."""
+    named = [cell for cell in entries(document, "where") if cell.get("named")]
+    ordered = sorted(named, key=lambda cell: -(finite(cell.get("share")) or 0.0))
+    found = []
+    for joint in dict.fromkeys(said(cell, "joint") for cell in ordered):
+        own = [cell for cell in ordered if said(cell, "joint") == joint]
+        parts = [cell for cell in own if cell.get("regime") != "all"]
+        whole = next((cell for cell in own if cell.get("regime") == "all"), own[0])
+        found.append(Place(joint, whole, regime(said(parts[0], "regime")) if parts else ""))
+    return found
+
+
+def where_sentence(document: Document) -> str:
+    """Return where the gap lies."""
+    found = places(document)
+    if not found:
+        return "No joint stands out of the noise."
+    of = len({said(cell, "joint") for cell in entries(document, "where")})
+    first, *others = (f"{place.joint} {share(place.cell.get('share'))}" for place in found)
+    when = f" (most when {found[0].when})" if found[0].when else ""
+    within = " The others stay within the noise." if of > len(found) else ""
+    count = f"In {len(found)} of {of} joints: " if of > 1 else ""
+    return f"{count}{listed([f'{first} of the excess{when}', *others])}.{within}"
+
+
+def shrinkage_sentence(document: Document) -> str:
+    """Return how far the gap shrinks on records that no fit has seen."""
+    found = part(document, "shrinkage")
+    before, after, gone = (finite(found.get(key)) for key in ("before", "after", "fraction"))
+    if before is None:
+        return "Not measured."
+    if verdict(document) == "no_gap" or after is None:
+        return f"The simulator is at {level(before)} the noise floor, measured on held-out records."
+    told = f"From {level(before)} to {level(after)} the noise floor on held-out records"
+    bounds = between(found, share)
+    return told + (
+        f": {share(gone)} of the excess is gone{f' ({bounds})' if bounds else ''}." if gone is not None else "."
+    )
+
+
+def comparison_sentence(document: Document) -> str:
+    """Return what calibration alone and a learned residual do; nothing if neither was measured."""
+    found, told = part(document, "shrinkage"), []
+    if finite(found.get("calibration")) is not None:
+        told.append(f"Calibration alone leaves {level(found['calibration'])}.")
+    if finite(found.get("ceiling_fraction")) is not None:
+        told.append(f"A learned residual, a black box, takes away {share(found['ceiling_fraction'])}.")
+    return " ".join(told)

@@ -1,0 +1,335 @@
+"""The report of a diagnosis: the answer comes first, nothing is invented, and no name of a joint is markup."""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from html.parser import HTMLParser
+from typing import Any
+
+import diagnosis_document as made
+import pytest
+
+from gsl.console import Console
+from gsl.report.diagnosis import report_html
+from gsl.report.diagnosis_bars import Bar, bar_chart
+from gsl.report.diagnosis_curves import Curve, line_chart, ticks
+from gsl.report.diagnosis_html import element, escaped, prose
+from gsl.report.diagnosis_next import steps
+from gsl.report.diagnosis_text import summary_lines
+from gsl.report.diagnosis_verdict import cause_name, headline, where_sentence
+from gsl.report.diagnosis_words import between, interval, level, listed, probability, share, short, value
+
+DOCUMENTS: dict[str, Callable[[], dict[str, Any]]] = {
+    "causes": made.document,
+    "no_gap": made.no_gap,
+    "inseparable": made.inseparable,
+    "unknown": made.unknown,
+    "one joint": lambda: made.document(("Knee",), causes=1),
+    "25 joints": lambda: made.document(tuple(f"joint_{index}" for index in range(25))),
+    "nothing": dict,
+}
+HOSTILE = "<script>alert(1)</script>\"' onload='x' &amp; [red]</td></style><img src=//x.y>\u202e\x00\ud800"
+VOID = {"meta"}
+UNSAID = re.compile(r"\bNone\b(?! of)|\bnan\b")
+
+
+class Page(HTMLParser):
+    """A page as a browser would understand it."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: Counter[str] = Counter()
+        self.attributes: list[tuple[str, str, str]] = []
+        self.cells: list[tuple[str, str]] = []
+        self.text = ""
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags[tag] += 1
+        self.attributes += [(tag, key, given or "") for key, given in attrs]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] != "style":
+            self.text += data + " "
+
+    def classes(self) -> Counter[str]:
+        return Counter(one for _, key, given in self.attributes if key == "class" for one in given.split())
+
+
+def words(text: str) -> str:
+    """Text of a page with single plain spaces."""
+    return " ".join(Page(text).text.split())
+
+
+@pytest.mark.parametrize("kind", DOCUMENTS)
+def test_the_page_is_whole_and_needs_nothing_else(kind: str) -> None:
+    text = report_html(DOCUMENTS[kind]())
+    page = Page(text)
+    assert page.tags["script"] == page.tags["link"] == page.tags["img"] == 0
+    assert not [one for one in page.attributes if one[1] in ("src", "href", "srcset") or one[1].startswith("on")]
+    assert "http" not in text.replace("http-equiv", "") and "url(" not in text and "@import" not in text
+    assert UNSAID.search(page.text) is None
+    assert len(text.encode()) < 200_000
+    assert report_html(DOCUMENTS[kind]()) == text
+
+
+def test_long_records_of_many_joints_stay_small() -> None:
+    found = made.document(tuple(f"joint_{index}" for index in range(25)))
+    found["replays"] = [one | {key: one[key] * 40 for key in ("time", "command", "real", "before", "after")}
+                        for one in found["replays"] * 9]  # fmt: skip
+    assert len(report_html(found).encode()) < 400_000
+
+
+def test_the_first_screen_answers_everything() -> None:
+    first = words(report_html(made.document())).split("Caveats")[0]
+    assert "2 causes found: servo gain of LKneePitch and command latency of all joints" in first
+    assert "In 3 of 14 joints: LKneePitch 60 % of the excess (most when fast), LHipRoll 22 % and LHipPitch 8 %" in first
+    assert "kp 0.57 (0.55 to 0.60)" in first and "delay 31.2 ms (29.0 to 33.5 ms)" in first
+    assert "97 % sure, explains 81 % of the gap (70 to 90 %)" in first
+    assert "From 3.20 × to 1.05 × the noise floor on held-out records: 98 % of the excess is gone (95 to 99 %)" in first
+    assert "gsl collect task=excite policy.file=runs/worn/diagnose/next.json name=next" in first
+    assert "outside its documented range" in first
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        ("no_gap", ("No gap beyond the noise", "No joint stands out", "1.02 × the noise floor", "grounding=none")),
+        (
+            "inseparable",
+            (
+                "apart: zero offset or sensor bias",
+                "zero offset of legs",
+                "offset 1.00° (0.90 to 1.10°)",
+                "Play steps_large",
+            ),
+        ),
+        ("unknown", ("no effect that we know explains it", "The nearest: servo gain of LKneePitch.", "grounding=gat")),
+        ("nothing", ("No verdict", "Not measured")),
+    ],
+)
+def test_every_verdict_is_told(kind: str, told: tuple[str, ...]) -> None:
+    found = words(report_html(DOCUMENTS[kind]()))
+    assert [one for one in told if one not in found] == []
+
+
+def test_what_was_given_to_do_is_what_is_told() -> None:
+    given = made.document() | {"commands": [{"why": "Do this.", "command": "gsl this\ngsl that"}]}
+    assert [one.command for one in steps(given)] == ["gsl this\ngsl that"]
+    assert "gsl optimize" not in report_html(given)
+
+
+def test_a_command_is_safe_to_paste() -> None:
+    found = made.document()
+    found["next_experiment"]["file"] = "a b; rm -rf ~"
+    found["command"] += " sim=$(ls) name=before"
+    assert steps(found)[1].command.splitlines() == [
+        "gsl collect task=excite 'policy.file=a b; rm -rf ~' name=next",
+        "gsl diagnose real=next/collect_real sim=nao_ideal 'sim=$(ls)' name=next",
+    ]
+    assert steps(found | {"command": "gsl 'diagnose"})[1].command.endswith(
+        "gsl diagnose real=next/collect_real name=next"
+    )
+
+
+def test_the_corrected_world_is_trained_in_by_its_folder_and_name() -> None:
+    found = made.document()
+    told = "gsl optimize --config-dir runs/worn/diagnose world=diagnosed grounding=none name=diagnosed"
+    assert steps(found)[0].command == told
+    here = steps(found | {"world_file": "world/diagnosed.yaml"})[0]
+    assert "--config-dir . world=diagnosed" in here.command and "in the folder of this report" in here.why
+    assert steps(found | {"world_file": None})[0].command == ""
+
+
+def test_a_cause_is_named_with_what_was_chosen_of_it() -> None:
+    assert cause_name({"effect": "joint_limit", "scope": "LKneePitch", "fixed": {"side": "upper"}}) == (
+        "joint limit of LKneePitch (side upper)"
+    )
+    assert cause_name({"effect": "link_mass", "scope": "torso", "joints": [], "fixed": {"link": "torso"}}) == (
+        "link mass of torso"
+    )
+    assert cause_name({"effect": "supply_sag", "scope": "", "joints": []}) == "supply sag"
+
+
+def test_what_a_learned_residual_leaves_is_a_share_of_squares() -> None:
+    found = {"before": 3.0, "after": 1.0, "fraction": 1.0, "ceiling_fraction": 0.625}  # 9 - 0.625 (9 - 1) = 2²
+    assert "learned residual (ceiling) 2.00 ×, 62 %" in words(report_html({"shrinkage": found}))
+
+
+def poisoned(document: Any, key: str = "") -> Any:
+    """The document with every string of people's, and every name of a joint or parameter, hostile."""
+    if isinstance(document, dict):
+        named = key in ("rms", "sd", "parameters")
+        return {f"{HOSTILE}{name}" if named else name: poisoned(one, name) for name, one in document.items()}
+    if isinstance(document, list):
+        return [poisoned(one, key) for one in document]
+    return f"{HOSTILE}{document}" if isinstance(document, str) and key not in ("verdict", "source") else document
+
+
+@pytest.mark.parametrize("kind", ["causes", "no_gap", "inseparable", "unknown"])
+def test_no_name_is_markup(kind: str) -> None:
+    plain, text = report_html(DOCUMENTS[kind]()), report_html(poisoned(DOCUMENTS[kind]()))
+    before, after = Page(plain), Page(text)
+    assert set(after.tags) <= set(before.tags)
+    assert {one[:2] for one in after.attributes} <= {one[:2] for one in before.attributes}
+    assert not [one for one in after.attributes if "alert" in one[2]]
+    assert "<script>alert(1)</script>" in after.text  # as text
+    text.encode("utf-8")
+
+
+def paths(document: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Every place of a mapping, of a list only those in its first entry."""
+    for key in document if isinstance(document, dict) else range(min(1, len(document))):
+        if isinstance(document, dict):
+            yield (*path, key)
+        if isinstance(document[key], dict | list):
+            yield from paths(document[key], (*path, key))
+
+
+@pytest.mark.parametrize("absent", [True, False])
+def test_whatever_is_missing_the_rest_is_told(absent: bool) -> None:
+    whole = made.document(("Hip", "Knee")) | {"inseparable": [["zero_offset", "sensor_bias"]]}
+    for *path, last in paths(whole):
+        found = copy.deepcopy(whole)
+        place: Any = found
+        for key in path:
+            place = place[key]
+        if absent:
+            del place[last]
+        else:
+            place[last] = None
+        assert UNSAID.search(Page(report_html(found)).text) is None, (*path, last)
+        assert UNSAID.search(str([told._replace(caption=told.caption or "") for told in summary_lines(found)])) is None
+
+
+def test_empty_lists_make_no_sections() -> None:
+    found = {key: [] if isinstance(one, list) else one for key, one in made.document().items()}
+    found |= dict.fromkeys(("horizon", "shrinkage", "floor", "policies", "self_test", "next_experiment"))
+    page = Page(report_html(found | {"verdict": "no_gap"}))
+    assert page.tags["section"] == 1  # how it was measured
+
+
+def test_the_map_frames_the_named_cells_and_greys_the_rest() -> None:
+    found = made.document()
+    classes = Page(report_html(found)).classes()
+    named = sum(cell["named"] for cell in found["where"])
+    assert classes["named"] == named
+    assert classes["noise"] == len(found["where"]) - named
+    found["where"] = [cell for cell in found["where"] if cell["named"] or cell["regime"] == "all"]
+    shown = {cell["regime"] for cell in found["where"]}
+    assert Page(report_html(found)).classes()["noise"] == len(made.NAO) * len(shown) - named
+
+
+def test_bars_are_as_long_as_their_values() -> None:
+    chart = bar_chart([Bar("a", [("before", 4.0), ("after", 1.0)], ""), Bar("b", [("before", None)], "")], mark=1.0)
+    assert chart is not None
+    widths = [float(given) for given in re.findall(r'width="([\d.]+)%" height="10"', chart)]
+    assert widths[0] == pytest.approx(4.0 * widths[1], rel=1e-2) and len(widths) == 2
+    assert f'x1="{widths[1]:.2f}%"' in chart  # the noise floor, where the bar of length 1 ends
+    assert bar_chart([]) is None
+
+
+def test_a_line_is_broken_where_there_is_no_number_and_has_its_ends() -> None:
+    chart = line_chart(
+        [Curve("a", "real", [0.0, 1.0, 2.0, 3.0], [0.0, None, float("nan"), 1.0])], x="x", y="y", zero=True
+    )
+    assert chart is not None
+    assert re.search(r'd="M0 1000M1000 (\d+)" class="line real"', chart)
+    assert line_chart([Curve("a", "real", [], [])], x="x", y="y") is None
+    assert line_chart([Curve("a", "real", [0.0], [2.0])], x="x", y="y") is not None
+
+
+def test_ticks_are_round_and_inside() -> None:
+    assert ticks(0.0, 5.2) == pytest.approx([0, 1, 2, 3, 4, 5])
+    assert ticks(-0.19, 1.1, 4) == pytest.approx([0.0, 0.5, 1.0])
+    assert ticks(3.0, 3.0)
+
+
+def test_replays_are_in_degrees_with_their_distances() -> None:
+    one = {"record": "r", "joint": "Knee", "time": [0.0, 1.0], "real": [0.0, 0.0], "command": None}
+    found = words(report_html({"replays": [one | {"before": [0.1, 0.1], "after": [0.01, 0.01]}]}))
+    assert "Knee in r: 5.7° from the robot as it was, 0.57° with the effects" in found
+
+
+def test_numbers_are_told_as_people_read_them() -> None:
+    assert [short(one) for one in (0, 0.57, 12.34, 123456.0, -0.00213, None)] == [
+        "0", "0.570", "12.3", "123456", "−0.00213", "–"]  # fmt: skip
+    assert (share(0.974), share(-0.0001), share(None)) == ("97 %", "0 %", "–")
+    assert (probability(1.0), probability(0.0), probability(0.5)) == (">99 %", "<1 %", "50 %")
+    assert (level(1.049), level(33.3), level(0.0)) == ("1.05 ×", "33 ×", "<0.01 ×")
+    assert between({"low": 0.95, "high": 0.99}, share) == "95 to 99 %"
+    width = {"value": 0.0175, "low": 0.0157, "high": 0.0192, "unit": "rad"}
+    assert (value(width), interval(width)) == ("1.00°", "0.90 to 1.10°")
+    torque = {"value": 0.1234, "low": 0.1, "high": 0.15, "unit": "N·m"}
+    assert (value(torque), interval(torque)) == ("0.12 N·m", "0.10 to 0.15 N·m")
+    assert value({"value": 2.5, "unit": "s"}) == "2.50 s"
+    assert listed(["a", "b", "c", "d", "e", "f"]) == "a, b, c and 3 more"
+
+
+def test_noise_is_told_in_mrad_and_where_it_comes_from() -> None:
+    assert "Knee 1.50 0.086" in words(report_html(made.document(("Knee",), causes=1)))
+    estimated = report_html({"floor": {"source": "estimated", "pairs": 0, "sd": {"Knee": 0.001}}})
+    assert "no motion was repeated" in estimated
+
+
+def test_calibration_is_told_without_a_minus_before_nothing() -> None:
+    row = {"joint": "Knee", "kp": 0.9951, "kd": 1.0, "coulomb": -2e-6, "zero": -1e-6}
+    assert "Knee 0.995 1.000 0.0000 0.00" in words(report_html({"calibration": [row]}))
+
+
+def test_where_speaks_of_regimes_if_no_joint_stands_out_as_a_whole() -> None:
+    cell = {"joint": "Knee", "regime": "high_load", "share": 0.4, "named": True}
+    other = {"joint": "Hip", "regime": "all", "share": 0.01, "named": False}
+    assert where_sentence({"where": [cell, other]}).startswith(
+        "In 1 of 2 joints: Knee 40 % of the excess (most when under high load)"
+    )
+
+
+def test_a_side_is_worse_only_where_it_is_more_than_noise_and_chance() -> None:
+    rows = [("Knee", 4.0, 1.1, 0.01), ("Hip", 0.5, 0.1, 0.01), ("Ankle", 4.0, 3.0, 0.4)]
+    found = words(report_html({"sides": [dict(zip(("pair", "left", "right", "p"), row, strict=True)) for row in rows]}))
+    assert "Knee 4.00 × 1.10 × 1 % worse on the left" in found
+    assert "Hip 0.50 × 0.10 × 1 % both within the noise" in found
+    assert "Ankle 4.00 × 3.00 × 40 % alike" in found
+
+
+def test_the_verdict_is_marked_among_the_explanations() -> None:
+    found = made.document()
+    assert re.findall(r'<circle[^>]*class="fill (\w+)"', report_html(found)) == ["after"] + 5 * ["other"]
+    found["ranking"] = found["ranking"][::-1]
+    assert re.findall(r'<circle[^>]*class="fill (\w+)"', report_html(found)) == 5 * ["other"] + ["after"]
+
+
+def test_text_is_escaped_once_and_markup_never() -> None:
+    assert element("td", "a < b", element("b", "&")) == "<td>a &lt; b<b>&amp;</b></td>"
+    assert escaped(escaped('"')) == "&quot;"
+    assert element("p", class_="a", title='"', aria_label=None) == '<p class="a" title="&quot;"></p>'
+    assert prose("97 % of 3 ms") == "97\u00a0% of 3\u00a0ms"
+
+
+@pytest.mark.parametrize("kind", DOCUMENTS)
+def test_a_terminal_shows_it_in_some_lines(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    found = DOCUMENTS[kind]()
+    for told in summary_lines(found):
+        Console().table(*told)
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.strip()]
+    assert lines[0] == headline(found)
+    assert len(lines) <= 25
+    assert max(map(len, lines)) <= 130
+
+
+def test_a_terminal_shows_names_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    for told in summary_lines(made.document(("[red]Knee",), causes=1)):
+        Console().table(*told)
+    assert "servo gain of [red]Knee" in capsys.readouterr().out
