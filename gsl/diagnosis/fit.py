@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,21 +18,22 @@ from gsl.diagnosis.residual import loss, weight
 
 REWEIGHTINGS = 2
 DAMPINGS = (0.0, 1.0, 30.0)  # of a step, as shares of the diagonal; the first that descends is taken
-FACTORS = (1.2, 1.08)  # of a parameter, in a search where joints shake
+FACTORS = (1.2, 1.08)  # of a parameter, in a search where joints shake or the fit is poor
+POOR = 1.5  # cost of a residual that makes a search worth its time
 ENOUGH = 1e-3  # relative descent at which a fit ends
 
 Build = Callable[[np.ndarray], Effects]
 
 
 def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """Return derivatives of the residuals to each joint's own nuisances, shape (4, W, scored, n_joints).
+    """Return derivatives of the residuals to each joint's own nuisances, shape (5, W, scored, n_joints).
 
     All joints are probed at once: a joint's answer to its neighbours' probes counts as its own.
 
     Args:
         bench: The log.
         effects: That are switched on.
-        at: Nuisances, shape (4, n_joints).
+        at: Nuisances, shape (5, n_joints).
         base: Residuals there.
     """
     if not bench.simulator.calibrates:
@@ -45,12 +47,12 @@ def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarr
 
 
 def projected(z: np.ndarray, slopes: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the best nuisances, shape (4, n_joints), and each joint's cost with them, shape (n_joints,).
+    """Return the best nuisances, shape (5, n_joints), and each joint's cost with them, shape (n_joints,).
 
     Args:
         z: Residuals with nuisances `at`, shape (W, scored, n_joints).
         slopes: From `sensitivities`.
-        at: Nuisances, shape (4, n_joints).
+        at: Nuisances, shape (5, n_joints).
     """
     flat = z.reshape(-1, z.shape[2])
     columns = slopes.reshape(len(slopes), -1, z.shape[2])
@@ -71,7 +73,7 @@ def proportional(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, at: np.ndar
         z: Residuals without the effects, nuisances `at`, shape (W, scored, n_joints).
         own: Derivatives to the parameters, shape (p, W, scored, n_joints).
         slopes: From `sensitivities`.
-        at: Nuisances, shape (4, n_joints).
+        at: Nuisances, shape (5, n_joints).
     """
     theta = np.zeros(len(own))
     for _ in range(REWEIGHTINGS):
@@ -109,49 +111,80 @@ def refined(
         build: From parameters to effects.
         start: Parameters, shape (p,).
         bounds: Lower and upper, shape (2, p).
-        at: Nuisances to begin with, shape (4, n_joints).
+        at: Nuisances to begin with, shape (5, n_joints).
         rounds: Steps at most.
     """
-    theta, n = np.clip(start, *bounds), at
-    z = bench.residual(build(theta), n)
-    total, matrix = float(loss(z).sum()) + nuisance.cost(n), np.eye(len(theta))
+    first = np.clip(start, *bounds)
+    z = bench.residual(build(first), at)
+    here = _Point(first, at, z, float(loss(z).sum()) + nuisance.cost(at))
+    here, matrix = _descended(bench, build, here, bounds, rounds)
+    if len(first) and (here.cost > POOR * z.size or bench.comparison.shaking.any()):
+        there, other = _descended(bench, build, _searched(bench, build, here, bounds), bounds, rounds)
+        here, matrix = (there, other) if there.cost < here.cost else (here, matrix)
+    covariance = np.linalg.inv(matrix)[: len(first), : len(first)]
+    return Fit(here.theta, here.nuisances, here.cost, covariance)
+
+
+class _Point(NamedTuple):
+    """Where a descent is: parameters, nuisances, residuals there and their cost."""
+
+    theta: np.ndarray
+    nuisances: np.ndarray
+    z: np.ndarray
+    cost: float
+
+
+def _descended(bench: Bench, build: Build, here: _Point, bounds: np.ndarray, rounds: int) -> tuple[_Point, np.ndarray]:
+    """Take Levenberg-Marquardt steps as long as they pay; return the last point and normal matrix."""
+    matrix = np.eye(len(here.theta) + here.nuisances.size)
     for _ in range(rounds):
-        slopes = sensitivities(bench, build(theta), n, z)
-        own = _own_slopes(bench, build, theta, bounds, n, z)
-        matrix, right = _normal(z, own, slopes, n)
-        for damping in DAMPINGS:
-            step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
-            new_theta = np.clip(theta + step[: len(theta)], *bounds)
-            new_n = nuisance.bounded(n + step[len(theta) :].reshape(n.shape))
-            new_z = bench.residual(build(new_theta), new_n)
-            new_total = float(loss(new_z).sum()) + nuisance.cost(new_n)
-            if new_total < total:
-                break
-        else:
+        slopes = sensitivities(bench, build(here.theta), here.nuisances, here.z)
+        own = _own_slopes(bench, build, here.theta, bounds, here.nuisances, here.z)
+        matrix, right = _normal(here.z, own, slopes, here.nuisances)
+        before, here = here, _stepped(bench, build, here, bounds, matrix, right)
+        if before.cost - here.cost < ENOUGH * before.cost:
             break
-        gained, theta, n, z, total = (total - new_total) / total, new_theta, new_n, new_z, new_total
-        if gained < ENOUGH:
-            break
-    covariance = np.linalg.inv(matrix)[: len(theta), : len(theta)]
-    if bench.comparison.shaking.any() and len(theta):
-        theta, total = _searched(bench, build, theta, bounds, n, total)
-    return Fit(theta, n, total, covariance)
+    return here, matrix
 
 
-def _searched(
-    bench: Bench, build: Build, theta: np.ndarray, bounds: np.ndarray, n: np.ndarray, total: float
-) -> tuple[np.ndarray, float]:
-    """Go on without derivatives, which mean little where joints shake: factor by factor, as long as the cost falls."""
-    for k, factor in [(k, factor) for factor in FACTORS for k in range(len(theta))]:
+def _stepped(
+    bench: Bench, build: Build, here: _Point, bounds: np.ndarray, matrix: np.ndarray, right: np.ndarray
+) -> _Point:
+    """Return the first of the damped steps that descends, else the point itself."""
+    p = len(here.theta)
+    for damping in DAMPINGS:
+        step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
+        theta = np.clip(here.theta + step[:p], *bounds)
+        nuisances = nuisance.bounded(here.nuisances + step[p:].reshape(here.nuisances.shape))
+        z = bench.residual(build(theta), nuisances)
+        cost = float(loss(z).sum()) + nuisance.cost(nuisances)
+        if cost < here.cost:
+            return _Point(theta, nuisances, z, cost)
+    return here
+
+
+def _searched(bench: Bench, build: Build, here: _Point, bounds: np.ndarray) -> _Point:
+    """Go on without derivatives, which mean little far off and where joints shake, factor by factor.
+
+    The nuisances are put back: where a fit is stuck they are what holds it.
+    """
+    none = nuisance.none(here.nuisances.shape[1])
+
+    def at(theta: np.ndarray) -> _Point:
+        z = bench.residual(build(theta), none)
+        return _Point(theta, none, z, float(loss(z).sum()))
+
+    best = at(here.theta)
+    for k, factor in [(k, factor) for factor in FACTORS for k in range(len(here.theta))]:
         for direction in (factor, 1.0 / factor):
             while True:
-                moved = theta.copy()
-                moved[k] = np.clip(theta[k] * direction, *bounds[:, k])
-                new = float(loss(bench.residual(build(moved), n)).sum()) + nuisance.cost(n)
-                if new >= total:
+                moved = best.theta.copy()
+                moved[k] = np.clip(moved[k] * direction, *bounds[:, k])
+                new = at(moved)
+                if new.cost >= best.cost:
                     break
-                theta, total = moved, new
-    return theta, total
+                best = new
+    return best
 
 
 def _own_slopes(
@@ -169,7 +202,7 @@ def _own_slopes(
 
 
 def _normal(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal equations of (parameters, nuisances), of shapes (p + 4 n, p + 4 n) and (p + 4 n,)."""
+    """Return the normal equations of (parameters, nuisances), of shapes (p + 5 n, p + 5 n) and (p + 5 n,)."""
     p, joints = len(own), z.shape[2]
     w, size = weight(z), p + n.size
     matrix, right = np.zeros((size, size)), np.zeros(size)

@@ -11,6 +11,7 @@ import numpy as np
 from gsl.diagnosis.records import Record
 
 SETTLED = 15  # ticks after which the start of an episode is forgotten
+ESTIMATE = 200  # samples that an estimate from roughness is worth: other motion than noise is in it
 QUIET = 0.3  # share of the ticks, those of the slowest commands, on which roughness is measured
 
 
@@ -23,12 +24,19 @@ class NoiseFloor:
         source: `repeats` or `estimated`.
         pairs: Repeats that were compared.
         resolution: Of the encoders [rad].
+        samples: Independent numbers that it comes from, over all joints.
     """
 
     sd: np.ndarray
     source: str
     pairs: int
     resolution: float
+    samples: int
+
+    @property
+    def slack(self) -> float:
+        """How much more than expected a residual may cost because the floor is itself measured, relative."""
+        return float(2.0 * np.sqrt(2.0 / max(self.samples, 1)))
 
 
 def noise_floor(found: Sequence[Record], resolution: float, least: np.ndarray | None = None) -> NoiseFloor:
@@ -44,10 +52,10 @@ def noise_floor(found: Sequence[Record], resolution: float, least: np.ndarray | 
     if groups:
         spread = [np.array([one.measured[SETTLED:] for one in group]) for group in groups]
         square = sum(part.var(axis=0, ddof=1).sum(axis=0) for part in spread) / sum(part.shape[1] for part in spread)
-        return NoiseFloor(
-            np.maximum(np.sqrt(square), least), "repeats", sum(len(group) - 1 for group in groups), resolution
-        )
-    return NoiseFloor(np.maximum(_roughness(found), least), "estimated", 0, resolution)
+        pairs = sum(len(group) - 1 for group in groups)
+        samples = sum(part.shape[1] * (len(part) - 1) for part in spread) * len(square)
+        return NoiseFloor(np.maximum(np.sqrt(square), least), "repeats", pairs, resolution, samples)
+    return NoiseFloor(np.maximum(_roughness(found), least), "estimated", 0, resolution, ESTIMATE)
 
 
 def _repeats(found: Sequence[Record]) -> list[list[Record]]:

@@ -10,27 +10,41 @@ from dataclasses import replace
 
 import numpy as np
 
-from gsl.core.plant import Plant
+from gsl.core.plant import Plant, Servo
 
-NAMES = ("kp", "kd", "coulomb", "zero")
-SIZES = np.array([0.04, 0.07, 0.012, 0.004])  # relative, relative, [N·m], [rad]: spread of one make of servo (estimate)
-PROBES = np.array([0.05, 0.10, 0.02, 0.002])  # of the finite differences
-KP, KD, COULOMB, ZERO = range(4)
+NAMES = ("kp", "kd", "coulomb", "zero", "inertia")
+# Relative, relative, [N·m], [rad], in units of `inertia_unit`: spread of one make of servo (estimate).
+SIZES = np.array([0.04, 0.07, 0.012, 0.004, 1.0])
+PROBES = np.array([0.05, 0.10, 0.02, 0.002, 0.5])  # of the finite differences
+KP, KD, COULOMB, ZERO, INERTIA = range(5)
+HALF_STEP = 1e-3  # of a simulator at 2 ms [s]
+LEAST = 0.2  # share of the nominal inertia that is left
+SPREAD = 0.05  # of the rotors' inertia
+
+
+def inertia_unit(servo: Servo) -> np.ndarray:
+    """Return what is the unit of the inertia's nuisance [kg·m²], shape (n_motors,).
+
+    Damping that acts on the speed of half a physics step ago takes kd · step / 2 off the inertia: simulators of one
+    robot differ by as much if their steps do.
+    """
+    return HALF_STEP * servo.kd + SPREAD * servo.armature
 
 
 def none(joints: int) -> np.ndarray:
-    """Return nuisances that do nothing, shape (4, n_joints)."""
+    """Return nuisances that do nothing, shape (5, n_joints)."""
     return np.zeros((len(NAMES), joints))
 
 
 def cost(nuisances: np.ndarray) -> float:
-    """Return what nuisances, shape (4, n_joints), cost."""
+    """Return what nuisances, shape (5, n_joints), cost."""
     return float(((nuisances / SIZES[:, None]) ** 2).sum())
 
 
 def bounded(nuisances: np.ndarray) -> np.ndarray:
-    """Return the nearest nuisances that are possible, shape (4, n_joints)."""
+    """Return the nearest nuisances that are possible, shape (5, n_joints)."""
     result = nuisances.copy()
+    result[INERTIA] = np.clip(result[INERTIA], -5.0, 20.0)
     result[KP], result[KD] = np.clip(result[KP], -0.8, 4.0), np.clip(result[KD], -0.9, 9.0)
     return result
 
@@ -48,5 +62,6 @@ def calibrated(plant: Plant, nuisances: np.ndarray) -> Plant:
         kp=servo.kp * (1.0 + wide[KP]),
         kd=servo.kd * (1.0 + wide[KD]),
         coulomb=np.maximum(0.0, servo.coulomb + wide[COULOMB]),
+        armature=np.maximum(LEAST * servo.armature, servo.armature + wide[INERTIA] * inertia_unit(servo)),
     )
     return replace(changed, sensors=replace(plant.sensors, bias=plant.sensors.bias + wide[ZERO]))

@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import lumped
-from gsl.core.plant import Plant
+from gsl.core.plant import GRAVITY, Plant
 from gsl.diagnosis.records import OnGround, Pieces
 from gsl.diagnosis.replay import Effects
 from gsl.effects.effect import applied, built
@@ -63,7 +63,7 @@ def _replayed(engine: Engine, window: OnGround, joints: int) -> np.ndarray:
     length = len(window.commands) - COMMANDS + 1
     base, robot = window.base, lumped(engine.plant.robot)
     place, turn = base[:3].copy(), Rotation.from_quat(base[6:10])
-    place[2] = -SUNK - lowest_point(robot, window.motion[0], turn.as_matrix())
+    place[2] = -_sunk(engine.plant) - lowest_point(robot, window.motion[0], turn.as_matrix())
     lifted = base[2] - place[2]  # where the log's ground is
     start = Reading(window.motion, place, tuple(base[6:10].tolist()), base[10:13], base[13:16], 1.0, ())
     engine.load(start, window.commands[length:], float(window.clock))
@@ -76,6 +76,12 @@ def _replayed(engine: Engine, window: OnGround, joints: int) -> np.ndarray:
         sensed = engine.encoders(reading)[0, :joints] + engine.plant.sensors.bias[:joints]
         told.append(np.r_[sensed, reading.place + [0.0, 0.0, lifted], angles[:2], yaw])
     return np.array(told)
+
+
+def _sunk(plant: Plant) -> float:
+    """Return how deep the lowest sole is in the ground [m]: a soft one carries it at eight corners."""
+    stiffness = plant.contact.stiffness
+    return SUNK + (0.0 if stiffness is None else plant.robot.mass * GRAVITY / (8.0 * stiffness))
 
 
 def restart_error(simulator: Walking, pieces: Pieces) -> np.ndarray:

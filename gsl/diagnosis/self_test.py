@@ -67,7 +67,7 @@ def simulated(found: Experiment, plant: Plant, step: float, rng: np.random.Gener
 def relogged(found: Experiment, arena: Arena, effects: Hypothesis, rng: np.random.Generator) -> Arena:
     """Return the arena with a simulated log in the real one's place, made with fresh nuisances."""
     simulator = arena.train.simulator
-    drawn = nuisance.bounded(nuisance.SIZES[:, None] * rng.standard_normal((4, len(found.joints))))
+    drawn = nuisance.bounded(nuisance.SIZES[:, None] * rng.standard_normal((len(nuisance.NAMES), len(found.joints))))
     plant = nuisance.calibrated(applied(simulator.plant, built(effects.effects)), drawn)
     made = simulated(found, plant, simulator.step, rng)
     length = found.pieces.real.shape[1]

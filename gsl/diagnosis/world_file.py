@@ -20,14 +20,15 @@ def diagnosed_effects(found: Findings) -> dict[str, Any]:
     Every entry is one of a world's `effects:`; the calibration comes joint by joint.
     """
     joints, chosen = found.experiment.joints, found.selection.chosen
-    parts = [chosen.effects, calibration(joints, chosen.fit.nuisances[:, : len(joints)])]
+    unit = nuisance.inertia_unit(found.simulator.plant.servo)
+    parts = [chosen.effects, calibration(joints, chosen.fit.nuisances[:, : len(joints)], unit)]
     if found.baseline is not None:
-        parts = [found.baseline.effects, calibration(joints, found.baseline.nuisances), *parts]
+        parts = [found.baseline.effects, calibration(joints, found.baseline.nuisances, unit), *parts]
     return joined(parts)
 
 
-def calibration(joints: Sequence[str], nuisances: np.ndarray) -> Effects:
-    """Return nuisances, shape (4, n_joints), as effects of single joints."""
+def calibration(joints: Sequence[str], nuisances: np.ndarray, unit: np.ndarray) -> Effects:
+    """Return nuisances, shape (5, n_joints), as effects of single joints; `unit` see `nuisance.inertia_unit`."""
     rows = {joint: nuisances[:, k] for k, joint in enumerate(joints)}
     return {
         "servo_gain": [
@@ -37,6 +38,9 @@ def calibration(joints: Sequence[str], nuisances: np.ndarray) -> Effects:
             {"torque": row[nuisance.COULOMB], "joints": joint}
             for joint, row in rows.items()
             if row[nuisance.COULOMB] > 0.0
+        ],
+        "armature": [
+            {"inertia": row[nuisance.INERTIA] * unit[k], "joints": joint} for k, (joint, row) in enumerate(rows.items())
         ],
         "sensor_bias": [{"bias": row[nuisance.ZERO], "joints": joint} for joint, row in rows.items()],
     }

@@ -23,7 +23,7 @@ class Armature:
     kind: ClassVar[str] = "body"
     rank: ClassVar[int] = 2
 
-    inertia: Annotated[float, setting("added inertia", unit="kg·m²", ge=0, lower=0.0, upper=0.05,
+    inertia: Annotated[float, setting("added inertia", unit="kg·m²", lower=0.0, upper=0.05,
                                       source="HULKs' NAO model: .045 in all; ours: .002-.016")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 

@@ -1,0 +1,206 @@
+"""The diagnosis of simulated logs whose cause is known, on an arm of two joints that takes seconds."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gsl.core.body import Joint, Link, Robot
+from gsl.core.plant import Plant, nominal
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.diagnosis import nuisance
+from gsl.diagnosis.candidates import library
+from gsl.diagnosis.diagnose import Findings, Options, diagnosed
+from gsl.diagnosis.document import document
+from gsl.diagnosis.experiment import experiment
+from gsl.diagnosis.noise_floor import noise_floor
+from gsl.diagnosis.records import records
+from gsl.diagnosis.world_file import diagnosed_effects
+from gsl.effects.effect import applied, built
+from gsl.worlds.held import Held, Windows
+from gsl.worlds.servo import COMMANDS
+
+PERIOD, NOISE = 0.02, 0.0015
+QUICK = Options(duels=0, nulls=0, most=1, threads=1)
+
+
+@cache
+def arm() -> Robot:
+    """Two links that hang from a fixed base, with axes at right angles."""
+    inertia = np.diag([4e-4, 4e-4, 1e-4])
+    links = [Link(name, 0.4, np.array([0.0, 0.0, -0.06]), inertia) for name in ("base", "upper", "lower")]
+    axes = {"shoulder": np.array([0.0, 1.0, 0.0]), "elbow": np.array([1.0, 0.0, 0.0])}
+    joints = tuple(
+        Joint(name, parent, child, np.array([0.0, 0.0, drop]), axes[name], -1.5, 1.5, 6.0, 3.0, 0.005)
+        for name, parent, child, drop in (("shoulder", "base", "upper", 0.0), ("elbow", "upper", "lower", -0.12))
+    )
+    named = {link.name: link for link in links}
+    gains = dict.fromkeys(axes, (40.0, 1.0))
+    return Robot("arm", named, joints, tuple(axes), gains=gains, encoder_step=NOISE)
+
+
+def motions() -> dict[str, np.ndarray]:
+    """Steps, triangles, a chirp and poses, two variants of each, shape (T, 2)."""
+    time, found = PERIOD * np.arange(150), {}
+    for variant, (size, phase) in {"a": (1.0, 0.0), "b": (0.8, 1.0)}.items():
+        wave = [np.sin(2 * np.pi * 0.6 * time + phase + k) for k in range(2)]
+        stairs = [np.repeat(np.random.default_rng([k, ord(variant)]).uniform(-1, 1, 6), 25) for k in range(2)]
+        chirp = [np.sin(2 * np.pi * (0.5 + 0.7 * time) * time + phase + k) for k in range(2)]
+        poses = [np.repeat([0.3, -0.9, 0.9], 50) * (-1) ** k for k in range(2)]
+        shapes = {"steps": 0.4, "triangle": 0.7, "chirp": 0.3, "poses": 0.8}
+        for (name, share), columns in zip(shapes.items(), (stairs, wave, chirp, poses), strict=True):
+            found[f"{name}_{variant}"] = share * size * np.array(columns).T * np.minimum(1.0, time / 0.3)[:, None]
+    return found
+
+
+def log(effects: Mapping[str, Any], seed: int = 1, *, jitter: float = 1.0, noise: float = NOISE) -> Batch:
+    """What the arm with effects and small deviations of its own would log; one motion is played twice."""
+    rng, robot = np.random.default_rng(seed), arm()
+    drawn = nuisance.SIZES[:, None] * rng.standard_normal((5, 2)) * 0.7 * jitter
+    drawn[nuisance.COULOMB] = np.abs(drawn[nuisance.COULOMB])
+    held = Held.of(nuisance.calibrated(applied(nominal(robot), built(effects)), drawn), 0.002, PERIOD)
+    played = motions()
+    names = [*played, "steps_a"]
+    return Batch(
+        tuple(_logged(held, played[name], noise, rng) for name in names),
+        robot.controlled,
+        PERIOD,
+        {"episodes": [{"policy": name} for name in names]},
+    )
+
+
+def _logged(held: Held, targets: np.ndarray, noise: float, rng: np.random.Generator) -> Trajectory:
+    before = 25
+    padded = np.vstack([np.repeat(targets[:1], COMMANDS - 1 + before, axis=0), targets])
+    motion = np.array([[targets[0] + 0.02 * rng.standard_normal(2), np.zeros(2)]])
+    windows = Windows(np.ascontiguousarray(padded[::-1])[None], motion, np.array([-before * PERIOD]))
+    position = held.replay(windows)[0, before - 1 :]
+    position = position + noise * rng.standard_normal(position.shape)
+    return Trajectory(PERIOD * np.arange(len(position)), targets, position, np.zeros_like(position))
+
+
+def found(effects: Mapping[str, Any], *, seed: int = 1, **options: Any) -> Findings:
+    return diagnosed(log(effects, seed), arm(), nominal(arm()), 0.002, replace(QUICK, **options), lambda phase: None)
+
+
+def test_no_effect_is_no_gap_and_the_self_test_knows_what_chance_gains() -> None:
+    result = found({}, seed=2, nulls=1)
+    assert result.verdict.word == "no_gap" and len(result.null_gains) == 1
+
+
+CAUSES = {
+    "command_latency": ({"delay": 0.012}, "delay", 0.05),
+    "coulomb_friction": ({"torque": 0.12}, "torque", 0.1),
+    "viscous_friction": ({"coefficient": 0.3}, "coefficient", 0.1),
+    "servo_gain": ({"kp": 0.6}, "kp", 0.05),
+    "armature": ({"inertia": 0.006}, "inertia", 0.1),
+    "torque_limit": ({"factor": 0.45}, "factor", 0.05),
+    "deadband": ({"width": 0.015}, "width", 0.15),
+    "link_mass": ({"link": "lower", "mass": 0.2}, "mass", 0.1),
+}
+
+
+@pytest.mark.parametrize("effect", CAUSES)
+def test_a_cause_is_named_with_its_value(effect: str) -> None:
+    parameters, name, tolerance = CAUSES[effect]
+    result = found({effect: parameters})
+    assert result.selection.chosen.names == (effect,), result.verdict
+    candidate, values = result.selection.chosen.candidates[0], result.selection.chosen.parameters[0]
+    assert candidate.entry(values)[name] == pytest.approx(parameters[name], rel=tolerance)
+    assert result.verdict.word in ("causes", "inseparable")
+    if "link" in parameters:
+        assert candidate.fixed["link"] == parameters["link"]
+
+
+def test_a_fault_of_one_joint_is_named_there() -> None:
+    result = found({"servo_gain": {"kp": 0.6, "joints": "elbow"}})
+    assert [one.scope for one in result.selection.chosen.candidates] == ["elbow"]
+    shares = {place["joint"]: place["share"] for place in document(result)["where"] if place["regime"] == "all"}
+    assert shares["elbow"] > 0.8 and sum(shares.values()) == pytest.approx(1.0)
+
+
+def test_two_causes_at_once() -> None:
+    result = found({"command_latency": {"delay": 0.02}, "coulomb_friction": {"torque": 0.15}}, most=2)
+    assert set(result.selection.chosen.names) == {"command_latency", "coulomb_friction"}
+
+
+def test_what_the_library_lacks_is_unknown() -> None:
+    lagging = ("target_smoothing", "sensor_delay", "armature", "viscous_friction", "servo_gain")
+    assert found({"command_latency": {"delay": 0.03}}, without=("command_latency", *lagging)).verdict.word == "unknown"
+
+
+def test_a_reference_log_takes_the_model_error_away() -> None:
+    """The diagnoser's plant is wrong in a way of its own, in both logs."""
+    foreign = {"viscous_friction": {"coefficient": 0.25}}
+    reference = log(foreign, seed=5)
+    result = diagnosed(
+        log({**foreign, "command_latency": {"delay": 0.015}}, seed=5),
+        arm(), nominal(arm()), 0.002, QUICK, lambda phase: None, reference=reference,
+    )  # fmt: skip
+    assert result.selection.chosen.names == ("command_latency",)
+    same = diagnosed(
+        log(foreign, seed=6, jitter=0.0), arm(), nominal(arm()), 0.002, QUICK, lambda phase: None,
+        reference=log(foreign, seed=7, jitter=0.0),
+    )  # fmt: skip
+    assert same.verdict.word == "no_gap"
+
+
+def test_the_diagnosed_world_moves_as_the_robot() -> None:
+    effects = {"servo_gain": {"kp": 0.6}}
+    result = found(effects)
+    exp = result.experiment
+    world: Plant = applied(nominal(arm()), built(diagnosed_effects(result)))
+    told = replace(result.simulator, plant=world).told({}, nuisance.none(2), exp.pieces)
+    assert np.sqrt(np.mean(exp.comparison.residual(told, exp.pieces) ** 2)) < 1.1
+
+
+def test_the_document_has_what_the_contract_asks_for() -> None:
+    told = document(found({"command_latency": {"delay": 0.012}}))
+    (cause,) = told["causes"]
+    assert told["verdict"] == "causes" and cause["effect"] == "command_latency"
+    delay = cause["parameters"]["delay"]
+    assert delay["low"] <= 0.012 <= delay["high"] and delay["unit"] == "s"
+    assert cause["joints"] == ["shoulder", "elbow"] and 0.5 < cause["probability"] <= 1.0
+    assert cause["gain"]["low"] <= cause["gain"]["value"] <= cause["gain"]["high"]
+    shrinkage = told["shrinkage"]
+    assert shrinkage["before"] > 1.5 > 1.15 > shrinkage["after"] and shrinkage["fraction"] > 0.9
+    assert shrinkage["ceiling_fraction"] is None or shrinkage["ceiling_fraction"] <= 1.0
+    assert all(place["low"] <= place["high"] for place in told["where"])
+
+
+def test_the_noise_floor_comes_from_repeats_and_else_from_roughness() -> None:
+    batch = log({}, jitter=0.0)
+    measured = noise_floor(records(batch, arm()), 1e-4)
+    assert measured.source == "repeats" and measured.sd == pytest.approx(NOISE, rel=0.2)
+    alone = noise_floor(records(replace(batch, episodes=batch.episodes[:-1], metadata={}), arm()), 1e-4)
+    assert alone.source == "estimated" and alone.sd == pytest.approx(NOISE, rel=0.35)
+    assert noise_floor(records(log({}, noise=0.0), arm()), 0.01).sd == pytest.approx(0.01 / np.sqrt(12.0))
+
+
+def test_repeats_stay_on_one_side_of_the_split() -> None:
+    exp = experiment(log({}), arm())
+    held = {exp.records[k].name for k in exp.pieces.record[exp.held_out]}
+    fitted = {exp.records[k].name for k in exp.pieces.record[exp.train]}
+    assert held and fitted and not held & fitted
+    assert {name[:-2] for name in held} == {name[:-2] for name in fitted}
+
+
+def test_the_library_is_tried_whole_but_for_what_is_left_out() -> None:
+    names = {candidate.effect for candidate in library(arm())}
+    assert {"backlash", "command_latency", "centre_of_mass", "gravity_tilt", "stribeck_friction"} <= names
+    assert names - {candidate.effect for candidate in library(arm(), ("backlash",))} == {"backlash"}
+    for candidate in library(arm()):
+        for parameters in candidate.grid:
+            applied(nominal(arm()), built({candidate.effect: candidate.entry(parameters)}))
+
+
+def test_threads_do_not_change_the_answer() -> None:
+    one, other = (
+        diagnosed(log({}, 3), arm(), nominal(arm()), 0.002, replace(QUICK, threads=threads), lambda phase: None)
+        for threads in (1, 3)
+    )
+    assert one.selection.none.cost == other.selection.none.cost
+    assert [h.cost for h in one.selection.tried] == [h.cost for h in other.selection.tried]
