@@ -26,6 +26,7 @@ GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best 
 RIVALS = 3  # hypotheses that duel, at most
 ON_FOOT = 0.1  # share of the cost that chance gains on the ground, where no log can be simulated: measured on walks
 RESTARTS = 40  # windows that measure what a log does not show of a walk
+LATENCY, SHIFTS = "command_latency", (0.002, 0.02, 0.05)  # and where a fit of two clocks' shift starts [s]
 ON_GROUND = ("contact",)  # kinds of effects that a robot in the air cannot show
 
 
@@ -78,6 +79,7 @@ class Findings:
         null_gains: What chance gained in simulated logs.
         trials: Duels of the surviving causes in simulated logs.
         baseline: From the reference, if there is one.
+        shift: Between the clocks of commands and measurements, taken out first [s], if they are apart.
     """
 
     experiment: Experiment
@@ -88,6 +90,12 @@ class Findings:
     null_gains: tuple[float, ...]
     trials: tuple[Trial, ...]
     baseline: Baseline | None
+    shift: float = 0.0
+
+    @property
+    def answer(self) -> Hypothesis:
+        """The hypothesis that may be used: the chosen one if it may be named, else calibration alone."""
+        return self.selection.chosen if self.verdict.word in ("causes", "inseparable") else self.selection.none
 
 
 def diagnosed(
@@ -115,17 +123,21 @@ def diagnosed(
         reference: A log without the effect, on which the nominal is calibrated first.
         known_nulls: What chance gained on these commands in this world, if it is known already.
     """
-    if reference is not None:
-        tick("calibrating the simulator on the reference")
-    baseline = None if reference is None else calibrated_on(reference, robot, plant, step, options, tick)
     found = experiment(log, robot, walking=walking)
     if walking:
         simulator = Walking(plant, fitting_step(step, found.period), found.period, workers=options.threads)
         spread = found.pieces.chosen(np.arange(0, len(found.pieces), max(1, len(found.pieces) // RESTARTS)))
         found = found.with_model_error(restart_error(simulator, spread))
-    if baseline is not None:
+    baseline, shift = None, 0.0
+    if reference is not None:
+        tick("calibrating the simulator on the reference")
+        baseline = calibrated_on(reference, robot, plant, step, options, tick)
         plant = nuisance.calibrated(applied(plant, built(baseline.effects)), baseline.nuisances)
         found = found.with_model_error(baseline.error)
+    if not options.clocks:
+        tick("setting the clocks")
+        shift = clock_shift(found, plant, step, options, tick)
+        plant = applied(plant, built({LATENCY: {"delay": shift}}))
     arena = arena_of(found, plant, step, options, tick)
     nulls = tuple(known_nulls or ())
     if options.nulls and not nulls and not walking:
@@ -139,7 +151,7 @@ def diagnosed(
     tick("self-test: can the causes that are left be told apart")
     trials = tuple(duels(found, arena, survivors, options.duels, tick)) if options.duels and not walking else ()
     verdict = judged(selection, _expected(selection, trials) * (1.0 + found.noise.slack), _margins(trials, survivors))
-    return Findings(found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline)
+    return Findings(found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift)
 
 
 def arena_of(found: Experiment, plant: Plant, step: float, options: Options, tick: Callable[[str], None]) -> Arena:
@@ -147,12 +159,21 @@ def arena_of(found: Experiment, plant: Plant, step: float, options: Options, tic
     simulator = found.simulator(plant, step, options.threads)
     contact = () if found.walking else ON_GROUND
     hidden = [name for name in names() if getattr(effect_class(name), "kind", "") in contact]
-    hidden += [] if options.clocks else ["command_latency"]
+    hidden += [] if options.clocks else [LATENCY]
     shaking = bool(found.comparison.shaking.any())
     without = (*options.without, *hidden, "external_push")
     candidates = library(found.robot, without, dense=shaking, floating=found.walking)
     scopes = scopes_of({} if found.walking else found.robot.groups, found.channels, apart=not found.walking)
     return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick)
+
+
+def clock_shift(found: Experiment, plant: Plant, step: float, options: Options, tick: Callable[[str], None]) -> float:
+    """Return by how much measurements lag behind commands [s], as far as a pure shift explains it."""
+    arena = arena_of(found, plant, step, replace(options, clocks=True, without=()), tick)
+    candidate = next(one for one in arena.library if one.effect == LATENCY)
+    still = nuisance.none(arena.train.joints)
+    fits = [arena.fitted((candidate,), np.array([start]), still) for start in SHIFTS]
+    return float(min(fits, key=lambda one: one.cost).parameters[0][0])
 
 
 def calibrated_on(

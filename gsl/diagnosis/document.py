@@ -29,13 +29,13 @@ WORDS = {
 
 def document(found: Findings, **about: Any) -> dict[str, Any]:
     """Return the whole document; `about` is what the caller knows besides: data, world_file, report, command, ..."""
-    exp, chosen, sim = found.experiment, found.selection.chosen, found.simulator
+    exp, answer, sim = found.experiment, found.answer, found.simulator
     everything = exp.bench(sim, "all")
     told = sim.told({}, nuisance.none(len(exp.channels)), exp.pieces)
     z = exp.comparison.residual(told, exp.pieces)
     times, growth = horizon(exp, told)
     causes = [] if found.verdict.word in ("no_gap", "unknown") else [_cause(found, one) for one in found.verdict.causes]
-    after = everything.simulator.told(chosen.effects, chosen.fit.nuisances, exp.pieces)
+    after = everything.simulator.told(answer.effects, answer.fit.nuisances, exp.pieces)
     places = [asdict(cell) for cell in cells(exp, z, regimes(exp, sim))]
     return {
         "verdict": found.verdict.word,
@@ -48,7 +48,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "sides": sides(exp, z),
         "shrinkage": shrinkage(found, told, after),
         "ranking": _ranking(found),
-        "calibration": _calibration(exp.joints, chosen.fit.nuisances[:, : len(exp.joints)]),
+        "calibration": _calibration(exp.joints, answer.fit.nuisances[:, : len(exp.joints)]),
         "floor": {
             "source": exp.noise.source,
             "pairs": exp.noise.pairs,
@@ -145,6 +145,10 @@ def _calibration(joints: Sequence[str], nuisances: np.ndarray) -> list[dict[str,
 
 def _caveats(found: Findings) -> list[str]:
     exp, said = found.experiment, []
+    if found.shift:
+        said.append(
+            f"The clocks are apart: {1e3 * found.shift:.1f} ms were taken out first, so that no latency can show."
+        )
     if exp.noise.source != "repeats":
         said.append("No command was played twice: the noise floor is estimated from the roughness of the log.")
     if not exp.by_record:

@@ -48,7 +48,8 @@ class Walking:
         parts = [OnGround(*(part[share] for part in pieces.windows)) for share in shares]
         if len(parts) == 1:
             return _all_replayed(plant, physics, parts[0])
-        return np.concatenate(Parallel(n_jobs=len(parts))(delayed(_all_replayed)(plant, physics, one) for one in parts))
+        parallel = Parallel(n_jobs=len(parts), max_nbytes=None)  # else joblib leaves a file for every call
+        return np.concatenate(parallel(delayed(_all_replayed)(plant, physics, one) for one in parts))
 
 
 def _all_replayed(plant: Plant, physics: Physics, windows: OnGround) -> np.ndarray:

@@ -19,7 +19,7 @@ WINDOWS = 12  # held-out windows that are replayed
 
 def in_bullet(found: Findings, *, iterations: int = 50) -> dict[str, Any]:
     """Return how far Bullet and the chain model differ with the answer [mrad], and Bullet's gap in floors."""
-    exp, chosen, sim = found.experiment, found.selection.chosen, found.simulator
+    exp, chosen, sim = found.experiment, found.answer, found.simulator
     index = exp.held_out[np.unique(np.linspace(0, len(exp.held_out) - 1, WINDOWS).round().astype(int))]
     part = exp.pieces.chosen(index)
     plant = calibrated(applied(sim.plant, built(chosen.effects)), chosen.fit.nuisances)

@@ -17,9 +17,10 @@ DIGITS = 6
 def diagnosed_effects(found: Findings) -> dict[str, Any]:
     """Return what the simulator lacks: the reference's findings, the diagnosed effects, then the calibration.
 
-    Every entry is one of a world's `effects:`; the calibration comes joint by joint.
+    Every entry is one of a world's `effects:`; the calibration comes joint by joint. Where nothing may be named it is
+    all there is.
     """
-    joints, chosen = found.experiment.joints, found.selection.chosen
+    joints, chosen = found.experiment.joints, found.answer
     unit = nuisance.inertia_unit(found.simulator.plant.servo)
     parts = [chosen.effects, calibration(joints, chosen.fit.nuisances[:, : len(joints)], unit)]
     if found.baseline is not None:

@@ -122,7 +122,9 @@ class Diagnose:
         held = {int(k) for k in exp.pieces.record[exp.held_out]}
         return {
             "robot": exp.robot.name,
-            "sim": self.sim.robot,
+            "sim": f"the simulated {self.sim.robot}"
+            + (" with " if self.sim.effects else "")
+            + ", ".join(self.sim.effects),
             "records": len(exp.records),
             "seconds": sum(len(one) for one in exp.records) * exp.period,
             "train": len(exp.records) - len(held) if exp.by_record else len(exp.records),
