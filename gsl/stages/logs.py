@@ -86,15 +86,16 @@ def _walks(sensors: object) -> bool:
 
 
 def _check_units(batch: Batch, robot: Robot, name: str) -> None:
+    """Refuse angles far beyond the joints' limits, told of the joint that is farthest out."""
+    found = []
     for k, joint in enumerate(batch.joints):
         limits = robot.joint(joint)
         for what in ("action", "position"):
             values = np.concatenate([getattr(episode, what)[:, k] for episode in batch.episodes])
-            worst = float(max(limits.lower - values.min(), values.max() - limits.upper))
-            if worst > BEYOND:
-                far = values[np.argmax(np.abs(values))]
-                hint = "are these degrees?" if abs(far) > 2.0 * np.pi else "is the zero or the sign another?"
-                raise GslError(
-                    f"{name}: {what}.{joint} reaches {far:.3g}, beyond the joint's limits "
-                    f"[{limits.lower:.2f}, {limits.upper:.2f}] rad; {hint}"
-                )
+            beyond = float(max(limits.lower - values.min(), values.max() - limits.upper))
+            found.append((beyond, f"{what}.{joint}", float(values[np.argmax(np.abs(values))]), limits))
+    beyond, column, far, limits = max(found, key=lambda one: one[0])
+    if beyond > BEYOND:
+        hint = "are these degrees?" if abs(far) > 2.0 * np.pi else "is the zero or the sign another?"
+        bounds = f"[{limits.lower:.2f}, {limits.upper:.2f}] rad"
+        raise GslError(f"{name}: {column} reaches {far:.3g}, beyond the joint's limits {bounds}; {hint}")

@@ -1,0 +1,79 @@
+"""Logs that cannot be diagnosed are refused in one line that says what, where and what to do."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gsl.core.body import lumped
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.errors import GslError
+from gsl.robots.nao import nao
+from gsl.stages.logs import check_log, log_files, on_ground, read_logs
+from gsl.storage.trajectories import write
+
+NAO = lumped(nao())
+REST = np.array([0.5 * NAO.stance.get(joint, 0.0) for joint in NAO.controlled])
+
+
+def log(ticks: int = 100) -> Batch:
+    waves = 0.1 * np.sin(0.1 * np.arange(ticks + 1))[:, None]
+    position = REST + waves
+    episode = Trajectory(0.02 * np.arange(ticks + 1), position[:-1], position, np.zeros_like(position))
+    return Batch((episode,), NAO.controlled, 0.02, {"robot": "nao", "role": "imported"})
+
+
+def changed(batch: Batch, change: Callable[[Trajectory], Trajectory]) -> Batch:
+    return replace(batch, episodes=tuple(change(episode) for episode in batch.episodes))
+
+
+def degrees(episode: Trajectory) -> Trajectory:
+    return replace(episode, action=np.degrees(episode.action), position=np.degrees(episode.position))
+
+
+def constant(episode: Trajectory) -> Trajectory:
+    return replace(episode, action=np.zeros_like(episode.action) + REST)
+
+
+def flipped(episode: Trajectory) -> Trajectory:
+    return replace(episode, position=-3.0 * episode.position)
+
+
+def standing(episode: Trajectory) -> Trajectory:
+    force = np.full(len(episode.time), 20.0)
+    return replace(episode, sensors={"foot_force.left": force, "foot_force.right": force})
+
+
+def test_a_good_log_passes() -> None:
+    check_log(log(), NAO, "good")
+    assert not on_ground(log()) and on_ground(changed(log(), standing))
+
+
+@pytest.mark.parametrize(
+    ("bad", "words"),
+    [
+        (changed(log(), degrees), "are these degrees?"),
+        (changed(log(), flipped), "is the zero or the sign another?"),
+        (changed(log(), constant), "no command ever changes"),
+        (log(20), "too short"),
+        (changed(log(), standing), "a walk needs base.position"),
+        (replace(log(), joints=("other", *NAO.controlled[1:])), "another robot? It lacks LHipYawPitch"),
+    ],
+)
+def test_a_bad_log_is_one_clear_line(bad: Batch, words: str) -> None:
+    with pytest.raises(GslError) as caught:
+        check_log(bad, NAO, "my_log.parquet")
+    told = str(caught.value)
+    assert told.startswith("my_log.parquet: ") and words in told and "\n" not in told
+
+
+def test_a_folder_of_files_is_one_log(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        write(tmp_path / f"{name}.parquet", log())
+    assert [path.name for path in log_files(str(tmp_path))] == ["a.parquet", "b.parquet"]
+    assert len(read_logs(str(tmp_path))) == 2
+    write(tmp_path / "c.parquet", replace(log(), control_period=0.01))
+    with pytest.raises(GslError, match=r"c\.parquet.*another control period"):
+        read_logs(str(tmp_path))
