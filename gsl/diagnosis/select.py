@@ -10,6 +10,7 @@ from gsl.diagnosis.attribute import BEAM, Arena, Gain, Hypothesis, gain
 from gsl.diagnosis.screen import Screening
 
 LEAST_SHARE = 0.2  # of what is left, that a further effect has to explain
+MUCH = 1.1  # cost of a residual that leaves room for more than a small further effect
 PAIRS = 5  # leads that are fitted beside an effect that stands already
 
 
@@ -63,7 +64,7 @@ def selected(arena: Arena, thresholds: Thresholds, *, most: int = 3) -> Selectio
     tried, chosen = [none, *singles], none
     if singles and _stands(singles[0], none, max(thresholds.gain, thresholds.share * none.cost)):
         chosen = singles[0]
-        beam = _distinct(singles)
+        beam = _distinct(singles)[: BEAM if _lacking(chosen) else 1]
         while len(chosen.candidates) < most:
             found = [one for base in beam for one in arena.successors(base, PAIRS)[0]]
             tried += found
@@ -71,6 +72,8 @@ def selected(arena: Arena, thresholds: Thresholds, *, most: int = 3) -> Selectio
             if not _stands(best, chosen, _least(thresholds, chosen)):
                 break
             chosen, beam = best, [best]
+            if not _lacking(chosen):
+                break
         chosen = _pruned(arena, chosen, thresholds, tried)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
 
@@ -84,6 +87,11 @@ def _least(thresholds: Thresholds, standing: Hypothesis) -> float:
     """Return what a further effect has to gain over what stands."""
     floor = max(thresholds.further, thresholds.share * standing.cost)
     return max(floor, LEAST_SHARE * max(0.0, standing.cost - float(standing.counts.sum())))
+
+
+def _lacking(standing: Hypothesis) -> bool:
+    """Whether much more is left than noise."""
+    return standing.level > MUCH
 
 
 def _distinct(singles: list[Hypothesis]) -> list[Hypothesis]:
