@@ -193,6 +193,9 @@ def test_help_shows_groups_settings_and_effects(capsys: pytest.CaptureFixture[st
     assert "backlash.width" in text
 
 
+NEEDED = {"diagnose": ("real=logs",)}  # what has no default
+
+
 def _choices() -> Iterator[tuple[str, ...]]:
     """Commands with choices as they are typed: in a command's n-th line every group takes its n-th option."""
     conf = configuration_folder()
@@ -200,7 +203,8 @@ def _choices() -> Iterator[tuple[str, ...]]:
         groups = [entry for entry in yaml.safe_load(command.read_text())["defaults"] if isinstance(entry, dict)]
         found = [_typed(next(iter(entry)).lstrip("/"), conf, command.stem) for entry in groups]
         for number in range(max(map(len, found))):
-            yield command.stem.replace("_", "-"), *(typed[min(number, len(typed) - 1)] for typed in found)
+            chosen = (typed[min(number, len(typed) - 1)] for typed in found)
+            yield command.stem.replace("_", "-"), *chosen, *NEEDED.get(command.stem, ())
     yield from [("iterate", f"experiment={option.stem}") for option in sorted((conf / "experiment").glob("*.yaml"))]
 
 
