@@ -63,7 +63,7 @@ def test_after_kill_9_no_worker_stays_and_the_artifact_can_be_built(chain: Path,
         time.sleep(1.0)
         process.kill()
         process.wait()
-        assert eventually(lambda: not session(process.pid), seconds=15.0)
+        assert eventually(lambda: not session(process.pid), seconds=60.0)
     quick = ("episodes=1", "neighbours=0", "task.duration=0.1", "workers=1")
     assert gsl("collect", *quick, f"out={tmp_path}/it", folder=chain).code == 0
     assert [path.name for path in tmp_path.iterdir()] == ["it"]
