@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperCommand
 
 from gsl import __version__
-from gsl.commandline.completion import CONFIG_DIR, complete, user_folder
+from gsl.commandline.completion import CONFIG_DIR, complete, name_of, user_folder
 from gsl.commandline.failure import INTERRUPTED, leave_quietly, report
 from gsl.console import Console
 from gsl.core.interruption import ignore, listen
@@ -27,7 +27,7 @@ class StageCommand(TyperCommand):
         from gsl.commandline.help import write_help
 
         super().format_help(ctx, formatter)
-        formatter.write(write_help(str(ctx.info_name), config_dir=user_folder(ctx)))
+        formatter.write(write_help(name_of(ctx), config_dir=user_folder(ctx)))
 
 
 class Shown(StrEnum):
@@ -58,10 +58,16 @@ app = typer.Typer(
 )
 
 
-def stage(name: str, summary: str) -> None:
-    """Add the command of a stage, whose settings are in the yaml file of the same name."""
+blind = typer.Typer(rich_markup_mode=None)
+app.add_typer(blind, name="blind")
+GROUPS = {"blind": blind}
 
-    @app.command(name, cls=StageCommand, help=summary, short_help=summary)
+
+def stage(name: str, summary: str) -> None:
+    """Add the command of a stage, whose settings are in the yaml file of the same name; two words are in a group."""
+    group, _, word = name.rpartition(" ")
+
+    @GROUPS.get(group, app).command(word, cls=StageCommand, help=summary, short_help=summary)
     def command(
         overrides: Overrides = None,
         multirun: Multirun = False,
@@ -81,6 +87,9 @@ stage("train-forward", "Learn from real trajectories how the robot moves: the fo
 stage("train-inverse", "Learn from simulated trajectories which action makes a motion: the inverse model.")
 stage("optimize", "Improve a policy in the simulator, grounded or not.")
 stage("diagnose", "Say where the simulator is wrong, which effect is missing, and how far the gap shrinks.")
+stage("blind make", "Draw robots with known causes, log what they do, and seal the labels.")
+stage("blind answer", "Diagnose every case without its label, and seal the answers.")
+stage("blind reveal", "Check the seals, set the answers against the labels, and count.")
 stage("evaluate", "Measure policies in the real world.")
 stage("compare", "Set groundings against each other over paired trials.")
 stage("survey", "See how far real worlds are from the simulator.")
@@ -125,6 +134,13 @@ def bench(json: Json = False) -> None:
     run_bench(Console(json=json))
 
 
+@blind.callback(invoke_without_command=True)
+def benchmark(ctx: typer.Context) -> None:
+    """Measure the diagnosis on robots of known but sealed causes."""
+    if ctx.invoked_subcommand is None:
+        Console().result({}, text=ctx.get_help())
+
+
 @app.callback(invoke_without_command=True)
 def root(
     ctx: typer.Context,
@@ -151,7 +167,7 @@ def main() -> None:
 def call(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code, with whatever went wrong told in a line."""
     words = [word for word in arguments if not word.startswith("-")]
-    command = " ".join(["gsl", *words[:1]])
+    command = " ".join(["gsl", *words[: 1 + (words[:1] == ["blind"])]])
     console = Console(json="--json" in arguments)
     try:
         code = int(app(args=list(arguments), prog_name="gsl", standalone_mode=False) or 0)

@@ -18,7 +18,7 @@ from pydantic import AfterValidator
 from gsl.commandline.composer import Composition, compose, opened
 from gsl.commandline.config_errors import instantiation_error, missing, resolution_error
 from gsl.commandline.known_settings import declared
-from gsl.commandline.overrides import COMMAND_KEYS
+from gsl.commandline.overrides import COMMAND_KEYS, file_of
 from gsl.console import Console
 from gsl.core.setting import component, setting
 from gsl.core.validation import make
@@ -46,7 +46,7 @@ class CommandSettings:
 
     def folder(self, command: str, level: str = "") -> Path:
         """Return the artifact's folder; `level` tells the jobs of a multirun apart."""
-        place = Path(self.out) if self.out else RUNS / self.name / command.replace("-", "_")
+        place = Path(self.out) if self.out else RUNS / self.name / file_of(command)
         return place.parent / level / place.name if level else place
 
 
@@ -74,7 +74,7 @@ def run(
     """
     console = Console(json=json)
     flags = [*(["--multirun"] if multirun else []), *([f"--config-dir={config_dir}"] if config_dir else [])]
-    line = shlex.join(["gsl", command, *flags, *overrides])
+    line = shlex.join(["gsl", *command.split(), *flags, *overrides])
     with opened(config_dir):
         composition = compose(command, overrides, multirun=multirun)
         if cfg:

@@ -10,12 +10,23 @@ GslError                    exit code 1: a stage failed
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 
 class GslError(Exception):
     """Something a user can understand and mend."""
 
     exit_code = 1
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let an error come back from a worker process, whatever its constructor takes."""
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[GslError], args: tuple[Any, ...], state: dict[str, Any]) -> GslError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(state)
+    return error
 
 
 class InputError(GslError):

@@ -17,7 +17,8 @@ MAY_IMPORT = {
     "diagnosis": ("core", "effects", *COMPONENTS),
     "storage": ("core", "effects", *COMPONENTS),
     "report": ("core", "effects", *COMPONENTS),
-    "stages": ("core", "effects", *COMPONENTS, "diagnosis", "storage", "report"),
+    "blind": ("core", "effects", *COMPONENTS, "diagnosis", "storage", "report"),
+    "stages": ("core", "effects", *COMPONENTS, "diagnosis", "blind", "storage", "report"),
 }
 ANYWHERE = ("errors", "console")
 COMPOSING = ("composer", "config_errors", "known_settings", "multirun")

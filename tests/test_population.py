@@ -73,7 +73,7 @@ def _dies(marker: Path, frozen: bytes, job: Job) -> int:
 def _in_parallel(function: Callable[..., int], tmp_path: Path) -> list[int]:
     jobs = [Job(np.zeros(1), seed) for seed in range(10, 16)]
     with QUIET.progress(len(jobs), "") as progress:
-        return population._in_parallel(partial(function, tmp_path / "died"), arm(), jobs, 2, progress)
+        return population.in_parallel(partial(function, tmp_path / "died"), arm(), jobs, 2, progress)
 
 
 def test_a_killed_worker_costs_only_its_own_jobs(tmp_path: Path) -> None:

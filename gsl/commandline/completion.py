@@ -17,9 +17,14 @@ def complete(ctx: typer.Context, incomplete: str) -> list[str]:
     typed, words_of_bash = incomplete, os.environ.get("COMP_WORDS")
     if words_of_bash:
         typed = joined(words_of_bash.split("\n"), int(os.environ.get("COMP_CWORD", "0")))
-    found = suggestions(str(ctx.info_name), typed, config_dir=user_folder(ctx))
+    found = suggestions(name_of(ctx), typed, config_dir=user_folder(ctx))
     cut = len(typed) - len(incomplete.lstrip("="))
     return [word[cut:] for word in found]
+
+
+def name_of(ctx: typer.Context) -> str:
+    """Return the name of a stage's command, which may be of two words, without that of the program."""
+    return ctx.command_path.partition(" ")[2]
 
 
 def user_folder(ctx: typer.Context) -> Path | None:

@@ -22,7 +22,7 @@ from yaml import YAMLError
 
 from gsl.commandline.config_errors import Vocabulary, translated, unfit, unknown_key
 from gsl.commandline.known_settings import declared, known_keys, plain
-from gsl.commandline.overrides import COMMAND_KEYS, effect_path, key_of, rewrite
+from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
 from gsl.core.validation import did_you_mean
 from gsl.effects import __path__ as effects_path
 from gsl.errors import ConfigError, InputError
@@ -183,7 +183,7 @@ def _first_value(override: Any) -> str:
 def _composed(command: str, overrides: Sequence[str]) -> DictConfig:
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None
-    name, how = command.replace("-", "_"), {"from_shell": False, "with_log_configuration": False}
+    name, how = file_of(command), {"from_shell": False, "with_log_configuration": False}
     return hydra.compose_config(config_name=name, overrides=list(overrides), run_mode=RunMode.RUN, **how)
 
 

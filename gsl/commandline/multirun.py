@@ -18,7 +18,7 @@ from omegaconf import DictConfig
 
 from gsl.commandline.composer import Composition
 from gsl.commandline.failure import described, report
-from gsl.commandline.overrides import key_of
+from gsl.commandline.overrides import file_of, key_of
 from gsl.config import RUNS, execute, resolved
 from gsl.console import Console
 from gsl.storage.documents import write_json
@@ -31,12 +31,12 @@ _SILENT = ("hydra/job_logging=none", "hydra/hydra_logging=none", "hydra.output_s
 def run_jobs(command: str, line: str, composition: Composition, console: Console) -> int:
     """Run all jobs and return the worst of their exit codes; a job that fails does not stop the others."""
     (RUNS / ".multirun").mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(prefix=f"{command}-", dir=RUNS / ".multirun"))
+    folder = Path(tempfile.mkdtemp(prefix=f"{file_of(command)}-", dir=RUNS / ".multirun"))
     job = functools.partial(run_job, command=command, line=line, swept=composition.swept, json=console.json)
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None
     hydra.multirun(
-        config_name=command.replace("-", "_"),
+        config_name=file_of(command),
         task_function=job,
         overrides=[
             *_SILENT,

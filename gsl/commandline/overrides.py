@@ -36,6 +36,11 @@ def rewrite(arguments: Iterable[str], chosen: Collection[str]) -> list[str]:
     return [_rewritten(argument, roles, chosen) for argument in arguments]
 
 
+def file_of(command: str) -> str:
+    """Return the name of a command's yaml file, and of the folder that it writes by default."""
+    return command.replace("-", "_").replace(" ", "_")
+
+
 def key_of(argument: str) -> str:
     """Return the key of an override without its prefix."""
     return argument.partition("=")[0].lstrip("+~")

@@ -1,4 +1,4 @@
-"""Means, intervals and rank correlations of a handful of numbers."""
+"""Means, shares, medians and rank correlations of a handful of numbers, with intervals."""
 
 from __future__ import annotations
 
@@ -36,6 +36,22 @@ def difference_interval(after: np.ndarray, before: np.ndarray, *, confidence: fl
         return Interval(float(difference), float(difference), float(difference))
     freedom = shares.sum() ** 2 / np.sum(shares**2 / (np.array([len(after), len(before)]) - 1))
     return _t_interval(difference, shares.sum(), freedom, confidence)
+
+
+def wilson(hits: int, count: int, *, confidence: float = 0.95) -> Interval:
+    """Return the share of hits with Wilson's score interval (Wilson 1927)."""
+    z, share = stats.norm.ppf(0.5 + confidence / 2), hits / count
+    centre = (share + z**2 / (2 * count)) / (1.0 + z**2 / count)
+    half = z / (1.0 + z**2 / count) * np.sqrt(share * (1.0 - share) / count + z**2 / (4 * count**2))
+    return Interval(share, float(max(0.0, centre - half)), float(min(1.0, centre + half)))
+
+
+def quantile_interval(values: Sequence[float] | np.ndarray, *, confidence: float = 0.95) -> Interval:
+    """Return the median of independent values, shape (n,), with the interval of order statistics that holds it."""
+    ordered, n = np.sort(np.asarray(values, dtype=float)), len(values)
+    outside = int(stats.binom.ppf((1.0 - confidence) / 2, n, 0.5))
+    low, high = max(0, outside - 1), min(n - 1, n - outside)
+    return Interval(float(np.median(ordered)), float(ordered[low]), float(ordered[high]))
 
 
 def rank_correlation(first: np.ndarray, second: np.ndarray) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.replay import Effects
+from gsl.effects.effect import together
 
 DIGITS = 6
 
@@ -49,12 +50,7 @@ def calibration(joints: Sequence[str], nuisances: np.ndarray, unit: np.ndarray) 
 
 def joined(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return several `effects:` mappings as one, numbers rounded to what a file should show."""
-    whole: dict[str, list[Any]] = {}
-    for part in parts:
-        for name, entries in part.items():
-            listed = entries if isinstance(entries, list | tuple) else [entries]
-            whole.setdefault(name, []).extend(_rounded(entry) for entry in listed)
-    return {name: entries for name, entries in whole.items() if entries}
+    return {name: [_rounded(entry) for entry in entries] for name, entries in together(parts).items()}
 
 
 def _rounded(entry: Mapping[str, Any]) -> dict[str, Any]:

@@ -76,6 +76,15 @@ def _effect(name: str, entry: Any) -> Effect:
     return entry
 
 
+def together(parts: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Return several `effects:` mappings as one with the entries of all; two entries of one effect both act."""
+    whole: dict[str, list[Any]] = {}
+    for part in parts:
+        for name, entries in part.items():
+            whole.setdefault(name, []).extend(entries if isinstance(entries, list | tuple) else [entries])
+    return {name: entries for name, entries in whole.items() if entries}
+
+
 def applied(plant: Plant, effects: Iterable[Effect]) -> Plant:
     """Return the plant with all effects in it."""
     for effect in effects:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gsl.report.diagnosis_text import summary_lines
+from gsl.stages.diagnosis_files import report_of
 from gsl.stages.headline import Unit, falls, unit_of
 from gsl.stages.measured import cells, columns
 from gsl.storage.artifact import Artifact
@@ -114,11 +115,14 @@ def _returned(metrics: Mapping[str, Any], unit: Unit) -> str:
 
 def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     titles, rows = _markdown(folder / "table.md")
-    spent, learned = metrics["real_episodes"], metrics["learned_from"]
+    spent, learned, flight = metrics["real_episodes"], metrics["learned_from"], metrics.get("excitation")
+    air = f"{flight['episodes']} motions in the air ({flight['real_seconds']:.0f} s) to diagnose, " if flight else ""
+    measured = spent - learned - (flight["episodes"] if flight else 0)
     plots = ", ".join(sorted(path.name for path in folder.glob("*.png")))
     below = [
+        *([metrics["diagnosis"]["told"]] if metrics.get("diagnosis") else []),
         metrics["verdict"],
-        f"real data: {learned} episodes to learn from, {spent - learned} to measure, {spent} in all",
+        f"real data: {air}{learned} episodes to learn from, {measured} to measure, {spent} in all",
         f"plots: {folder.as_posix()}/ ({plots})",
     ]
     return Told(f"grounded simulation learning [{unit.name}]", titles, rows, "\n".join(below))
@@ -137,9 +141,16 @@ def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     return Told(f"worlds [{unit.name}]", *_markdown(folder / "table.md"))
 
 
+def _blind_reveal(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    met = f"{metrics['met']} of {metrics['judged']} thresholds are met"
+    below = f"{met}; every wrong answer, by truth and strength: {folder.as_posix()}/results.md"
+    return Told(f"blind benchmark, {metrics['cases']} cases", *_markdown(folder / "results.md"), below)
+
+
 def _markdown(path: Path) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return the titles and rows of the first table of a file."""
-    lines = itertools.takewhile(lambda line: line.startswith("|"), path.read_text(encoding="utf-8").splitlines())
+    below_title = itertools.dropwhile(lambda line: line[:1] != "|", path.read_text(encoding="utf-8").splitlines())
+    lines = itertools.takewhile(lambda line: line.startswith("|"), below_title)
     titles, _, *rows = (tuple(cell.strip() for cell in line[1:-1].split("|")) for line in lines)
     return titles, rows
 
@@ -178,12 +189,8 @@ def _worst(by_joint: Mapping[str, float]) -> str:
 
 
 def _diagnose(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> list[Told]:
-    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-    paths = {key: (folder / report[key]).as_posix() for key in ("world_file", "report")}
-    return [
-        Told(part[0], tuple(part[1]), [tuple(row) for row in part[2]], part[3])
-        for part in summary_lines(report | paths)
-    ]
+    parts = summary_lines(report_of(folder))
+    return [Told(part[0], tuple(part[1]), [tuple(row) for row in part[2]], part[3]) for part in parts]
 
 
 _TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told | list[Told]]] = {
@@ -196,4 +203,5 @@ _TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told | list[Tol
     "iterate": _iterate,
     "compare": _compare,
     "survey": _survey,
+    "blind_reveal": _blind_reveal,
 }

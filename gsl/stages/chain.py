@@ -6,26 +6,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from gsl.core.described import described
 from gsl.core.setting import component, setting
-from gsl.errors import ArtifactError
+from gsl.grounding.effects import DiagnosedEffects, switched_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
 from gsl.policies.policy import Policy
 from gsl.stages.collect import Collect
+from gsl.stages.diagnosis_files import read_diagnosis
+from gsl.stages.diagnosis_plan import DiagnosisPlan
 from gsl.stages.evaluate import Evaluate
-from gsl.stages.headline import headline
+from gsl.stages.link import built
 from gsl.stages.optimize import Optimize
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import TrainInverse
-from gsl.storage import manifest
-from gsl.storage.artifact import Artifact, Stage, build
+from gsl.storage.artifact import Artifact
 from gsl.tasks.task import REAL, SIM, Task
 from gsl.worlds.world import World
-
-COMMAND = "gsl iterate"
 
 
 @component
@@ -57,8 +55,25 @@ class Chain:
     inverse_method: Literal["regression", "solve"]
     optimizer: CmaEs
     budget: Budget
+    diagnosis: DiagnosisPlan
     accept: bool
     workers: int
+
+    def diagnosed(self, home: Path, grounding: Grounding, seed: int, console: Any) -> Grounding:
+        """Return a grounding that has its diagnosis, made below `home` if it wants one of its own."""
+        if not isinstance(grounding, DiagnosedEffects) or grounding.effects:
+            return grounding
+        made = self.diagnosis.carried_out(self.real, self.sim, home, workers=self.workers, seed=seed, console=console)
+        return replace(grounding, diagnosis=str(made.folder))
+
+    def ready(self, home: Path, grounding: Grounding, previous: str | None, seed: int, console: Any) -> Grounding:
+        """Return a grounding that has its models, trained below `home`; those inside of effects know their world."""
+        if isinstance(grounding, DiagnosedEffects):
+            inside = replace(self, sim=switched_on(self.sim, grounding.load(read_diagnosis)))
+            return replace(grounding, inner=inside.ready(home, grounding.inner, previous, seed, console))
+        if isinstance(grounding, ActionTransformation):
+            return self.trained(home, grounding, previous, seed, console)
+        return grounding
 
     def trained(
         self, home: Path, grounding: ActionTransformation, previous: str | None, seed: int, console: Any
@@ -89,9 +104,7 @@ class Chain:
         f, f_inverse = (built(stage, home / stage.kind, console) for stage in (forward, inverse))
         return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))
 
-    def search(
-        self, out: Path, grounding: Grounding | ActionTransformation, previous: str | None, seed: int, console: Any
-    ) -> Artifact:
+    def search(self, out: Path, grounding: Grounding, previous: str | None, seed: int, console: Any) -> Artifact:
         """Optimise in the simulator with a grounding that is ready."""
         stage = Optimize(
             world=self.sim,
@@ -121,18 +134,3 @@ class Chain:
             seed=seed,
         )
         return built(stage, out, console)
-
-
-def built(stage: Stage, out: Path, console: Any) -> Artifact:
-    """Build one link; what an earlier chain built otherwise in its place is replaced, what anyone else built is not."""
-    command = f"{COMMAND} ({stage.kind})"
-    made = build(stage, config=described(stage), out=out, command=command, force=_ours(out), console=console)
-    console.status(f"{out.as_posix()}: {headline(made)}{' (unchanged)' if made.unchanged else ''}")
-    return made
-
-
-def _ours(out: Path) -> bool:
-    try:
-        return manifest.read(out).command.startswith(COMMAND)
-    except ArtifactError:
-        return False

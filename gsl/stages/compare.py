@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from gsl.core.setting import component, setting
+from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.stages.comparison import Trial, markdown, summaries
+from gsl.stages.diagnosis_plan import flown
 from gsl.stages.iterate import Iterate
 from gsl.storage.documents import write_json
 from gsl.worlds.world import World
@@ -25,7 +27,8 @@ class Compare:
     A grounding that its check would refuse is gone on with, and the table says how often that was.
 
     A search in a simulator that knows nothing of the real world (no grounding, action noise) is done once a trial and
-    measured in every world: columns of such a method are not independent of each other.
+    measured in every world: columns of such a method are not independent of each other. Methods with diagnosed effects
+    share the diagnosis of their trial and world; each of them pays for it.
     """
 
     kind: ClassVar[str] = "compare"
@@ -57,15 +60,15 @@ class Compare:
                     yield self._trial(home, world, method, number, console)
 
     def _trial(self, home: Path, world: str, method: str, number: int, console: Any) -> Trial:
-        grounding, seed, name = self.methods[method], self.iterate.seed + number - 1, f"trial_{number:02d}"
+        seed, name = self.iterate.seed + number - 1, f"trial_{number:02d}"
         chain = replace(self.iterate.chain, real=self.worlds[world], accept=True)
-        place = home / world / method / name
-        if isinstance(grounding, ActionTransformation):
-            ready = chain.trained(place, grounding, None, seed, console)
-            found = chain.search(place / "optimize", ready, None, seed, console)
-            collected = self.iterate.budget.real_episodes + self.iterate.budget.real_neighbours
-        else:
-            found = chain.search(home / "sim" / method / name / "optimize", grounding, None, seed, console)
-            collected = 0
+        place, air = home / world / method / name, home / world / "diagnosis" / name
+        grounding = chain.diagnosed(air, self.methods[method], seed, console)
+        collected = flown(air).episodes if grounding is not self.methods[method] else 0
+        if isinstance(innermost(grounding), ActionTransformation):
+            collected += self.iterate.budget.real_episodes + self.iterate.budget.real_neighbours
+        ready = chain.ready(place, grounding, None, seed, console)
+        out = place if collected else home / "sim" / method / name
+        found = chain.search(out / "optimize", ready, None, seed, console)
         measured = chain.measure(place / "evaluate", found, seed, console)
         return Trial.of(world, method, number, found.metrics, measured.metrics, collected)

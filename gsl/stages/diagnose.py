@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -20,11 +19,11 @@ from gsl.diagnosis.document import document
 from gsl.diagnosis.verify import in_bullet
 from gsl.diagnosis.world_file import diagnosed_effects, joined
 from gsl.report.diagnosis import report_html
+from gsl.stages.diagnosis_files import PAGE, REPORT, WORLD, report_of
+from gsl.stages.experiment_file import write_next_experiment
 from gsl.stages.logs import check_log, log_files, on_ground, read_logs
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
-
-REPORT, PAGE, WORLD = "report.json", "report.html", "world/diagnosed.yaml"
 
 
 @component
@@ -59,7 +58,7 @@ class Diagnose:
         return found
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
-        """Write report.json, report.html and the diagnosed world."""
+        """Write report.json, report.html, the diagnosed world and the next experiment."""
         begin = time.perf_counter()
         robot = lumped(self.sim.plant.robot)
         logs = {role: self._read(role) for role in ("real", "reference") if getattr(self, role)}
@@ -77,11 +76,8 @@ class Diagnose:
 
     def document(self, folder: Path) -> dict[str, Any]:
         """Return what --json shows of an artifact: the report without its curves."""
-        report: dict[str, Any] = json.loads((folder / REPORT).read_text(encoding="utf-8"))
         bulky = ("replays", "horizon")
-        shown = {key: value for key, value in report.items() if key not in bulky}
-        paths = {"world_file": folder / WORLD, "report": folder / PAGE}
-        return shown | {key: path.as_posix() for key, path in paths.items() if report[key]}
+        return {key: value for key, value in report_of(folder).items() if key not in bulky}
 
     def _read(self, role: str) -> Batch:
         batch = read_logs(getattr(self, role))
@@ -99,6 +95,8 @@ class Diagnose:
         told = document(
             found,
             verified=in_bullet(found, iterations=self.sim.iterations) if checked else None,
+            next_experiment=write_next_experiment(found, self.sim.robot, folder),
+            effects=diagnosed_effects(found),
             world_file=WORLD,
             report=PAGE,
             data=self._data(found, batch),
@@ -139,7 +137,8 @@ class Diagnose:
         config = described(self.sim)
         config["effects"] = joined([config["effects"], diagnosed_effects(found)])
         text = yaml.safe_dump(documents.plain(config), sort_keys=False, allow_unicode=True)
-        return f"# {summary}\n# The simulator with it switched on, and calibrated joint by joint.\n{text}"
+        told = "with it switched on, and calibrated" if found.answer.candidates else "calibrated"
+        return f"# {summary}\n# The simulator {told} joint by joint.\n{text}"
 
 
 def _telling(console: Any) -> Callable[[str], None]:

@@ -142,7 +142,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         raise InputError(f"the real trajectories lack {error.args[0]}: no simulation can start from them") from error
     finally:
         env.close()
-    ran = _grounded_pi0(scenario, parameters, derived_seed(seed, EPISODES))
+    ran = pi0_in(scenario, parameters, derived_seed(seed, EPISODES))
     return GroundingReport(
         {group: found for group, found in deviations.items() if found},
         layout.joints,
@@ -165,7 +165,7 @@ def largest_stable_alpha(scenario: Scenario, parameters: np.ndarray, seed: int) 
     assert isinstance(grounding, LoadedTransformation)
     for alpha in ALPHAS:
         tried = replace(scenario, grounding=replace(grounding, alpha=alpha))
-        if not any(fell for _, fell in _grounded_pi0(tried, parameters, seed, patient=False)):
+        if not any(fell for _, fell in pi0_in(tried, parameters, seed, patient=False)):
             return alpha
     return ALPHAS[-1]
 
@@ -181,10 +181,8 @@ def _compared(env: Any, grounding: Any, episodes: Sequence[Any], seed: int) -> d
     }
 
 
-def _grounded_pi0(
-    scenario: Scenario, parameters: np.ndarray, seed: int, *, patient: bool = True
-) -> list[tuple[float, bool]]:
-    """Return value and fall of some episodes; the impatient stop at the first fall."""
+def pi0_in(scenario: Scenario, parameters: np.ndarray, seed: int, *, patient: bool = True) -> list[tuple[float, bool]]:
+    """Return value and fall of some episodes of π0; the impatient stop at the first fall."""
     env, done = scenario.make(), []
     for index in range(EPISODES):
         episode = rollout(scenario, env, parameters, derived_seed(seed, index))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,11 @@ import numpy as np
 
 from gsl.core.seeds import derived_seed
 from gsl.errors import GslError, InputError, TrajectoryError
+from gsl.grounding.effects import DiagnosedEffects, switched_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.report.grounding_errors import grounding_errors
+from gsl.stages.diagnosis_files import read_diagnosis
+from gsl.stages.effects_check import check_effects
 from gsl.stages.grounding_check import TITLES, check, largest_stable_alpha
 from gsl.stages.rollout import Scenario
 from gsl.stages.train_forward import HELDOUT
@@ -24,47 +27,86 @@ from gsl.storage.trajectories import read
 REPORT, FIGURE = "grounding.json", "grounding.png"
 
 
-def grounding_parents(grounding: Any) -> Mapping[str, Path]:
-    """Return the models a grounding is made of, by role."""
+def grounding_parents(grounding: Any, path: str = "grounding") -> Mapping[str, Path]:
+    """Return what a grounding is made of, by role: the dotted name of the setting, seen from `path`."""
+    if isinstance(grounding, DiagnosedEffects):
+        own = {} if grounding.effects else {f"{path}.diagnosis": resolve(grounding.diagnosis, kind="diagnose")}
+        return {**own, **grounding_parents(grounding.inner, f"{path}.inner")}
     if not isinstance(grounding, ActionTransformation):
         return {}
     return {
-        "grounding.forward_model": resolve(grounding.forward_model, kind="train_forward"),
-        "grounding.inverse_model": resolve(grounding.inverse_model, kind="train_inverse"),
+        f"{path}.forward_model": resolve(grounding.forward_model, kind="train_forward"),
+        f"{path}.inverse_model": resolve(grounding.inverse_model, kind="train_inverse"),
     }
 
 
-def grounded(
-    scenario: Scenario, parameters: np.ndarray, folder: Path, console: Any, *, accept: bool, seed: int
-) -> tuple[Scenario, Mapping[str, Any]]:
-    """Load a grounding's models, settle alpha, write its report, and let it through or not.
+@dataclass(frozen=True)
+class Gate:
+    """What a grounding has to pass on its way into a search.
 
-    Returns:
-        The scenario with the grounding ready to act, and what to report of it.
-
-    Raises:
-        GslError: The grounding fails its check and `accept` is not set.
+    Attributes:
+        parameters: Of π0, shape (n_parameters,).
+        folder: Where its report goes.
+        console: Where it is told.
+        accept: Whether it may pass in spite of problems.
+        seed: Of all randomness.
     """
-    settings = scenario.grounding
-    if not isinstance(settings, ActionTransformation):
+
+    parameters: np.ndarray
+    folder: Path
+    console: Any
+    accept: bool
+    seed: int
+
+    def passed(self, scenario: Scenario) -> tuple[Scenario, Mapping[str, Any]]:
+        """Return the scenario with a grounding ready to act, in the world that it makes, and what to report of it.
+
+        Raises:
+            GslError: The grounding fails its check and `accept` is not set.
+        """
+        if isinstance(scenario.grounding, DiagnosedEffects):
+            return self._diagnosed(scenario, scenario.grounding)
+        if isinstance(scenario.grounding, ActionTransformation):
+            return self._transformed(scenario, scenario.grounding)
         return scenario, {}
-    console.status("checking the grounded simulator against held-out real trajectories")
-    loaded = settings.load(read_forward_model, read_inverse_model)
-    ready = replace(scenario, grounding=loaded)
-    if settings.alpha == "auto":
-        alpha = largest_stable_alpha(ready, parameters, derived_seed(seed, "alpha"))
-        ready = replace(scenario, grounding=replace(loaded, alpha=alpha))
-    heldout = model_file(settings.forward_model, "forward_model").with_name(HELDOUT)
-    try:
-        report = check(ready, parameters, read(heldout), derived_seed(seed, "check"))
-    except InputError as error:
-        raise error if isinstance(error, TrajectoryError) else TrajectoryError(heldout, str(error)) from error
-    write_json(folder / REPORT, report.metrics())
-    grounding_errors(folder / FIGURE, report.by_joint())
-    console.table("grounded simulator against held-out real trajectories", TITLES, report.rows())
-    if not report.acceptable:
-        problem = "; ".join(report.problems)
-        if not accept:
-            raise GslError(f"this grounding is refused: {problem}. Collect more data, or go on with accept=true")
-        console.status(f"warning: {problem}")
-    return ready, {"alpha": report.alpha, "grounding_acceptable": report.acceptable}
+
+    def _diagnosed(self, scenario: Scenario, settings: DiagnosedEffects) -> tuple[Scenario, Mapping[str, Any]]:
+        """Switch effects on; an inner grounding that learns is checked in the world that they make."""
+        found = settings.load(read_diagnosis)
+        self.console.status(found.told)
+        inside = replace(scenario, world=switched_on(scenario.world, found), grounding=settings.inner)
+        about = {"effects": list(found.causes), "diagnosis": found.verdict}
+        ready, checked = self.passed(inside)
+        if not checked:
+            report = check_effects(found, ready, self.parameters, derived_seed(self.seed, "check"))
+            write_json(self.folder / REPORT, report)
+            checked = {"grounding_acceptable": report["acceptable"]}
+            self._judge(report["problems"], "Diagnose again")
+        return ready, {**about, **checked}
+
+    def _transformed(self, scenario: Scenario, settings: ActionTransformation) -> tuple[Scenario, Mapping[str, Any]]:
+        """Load models, settle alpha, and compare with held-out real trajectories."""
+        self.console.status("checking the grounded simulator against held-out real trajectories")
+        loaded = settings.load(read_forward_model, read_inverse_model)
+        ready = replace(scenario, grounding=loaded)
+        if settings.alpha == "auto":
+            alpha = largest_stable_alpha(ready, self.parameters, derived_seed(self.seed, "alpha"))
+            ready = replace(scenario, grounding=replace(loaded, alpha=alpha))
+        heldout = model_file(settings.forward_model, "forward_model").with_name(HELDOUT)
+        try:
+            report = check(ready, self.parameters, read(heldout), derived_seed(self.seed, "check"))
+        except InputError as error:
+            raise error if isinstance(error, TrajectoryError) else TrajectoryError(heldout, str(error)) from error
+        write_json(self.folder / REPORT, report.metrics())
+        grounding_errors(self.folder / FIGURE, report.by_joint())
+        self.console.table("grounded simulator against held-out real trajectories", TITLES, report.rows())
+        self._judge(report.problems, "Collect more data")
+        return ready, {"alpha": report.alpha, "grounding_acceptable": report.acceptable}
+
+    def _judge(self, problems: Sequence[str], advice: str) -> None:
+        if not problems:
+            return
+        problem = "; ".join(problems)
+        if not self.accept:
+            raise GslError(f"this grounding is refused: {problem}. {advice}, or go on with accept=true")
+        self.console.status(f"warning: {problem}")

@@ -66,6 +66,13 @@ def _collect(metrics: Metrics, unit: Unit) -> str:
     return told if metrics["value"] is None else f"{told}, π0 {unit.shown(metrics['value'])}"
 
 
+def _diagnose(metrics: Metrics, unit: Unit) -> str:
+    causes, verdict = ", ".join(metrics["causes"]), metrics["verdict"].replace("_", " ")
+    share = metrics["fraction"]
+    gone = "" if share is None else f"; {100 * share:.0f} % of the held-out gap is gone"
+    return f"{verdict}: {causes}{gone}" if causes else f"{verdict}{gone}"
+
+
 def _train_forward(metrics: Metrics, unit: Unit) -> str:
     names = {"pi0": "of π0", "off_pi0": "off π0"}
     errors = {
@@ -81,6 +88,8 @@ def _train_inverse(metrics: Metrics, unit: Unit) -> str:
 
 def _optimize(metrics: Metrics, unit: Unit) -> str:
     told = f"{metrics['generations']} generations, best {unit.shown(metrics['best_value_sim'])} in simulation"
+    if "effects" in metrics:
+        told += f"; {', '.join(metrics['effects']) or 'calibration'} switched on"
     alpha = metrics.get("alpha")
     if alpha is None:
         return told
@@ -111,6 +120,7 @@ def _survey(metrics: Metrics, unit: Unit) -> str:
 
 _TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
     "collect": _collect,
+    "diagnose": _diagnose,
     "train_forward": _train_forward,
     "train_inverse": _train_inverse,
     "optimize": _optimize,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.core.setting import component, setting
+from gsl.grounding.effects import DiagnosedEffects, innermost, switched_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
@@ -18,6 +19,8 @@ from gsl.policies.policy import Policy
 from gsl.report.render import walk_strip
 from gsl.stages.chain import Budget, Chain
 from gsl.stages.choices import FILE, policies, record
+from gsl.stages.diagnosis_files import read_diagnosis
+from gsl.stages.diagnosis_plan import DiagnosisPlan, flown
 from gsl.stages.iteration_report import COLUMNS, Rounds, write_curve, write_table, write_trace
 from gsl.stages.population import Workers
 from gsl.stages.train_forward import HELDOUT
@@ -30,10 +33,16 @@ from gsl.tasks.task import Task
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.world import World
 
+FIRST = "iteration_01"
+
 
 @component
 class Iterate:
-    """The whole chain; every link is an artifact of its own beside this one, and what is unchanged is not done anew."""
+    """The whole chain; every link is an artifact of its own beside this one, and what is unchanged is not done anew.
+
+    With diagnosed effects an excitation in the air comes before the first iteration, and all of them take place in the
+    simulator that its diagnosis leaves; without a cause that is the calibrated one.
+    """
 
     kind: ClassVar[str] = "iterate"
 
@@ -47,6 +56,7 @@ class Iterate:
     grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
     optimizer: Annotated[CmaEs, setting("what improves the parameters")]
     budget: Annotated[Budget, setting("episodes of each part")]
+    diagnosis: Annotated[DiagnosisPlan, setting("how grounding=effects finds the effects")]
     iterations: Annotated[int, setting("most iterations", ge=1)] = 1
     beside: Annotated[bool, setting("show the result without grounding beside it")] = False
     accept: Annotated[bool, setting("go on with a grounding that fails its check")] = False
@@ -61,8 +71,9 @@ class Iterate:
         """Run the iterations, write the policy they end with, the table and the plots."""
         home, rounds = folder.parent, Rounds(self.task)
         with console.live_table(f"grounded simulation learning [{self.task.unit}]", COLUMNS) as table:
+            grounding = self._diagnosed(home, rounds, console)
             for number in range(1, self.iterations + 1):
-                evaluation = self._iteration(home, number, rounds, console)
+                evaluation = self._iteration(home, number, grounding, rounds, console)
                 for row in rounds.add(evaluation, self._collected_real):
                     table.row(*row)
                 if not rounds.rising:
@@ -79,13 +90,13 @@ class Iterate:
         write_table(folder, rounds)
         write_curve(folder, rounds)
         if self.learned:
-            self._trace(folder, home)
+            self._trace(folder, home, grounding)
         return rounds.metrics()
 
     @property
     def learned(self) -> bool:
         """Whether the grounding has models to train."""
-        return isinstance(self.grounding, ActionTransformation)
+        return isinstance(innermost(self.grounding), ActionTransformation)
 
     @property
     def chain(self) -> Chain:
@@ -100,6 +111,7 @@ class Iterate:
             inverse_method=self.inverse_method,
             optimizer=self.optimizer,
             budget=self.budget,
+            diagnosis=self.diagnosis,
             accept=self.accept,
             workers=self.workers,
         )
@@ -108,32 +120,40 @@ class Iterate:
     def _collected_real(self) -> int:
         return (self.budget.real_episodes + self.budget.real_neighbours) if self.learned else 0
 
-    def _iteration(self, home: Path, number: int, rounds: Rounds, console: Any) -> Artifact:
+    def _iteration(self, home: Path, number: int, grounding: Grounding, rounds: Rounds, console: Any) -> Artifact:
         """Return the evaluation that ends one iteration."""
         place, seed = home / f"iteration_{number:02d}", self.seed + 1000 * (number - 1)
         previous = None if rounds.best is None else str(rounds.best.folder)
-        grounding = self.grounding
-        if isinstance(grounding, ActionTransformation):
-            grounding = self.chain.trained(place, grounding, previous, seed, console)
-        found = self.chain.search(place / "optimize", grounding, previous, seed, console)
+        ready = self.chain.ready(place, grounding, previous, seed, console)
+        found = self.chain.search(place / "optimize", ready, previous, seed, console)
         return self.chain.measure(place / "evaluate", found, seed, console)
 
+    def _diagnosed(self, home: Path, rounds: Rounds, console: Any) -> Grounding:
+        """Return the grounding with its diagnosis: an excitation knows no policy, so that one serves all iterations."""
+        grounding = self.chain.diagnosed(home / FIRST, self.grounding, self.seed, console)
+        if grounding is not self.grounding:
+            flight = flown(home / FIRST)
+            rounds.diagnosed(flight)
+            console.status(flight.told)
+        return grounding
+
     def _ungrounded(self, home: Path, console: Any) -> Artifact:
-        place = home / "iteration_01"
+        place = home / FIRST
         found = self.chain.search(place / "optimize_none", NoGrounding(), None, self.seed, console)
         return self.chain.measure(place / "evaluate_none", found, self.seed, console)
 
-    def _trace(self, folder: Path, home: Path) -> None:
+    def _trace(self, folder: Path, home: Path, grounding: Grounding) -> None:
         """Draw a real walk that no model has seen, and what the first iteration's grounding makes of it."""
-        place = home / "iteration_01"
+        place, inner = home / FIRST, innermost(grounding)
         alpha = json.loads((place / "optimize" / "metrics.json").read_text(encoding="utf-8"))["alpha"]
-        assert isinstance(self.grounding, ActionTransformation), "only learned groundings are traced"
+        assert isinstance(inner, ActionTransformation), "only learned groundings are traced"
         forward, inverse = str(place / "train_forward"), str(place / "train_inverse")
-        settings = replace(self.grounding, alpha=alpha, forward_model=forward, inverse_model=inverse)
-        grounding = settings.load(read_forward_model, read_inverse_model)
+        settings = replace(inner, alpha=alpha, forward_model=forward, inverse_model=inverse)
         heldout = read(place / "train_forward" / HELDOUT)
-        walks = of_policy(heldout, pi0=True) or heldout.episodes
-        assert isinstance(self.sim, BulletWorld), "the check of the grounding has replayed in it"
-        walk = max(walks, key=len)
-        write_trace(folder, self.sim, grounding, walk)
-        walk_strip(self.sim.plant.robot, walk, folder / "walk.png")
+        walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
+        sim = self.sim
+        if isinstance(grounding, DiagnosedEffects):
+            sim = switched_on(sim, grounding.load(read_diagnosis))
+        assert isinstance(sim, BulletWorld), "the check of the grounding has replayed in it"
+        write_trace(folder, sim, settings.load(read_forward_model, read_inverse_model), walk)
+        walk_strip(sim.plant.robot, walk, folder / "walk.png")

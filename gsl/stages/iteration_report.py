@@ -15,6 +15,7 @@ from gsl.grounding.none import NoGrounding
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.learning_curve import Search, learning_curve, search
 from gsl.report.markdown import table
+from gsl.stages.diagnosis_plan import Flight
 from gsl.stages.evaluate import TABLE
 from gsl.stages.grounding_replay import PAST, Place, replay
 from gsl.storage.artifact import Artifact
@@ -42,6 +43,7 @@ class Rounds:
         self._task = task
         self._done: list[Artifact] = []
         self._beside: Artifact | None = None
+        self._flight: Flight | None = None
         self._spent = 0
         self._collected = 0
         self.rows: list[tuple[str, ...]] = []
@@ -52,6 +54,11 @@ class Rounds:
         """The paper's stop rule, with the interval: is v(pi_i) - v(pi_i-1) surely above 0?"""
         return bool(self._done[-1].metrics["gain"]["interval"][0] > 0.0)
 
+    def diagnosed(self, flight: Flight) -> None:
+        """Take in the diagnosis on which the iterations stand; what it cost goes into the first one's row."""
+        self._flight = flight
+        self._spent += flight.episodes
+
     def add(self, evaluation: Artifact, collected: int) -> list[tuple[str, ...]]:
         """Take in an iteration that has collected some real episodes, and return its rows."""
         self._done.append(evaluation)
@@ -61,12 +68,13 @@ class Rounds:
         first = len(self._done) == 1
         if self.rising or (first and evaluation.metrics["gain"]["value"] > 0.0):
             self.best = evaluation
-        return self._added(str(len(self._done)), evaluation.metrics, cost, first=first)
+        in_the_air = f" + {self._flight.episodes} in the air" if first and self._flight else ""
+        return self._added(str(len(self._done)), evaluation.metrics, f"{cost}{in_the_air}", first=first)
 
     def add_beside(self, evaluation: Artifact) -> list[tuple[str, ...]]:
         """Take in what is shown for comparison, and return its rows."""
         self._beside = evaluation
-        return self._added("no grounding", evaluation.metrics, evaluation.metrics["real_episodes"], first=False)
+        return self._added("no grounding", evaluation.metrics, str(evaluation.metrics["real_episodes"]), first=False)
 
     @property
     def verdict(self) -> str:
@@ -92,9 +100,24 @@ class Rounds:
             "gain": best.metrics["gain"],
             "real_episodes": self._spent,
             "learned_from": self._collected,
+            **self._of_the_flight(),
             "stopped_by_itself": not self.rising,
             "verdict": self.verdict,
             "ungrounded": None if self._beside is None else self._beside.metrics,
+        }
+
+    @property
+    def diagnosis(self) -> list[str]:
+        """What was diagnosed and what was done with it, in a line; none if nothing was."""
+        return [self._flight.told] if self._flight else []
+
+    def _of_the_flight(self) -> Mapping[str, Any]:
+        if self._flight is None:
+            return {"excitation": None, "diagnosis": None}
+        found = self._flight.diagnosis
+        return {
+            "excitation": {"episodes": self._flight.episodes, "real_seconds": self._flight.seconds},
+            "diagnosis": {"verdict": found.verdict, "causes": list(found.causes), "told": self._flight.told},
         }
 
     def searches(self) -> list[Search]:
@@ -112,13 +135,13 @@ class Rounds:
         document = json.loads((evaluation.folder / TABLE).read_text(encoding="utf-8"))
         return search(label, document, shown=self._task.shown, returned=evaluation.metrics["best"], start=start)
 
-    def _added(self, label: str, metrics: Mapping[str, Any], cost: int, *, first: bool) -> list[tuple[str, ...]]:
+    def _added(self, label: str, metrics: Mapping[str, Any], cost: str, *, first: bool) -> list[tuple[str, ...]]:
         simulated, share = metrics["returned_value_sim"], metrics["gain"]["share"]
         expected = "" if simulated is None else f"{self._task.shown * simulated:.1f}"
         gained = "" if share is None else f"{100 * share:+.1f} %"
         zero: tuple[str, ...] = ("0", "π0", "", *self._measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
-        rows.append((label, metrics["best"], expected, *self._measured(metrics["returned"]), gained, str(cost)))
+        rows.append((label, metrics["best"], expected, *self._measured(metrics["returned"]), gained, cost))
         self.rows += rows
         return rows
 
@@ -129,8 +152,9 @@ class Rounds:
 
 
 def write_table(folder: Path, rounds: Rounds) -> None:
-    """Write the table and the verdict as markdown."""
-    (folder / MARKDOWN).write_text(f"{table(COLUMNS, rounds.rows)}\n{rounds.verdict}\n", encoding="utf-8")
+    """Write the table, the diagnosis if there was one, and the verdict as markdown."""
+    told = "\n\n".join([table(COLUMNS, rounds.rows).rstrip(), *rounds.diagnosis, rounds.verdict])
+    (folder / MARKDOWN).write_text(f"{told}\n", encoding="utf-8")
 
 
 def write_curve(folder: Path, rounds: Rounds) -> None:

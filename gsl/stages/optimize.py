@@ -17,7 +17,7 @@ from gsl.policies.policy import Policy
 from gsl.stages.choices import FILE, PolicyChoice, policies, record
 from gsl.stages.generations import FILE as PROGRESS
 from gsl.stages.generations import Generation, GenerationLog
-from gsl.stages.grounding_gate import grounded, grounding_parents
+from gsl.stages.grounding_gate import Gate, grounding_parents
 from gsl.stages.population import Job, Workers, episodes
 from gsl.stages.rollout import Scenario
 from gsl.storage.policies import write_policies
@@ -51,7 +51,7 @@ class Optimize:
         """Write the generations' log and the policies: π0 first, then the best of each generation."""
         first = PolicyChoice(self.policy, self.initial).parameters()
         bare = Scenario(self.world, self.task, self.policy, SIM, self.grounding)
-        scenario, checked = grounded(bare, first, folder, console, accept=self.accept, seed=self.seed)
+        scenario, checked = Gate(first, folder, console, self.accept, self.seed).passed(bare)
         log = GenerationLog(folder)
         search = self.optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
         found = [record(self.policy, "pi0" if self.initial is None else "start", first)]

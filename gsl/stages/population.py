@@ -56,16 +56,17 @@ class Episode(NamedTuple):
 
 def trajectories(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Any) -> list[Trajectory]:
     """Return the trajectories of all jobs, in their order."""
-    return _in_parallel(_trajectory, scenario, jobs, workers, progress)
+    return in_parallel(_trajectory, scenario, jobs, workers, progress)
 
 
 def episodes(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Any) -> list[Episode]:
     """Return value, fall and length of all jobs, in their order."""
-    return _in_parallel(_episode, scenario, jobs, workers, progress)
+    return in_parallel(_episode, scenario, jobs, workers, progress)
 
 
-def _in_parallel(function: Any, scenario: Scenario, jobs: Sequence[Job], workers: int, progress: Any) -> list[Any]:
-    frozen = pickle.dumps(scenario)
+def in_parallel(function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Any) -> list[Any]:
+    """Return `function(pickled shared, job)` of all jobs, in their order."""
+    frozen = pickle.dumps(shared)
     done: dict[int, Any] = {}
     for _ in range(TRIES):
         missing = [index for index in range(len(jobs)) if index not in done]
@@ -75,11 +76,11 @@ def _in_parallel(function: Any, scenario: Scenario, jobs: Sequence[Job], workers
         if len(done) == len(jobs):
             return [done[index] for index in range(len(jobs))]
     raise GslError(
-        f"worker processes died {TRIES} times in one batch of rollouts; try workers=1 or look at free memory"
+        f"worker processes died {TRIES} times in one batch of jobs; try workers=1 or look at free memory"
     )
 
 
-def _arriving(function: Any, frozen: bytes, jobs: Sequence[Job], missing: list[int], workers: int) -> Iterator[Any]:
+def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: list[int], workers: int) -> Iterator[Any]:
     """Yield (index, result) as they come, until a worker dies."""
     import joblib
     from joblib.externals.loky.process_executor import TerminatedWorkerError
@@ -112,7 +113,7 @@ def _deaf_to_ctrl_c() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _numbered(function: Any, frozen: bytes, job: Job, index: int) -> tuple[int, Any]:
+def _numbered(function: Any, frozen: bytes, job: Any, index: int) -> tuple[int, Any]:
     _end_with_parent()
     return index, function(frozen, job)
 

@@ -1,0 +1,111 @@
+"""Diagnosed effects: the simulator with what a diagnosis found switched on, and another grounding in it, if any.
+
+The world changes, the actions do not, but for what the inner grounding does to them: with a grounded action
+transformation inside, physics takes what has a name, and what is left is learned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, is_dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from gsl.core.described import described
+from gsl.core.layout import Layout
+from gsl.core.setting import component, setting
+from gsl.effects.effect import together
+from gsl.errors import ConfigError
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.grounding import Grounding, GroundingRun
+from gsl.grounding.none import NoGrounding
+from gsl.worlds.world import World
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a diagnosis says of a simulator.
+
+    Attributes:
+        verdict: `no_gap`, `causes`, `inseparable`, `unknown`; `given` where nobody diagnosed.
+        causes: Names of the effects that it names.
+        summary: In a sentence.
+        robot: That was simulated.
+        simulated: The `effects:` of the simulator as it was.
+        effects: What it lacks, its calibration included.
+        before, after: The held-out gap without and with them, in noise floors; None where nobody measured.
+    """
+
+    verdict: str
+    causes: tuple[str, ...]
+    summary: str
+    robot: str
+    simulated: Mapping[str, Any]
+    effects: Mapping[str, Any]
+    before: float | None = None
+    after: float | None = None
+
+    @property
+    def told(self) -> str:
+        """What is done with it, in a sentence."""
+        if not self.causes:
+            return "Nothing is switched on: the simulator is taken as it is, calibrated joint by joint."
+        return f"Switched on in the simulator: {', '.join(dict.fromkeys(self.causes))}."
+
+
+@component
+class DiagnosedEffects:
+    """Which diagnosis to believe, and what to ground in its world besides; `load` reads it."""
+
+    diagnosis: Annotated[str, setting("path or run of the diagnosis")] = ""
+    effects: Annotated[
+        Mapping[str, Any], setting("what to switch on instead of a diagnosis, as in a world's `effects:`")
+    ] = field(default_factory=dict)
+    inner: Annotated[
+        Grounding | ActionTransformation, setting("what stands between action and the diagnosed simulator")
+    ] = field(default_factory=NoGrounding)
+
+    def load(self, read: Callable[[str], Diagnosis]) -> Diagnosis:
+        """Return the diagnosis; `read` finds one by its reference.
+
+        Raises:
+            ConfigError: There is neither a diagnosis nor an effect.
+        """
+        if self.effects:
+            names = tuple(self.effects)
+            told = f"These effects were given, not diagnosed: {', '.join(names)}."
+            return Diagnosis("given", names, told, "", {}, self.effects)
+        if not self.diagnosis:
+            raise ConfigError("grounding.diagnosis", "is missing; name a run of gsl diagnose, or set effects")
+        return read(self.diagnosis)
+
+    def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
+        """Refuse to start: the world has to be changed first.
+
+        Raises:
+            ConfigError: Always; `switched_on` gives the world, and `inner` acts in it.
+        """
+        raise ConfigError("grounding", "its effects are not switched on; a stage that uses it has to do that")
+
+
+def switched_on(world: World, found: Diagnosis) -> World:
+    """Return the world with what it lacks.
+
+    Raises:
+        ConfigError: It is not the simulator that was diagnosed.
+    """
+    if not is_dataclass(world) or isinstance(world, type) or not hasattr(world, "effects"):
+        raise ConfigError("grounding", "this world has no effects to switch on; take another grounding")
+    settings = described(world)
+    if found.verdict != "given" and (settings["robot"], settings["effects"]) != (found.robot, found.simulated):
+        other = f"the {found.robot} with {', '.join(found.simulated) or 'no effects'}"
+        raise ConfigError("grounding.diagnosis", f"is of another simulator: {other}; diagnose this one")
+    return replace(world, effects=together([settings["effects"], found.effects]))
+
+
+def innermost(grounding: Grounding) -> Grounding:
+    """Return what transforms the actions, whatever was done to the world before."""
+    while isinstance(grounding, DiagnosedEffects):
+        grounding = grounding.inner
+    return grounding

@@ -1,0 +1,43 @@
+"""The files of a diagnosis: its report, with the paths of what lies beside it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from gsl.grounding.effects import Diagnosis
+from gsl.storage.references import load
+
+REPORT, PAGE, WORLD, COMMANDS = "report.json", "report.html", "world/diagnosed.yaml", "next_experiment.json"
+
+
+def report_of(folder: Path) -> dict[str, Any]:
+    """Return the report of an artifact with paths that are good from where the command runs."""
+    report: dict[str, Any] = json.loads((folder / REPORT).read_text(encoding="utf-8"))
+    found = {key: (folder / report[key]).as_posix() for key in ("world_file", "report") if report.get(key)}
+    wanted = report.get("next_experiment")
+    if wanted and wanted.get("file"):
+        found |= {"next_experiment": wanted | {"file": (folder / wanted["file"]).as_posix()}}
+    return report | found
+
+
+def read_diagnosis(reference: str) -> Diagnosis:
+    """Return what an artifact of `gsl diagnose` says of its simulator.
+
+    Raises:
+        ArtifactError: There is none, or it is not as it was written.
+    """
+    artifact = load(reference, "diagnose")
+    report, sim = report_of(artifact.folder), artifact.config["sim"]
+    gap = report["shrinkage"]
+    return Diagnosis(
+        verdict=report["verdict"],
+        causes=tuple(one["effect"] for one in report["causes"]),
+        summary=report["summary"],
+        robot=sim["robot"],
+        simulated=sim["effects"],
+        effects=report["effects"],
+        before=gap["before"],
+        after=gap["after"],
+    )

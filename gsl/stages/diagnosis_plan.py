@@ -1,0 +1,83 @@
+"""A plan of a diagnosis: what an iteration plays on the real robot in the air, and how thoroughly it looks at it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from gsl.core.setting import component, setting
+from gsl.errors import ConfigError
+from gsl.grounding.effects import Diagnosis
+from gsl.policies.excitation import Excitation
+from gsl.stages.collect import Collect
+from gsl.stages.diagnose import Diagnose
+from gsl.stages.diagnosis_files import read_diagnosis
+from gsl.stages.link import built
+from gsl.storage import manifest
+from gsl.storage.artifact import Artifact
+from gsl.tasks.excite import Excite
+from gsl.tasks.task import REAL
+from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.world import World
+
+EXCITATION, DIAGNOSIS = "collect_excitation", "diagnose"
+
+
+@component
+class DiagnosisPlan:
+    """Excitation and thoroughness; an excitation knows no policy, so that one serves all iterations."""
+
+    excitation: Annotated[Excitation, setting("what is played in the air")]
+    most: Annotated[int, setting("effects at once, at most", ge=1, le=4)] = 3
+    duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
+    nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
+
+    def carried_out(self, real: World, sim: World, home: Path, *, workers: int, seed: int, console: Any) -> Artifact:
+        """Return the diagnosis of a simulator against an excitation of the real robot, both built below `home`.
+
+        Raises:
+            ConfigError: One of the two worlds is not of a kind that is diagnosed.
+        """
+        if not isinstance(real, BulletWorld) or not isinstance(sim, BulletWorld):
+            raise ConfigError("grounding", "only robots in Bullet worlds are diagnosed; take another grounding")
+        played = Collect(
+            world=replace(real, floating=False),
+            task=Excite(duration=self.excitation.duration),
+            policy=self.excitation,
+            role=REAL,
+            episodes=1,
+            workers=workers,
+            seed=seed,
+        )
+        log = built(played, home / EXCITATION, console)
+        found = Diagnose(
+            real=str(log.folder),
+            sim=sim,
+            most=self.most,
+            duels=self.duels,
+            nulls=self.nulls,
+            workers=workers,
+            seed=seed,
+        )
+        return built(found, home / DIAGNOSIS, console)
+
+
+class Flight(NamedTuple):
+    """What a diagnosis cost, and what came of it."""
+
+    episodes: int
+    seconds: float
+    diagnosis: Diagnosis
+
+    @property
+    def told(self) -> str:
+        """Verdict, what it says, and what is done with it."""
+        found = self.diagnosis
+        return f"Diagnosis: {found.verdict.replace('_', ' ')}. {found.summary} {found.told}"
+
+
+def flown(home: Path) -> Flight:
+    """Return what lies below `home` of a plan that was carried out."""
+    spent = Artifact(home / EXCITATION, manifest.read(home / EXCITATION)).metrics
+    return Flight(spent["real_episodes"], spent["seconds"], read_diagnosis(str(home / DIAGNOSIS)))

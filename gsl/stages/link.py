@@ -1,0 +1,29 @@
+"""A link of a chain: one stage that a whole iteration builds as an artifact of its own, or finds as it left it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from gsl.core.described import described
+from gsl.errors import ArtifactError
+from gsl.stages.headline import headline
+from gsl.storage import manifest
+from gsl.storage.artifact import Artifact, Stage, build
+
+COMMAND = "gsl iterate"
+
+
+def built(stage: Stage, out: Path, console: Any) -> Artifact:
+    """Build one link; what an earlier chain built otherwise in its place is replaced, what anyone else built is not."""
+    command = f"{COMMAND} ({stage.kind})"
+    made = build(stage, config=described(stage), out=out, command=command, force=_ours(out), console=console)
+    console.status(f"{out.as_posix()}: {headline(made)}{' (unchanged)' if made.unchanged else ''}")
+    return made
+
+
+def _ours(out: Path) -> bool:
+    try:
+        return manifest.read(out).command.startswith(COMMAND)
+    except ArtifactError:
+        return False
