@@ -200,9 +200,12 @@ def _choices() -> Iterator[tuple[str, ...]]:
     """Commands with choices as they are typed: in a command's n-th line every group takes its n-th option."""
     conf = configuration_folder()
     for command in sorted(conf.glob("*.yaml")):
-        groups = [entry for entry in yaml.safe_load(command.read_text())["defaults"] if isinstance(entry, dict)]
+        defaults = yaml.safe_load(command.read_text()).get("defaults", [])
+        groups = [
+            entry for entry in defaults if isinstance(entry, dict) and not next(iter(entry)).startswith("override")
+        ]
         found = [_typed(next(iter(entry)).lstrip("/"), conf, command.stem) for entry in groups]
-        for number in range(max(map(len, found))):
+        for number in range(max(map(len, found), default=0)):
             chosen = (typed[min(number, len(typed) - 1)] for typed in found)
             yield command.stem.replace("_", "-"), *chosen, *NEEDED.get(command.stem, ())
     yield from [("iterate", f"experiment={option.stem}") for option in sorted((conf / "experiment").glob("*.yaml"))]
@@ -211,6 +214,8 @@ def _choices() -> Iterator[tuple[str, ...]]:
 def _typed(group: str, conf: Path, command: str) -> list[str]:
     folder, _, role = group.partition("@")
     found = (option.stem for option in sorted((conf / folder).glob("*.yaml")))
+    if role.endswith("excitation"):  # the policy that a diagnosis plays
+        return [f"{role}=excitation"]
     return [f"{role or folder}={name}" for name in found if name != "excite" or command == "collect"]
 
 
