@@ -25,7 +25,7 @@ from gsl.diagnosis.screen import Ground, Lead, screened
 
 GAIN, SHIFT = 20.0, 0.02  # in units of cost, or as a share of a range: less is nothing
 STEPS = 400  # control periods that a one-step fit looks at
-EVALUATIONS = 6  # of the joint fit, each with all its derivatives
+EVALUATIONS = 10  # of the joint fit, each with all its derivatives
 PROBE = 0.02  # of its derivatives, as a share of a range
 FAR = 50.0  # floors beyond which it does not look at a residual
 
@@ -76,7 +76,12 @@ def everything_at_once(found: Experiment, arena: Arena) -> Answer:
         return np.tanh(arena.train.residual(switched_on(library, values), none).ravel() / FAR)
 
     around = 1.0 + ends + [[-1e-9], [1e-9]]
-    fitted = least_squares(residual, np.ones(len(library)), bounds=around, diff_step=PROBE, max_nfev=EVALUATIONS).x - 1
+    fitted = (
+        least_squares(
+            residual, np.ones(len(library)), bounds=around, diff_step=PROBE, x_scale="jac", max_nfev=EVALUATIONS
+        ).x
+        - 1
+    )
     order = np.argsort(-np.abs(fitted))
     if abs(fitted[order[0]]) < SHIFT:
         return _answer("no_gap", [])

@@ -20,7 +20,7 @@ from gsl.diagnosis.screen import Ground, Screening, best_of, screened
 
 WIDTH = 8  # leads that are fitted after a screening
 BEAM = 2  # sets of effects that are continued
-ROUNDS = 3
+ROUNDS = 4
 DOMINANT, LOCAL = 0.25, 2  # share of the excess that makes a joint a suspect, and how many there are at most
 
 
@@ -85,8 +85,14 @@ class Arena:
         """Return the hypothesis without an effect."""
         return self.fitted((), np.zeros(0), nuisance.none(self.train.joints))
 
-    def fitted(self, candidates: tuple[Candidate, ...], start: np.ndarray, at: np.ndarray) -> Hypothesis:
-        """Fit a set of effects from a start and score it."""
+    def fitted(
+        self,
+        candidates: tuple[Candidate, ...],
+        start: np.ndarray,
+        at: np.ndarray,
+        slopes: np.ndarray | None = None,
+    ) -> Hypothesis:
+        """Fit a set of effects from a start, maybe with sensitivities taken near it, and score it."""
         sizes = np.cumsum([len(candidate.free) for candidate in candidates])[:-1]
 
         def parted(values: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -96,7 +102,8 @@ class Arena:
             return switched_on(candidates, parted(values))
 
         bounds = np.hstack([candidate.bounds for candidate in candidates]) if candidates else np.zeros((2, 0))
-        fit = refined(self.train, build, start, bounds, at, rounds=ROUNDS)
+        ratios = np.concatenate([np.zeros(0, dtype=bool), *(candidate.ratios for candidate in candidates)])
+        fit = refined(self.train, build, start, bounds, at, slopes, ratios=ratios, rounds=ROUNDS)
         return self._scored(candidates, parted(fit.parameters), fit, build)
 
     def _scored(
@@ -126,7 +133,9 @@ class Arena:
         leads = [lead for lead in screening.leads if (lead.candidate.effect, lead.candidate.scope) not in used]
         start = np.concatenate([np.zeros(0), *base.parameters])
         found = [
-            self.fitted((*base.candidates, lead.candidate), np.r_[start, lead.parameters], lead.nuisances)
+            self.fitted(
+                (*base.candidates, lead.candidate), np.r_[start, lead.parameters], lead.nuisances, ground.slopes
+            )
             for lead in best_of(leads, width)
         ]
         return sorted(found, key=lambda one: one.cost), screening

@@ -55,6 +55,11 @@ class Candidate:
         return PROBE * (self.documented[1] - self.neutral)
 
     @property
+    def ratios(self) -> np.ndarray:
+        """Which parameters are factors, one of which does nothing, shape (p,)."""
+        return (self.neutral == 1.0) & (self.bounds[0] > 0.0)
+
+    @property
     def on_joints(self) -> bool:
         """Whether it has a scope of joints."""
         return "joints" in self.fixed

@@ -138,7 +138,13 @@ def _written(one: Hypothesis) -> str:
 
 def _calibration(joints: Sequence[str], nuisances: np.ndarray) -> list[dict[str, Any]]:
     return [
-        {"joint": joint, "kp": float(1.0 + kp), "kd": float(1.0 + kd), "coulomb": float(coulomb), "zero": float(zero)}
+        {
+            "joint": joint,
+            "kp": float(np.exp(kp)),
+            "kd": float(np.exp(kd)),
+            "coulomb": float(coulomb),
+            "zero": float(zero),
+        }
         for joint, (kp, kd, coulomb, zero, _) in zip(joints, nuisances.T, strict=True)
     ]
 

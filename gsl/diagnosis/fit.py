@@ -102,7 +102,15 @@ class Fit:
 
 
 def refined(
-    bench: Bench, build: Build, start: np.ndarray, bounds: np.ndarray, at: np.ndarray, *, rounds: int = 3
+    bench: Bench,
+    build: Build,
+    start: np.ndarray,
+    bounds: np.ndarray,
+    at: np.ndarray,
+    slopes: np.ndarray | None = None,
+    *,
+    ratios: np.ndarray | None = None,
+    rounds: int = 4,
 ) -> Fit:
     """Descend from a start.
 
@@ -112,17 +120,39 @@ def refined(
         start: Parameters, shape (p,).
         bounds: Lower and upper, shape (2, p).
         at: Nuisances to begin with, shape (5, n_joints).
+        slopes: From `sensitivities`, taken somewhere near.
+        ratios: Which parameters multiply, and are stepped in their logarithms as such nuisances are, shape (p,).
         rounds: Steps at most.
     """
+    multiplies = np.zeros(len(start), dtype=bool) if ratios is None else ratios
+    problem = _Problem(bench, build, bounds, multiplies)
     first = np.clip(start, *bounds)
     z = bench.residual(build(first), at)
     here = _Point(first, at, z, float(loss(z).sum()) + nuisance.cost(at))
-    here, matrix = _descended(bench, build, here, bounds, rounds)
+    here, matrix = _descended(problem, here, slopes, rounds)
     if len(first) and (here.cost > POOR * z.size or bench.comparison.shaking.any()):
-        there, other = _descended(bench, build, _searched(bench, build, here, bounds), bounds, rounds)
+        there, other = _descended(problem, _searched(bench, build, here, bounds), None, rounds)
         here, matrix = (there, other) if there.cost < here.cost else (here, matrix)
-    covariance = np.linalg.inv(matrix)[: len(first), : len(first)]
+    scale = problem.scale(here.theta)
+    covariance = np.linalg.inv(matrix)[: len(first), : len(first)] * np.outer(scale, scale)
     return Fit(here.theta, here.nuisances, here.cost, covariance)
+
+
+class _Problem(NamedTuple):
+    """What a descent works on: windows, effects, bounds of the parameters, and which of them multiply."""
+
+    bench: Bench
+    build: Build
+    bounds: np.ndarray
+    ratios: np.ndarray
+
+    def scale(self, theta: np.ndarray) -> np.ndarray:
+        """Return how much a parameter moves by a unit of its step, shape (p,)."""
+        return np.where(self.ratios, theta, 1.0)
+
+    def moved(self, theta: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Return parameters after a step, shape (p,)."""
+        return np.clip(np.where(self.ratios, theta * np.exp(np.clip(step, -2.0, 2.0)), theta + step), *self.bounds)
 
 
 class _Point(NamedTuple):
@@ -134,29 +164,33 @@ class _Point(NamedTuple):
     cost: float
 
 
-def _descended(bench: Bench, build: Build, here: _Point, bounds: np.ndarray, rounds: int) -> tuple[_Point, np.ndarray]:
-    """Take Levenberg-Marquardt steps as long as they pay; return the last point and normal matrix."""
-    matrix = np.eye(len(here.theta) + here.nuisances.size)
-    for _ in range(rounds):
-        slopes = sensitivities(bench, build(here.theta), here.nuisances, here.z)
-        own = _own_slopes(bench, build, here.theta, bounds, here.nuisances, here.z)
+def _descended(problem: _Problem, here: _Point, slopes: np.ndarray | None, rounds: int) -> tuple[_Point, np.ndarray]:
+    """Take Levenberg-Marquardt steps as long as they pay; return the last point and normal matrix.
+
+    Sensitivities to the nuisances that are given serve the first step only, those taken after it all others.
+    """
+    bench, build = problem.bench, problem.build
+    given, matrix = slopes is not None, np.eye(len(here.theta) + here.nuisances.size)
+    for count in range(rounds):
+        if slopes is None or not given or count == 1:
+            slopes = sensitivities(bench, build(here.theta), here.nuisances, here.z)
+        own = _own_slopes(bench, build, here.theta, problem.bounds, here.nuisances, here.z)
+        own = own * problem.scale(here.theta)[:, None, None, None]
         matrix, right = _normal(here.z, own, slopes, here.nuisances)
-        before, here = here, _stepped(bench, build, here, bounds, matrix, right)
-        if before.cost - here.cost < ENOUGH * before.cost:
+        before, here = here, _stepped(problem, here, matrix, right)
+        if before.cost - here.cost < ENOUGH * before.cost and (count or not given):
             break
     return here, matrix
 
 
-def _stepped(
-    bench: Bench, build: Build, here: _Point, bounds: np.ndarray, matrix: np.ndarray, right: np.ndarray
-) -> _Point:
+def _stepped(problem: _Problem, here: _Point, matrix: np.ndarray, right: np.ndarray) -> _Point:
     """Return the first of the damped steps that descends, else the point itself."""
     p = len(here.theta)
     for damping in DAMPINGS:
         step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
-        theta = np.clip(here.theta + step[:p], *bounds)
+        theta = problem.moved(here.theta, step[:p])
         nuisances = nuisance.bounded(here.nuisances + step[p:].reshape(here.nuisances.shape))
-        z = bench.residual(build(theta), nuisances)
+        z = problem.bench.residual(problem.build(theta), nuisances)
         cost = float(loss(z).sum()) + nuisance.cost(nuisances)
         if cost < here.cost:
             return _Point(theta, nuisances, z, cost)

@@ -13,11 +13,12 @@ import numpy as np
 from gsl.core.plant import Plant, Servo
 
 NAMES = ("kp", "kd", "coulomb", "zero", "inertia")
-# Relative, relative, [N·m], [rad], in units of `inertia_unit`: spread of one make of servo (estimate).
+# Logarithms of factors, [N·m], [rad], in units of `inertia_unit`: spread of one make of servo (estimate).
 SIZES = np.array([0.04, 0.07, 0.012, 0.004, 1.0])
 PROBES = np.array([0.05, 0.10, 0.02, 0.002, 0.5])  # of the finite differences
 KP, KD, COULOMB, ZERO, INERTIA = range(5)
 HALF_STEP = 1e-3  # of a simulator at 2 ms [s]
+FACTORS = (0.1, 10.0)  # of the gains, at most
 LEAST = 0.2  # share of the nominal inertia that is left
 SPREAD = 0.05  # of the rotors' inertia
 
@@ -36,6 +37,16 @@ def none(joints: int) -> np.ndarray:
     return np.zeros((len(NAMES), joints))
 
 
+def drawn(rng: np.random.Generator, joints: int) -> np.ndarray:
+    """Return nuisances as one make of servo has them, shape (5, n_joints).
+
+    A robot's inertia is never below the simulator's: its time has no step that damping could lag behind.
+    """
+    result = SIZES[:, None] * rng.standard_normal((len(NAMES), joints))
+    result[INERTIA] = np.abs(result[INERTIA])
+    return result
+
+
 def cost(nuisances: np.ndarray) -> float:
     """Return what nuisances, shape (5, n_joints), cost."""
     return float(((nuisances / SIZES[:, None]) ** 2).sum())
@@ -45,7 +56,7 @@ def bounded(nuisances: np.ndarray) -> np.ndarray:
     """Return the nearest nuisances that are possible, shape (5, n_joints)."""
     result = nuisances.copy()
     result[INERTIA] = np.clip(result[INERTIA], -5.0, 20.0)
-    result[KP], result[KD] = np.clip(result[KP], -0.8, 4.0), np.clip(result[KD], -0.9, 9.0)
+    result[: KD + 1] = np.clip(result[: KD + 1], *np.log(FACTORS))
     return result
 
 
@@ -54,13 +65,13 @@ def calibrated(plant: Plant, nuisances: np.ndarray) -> Plant:
 
     Args:
         plant: Its first motors are the logged joints.
-        nuisances: Shape (4, n_joints).
+        nuisances: Shape (5, n_joints).
     """
     wide = nuisances[:, plant.robot.drive]
     servo = plant.servo
     changed = plant.with_servo(
-        kp=servo.kp * (1.0 + wide[KP]),
-        kd=servo.kd * (1.0 + wide[KD]),
+        kp=servo.kp * np.exp(wide[KP]),
+        kd=servo.kd * np.exp(wide[KD]),
         coulomb=np.maximum(0.0, servo.coulomb + wide[COULOMB]),
         armature=np.maximum(LEAST * servo.armature, servo.armature + wide[INERTIA] * inertia_unit(servo)),
     )

@@ -74,7 +74,7 @@ def selected(arena: Arena, thresholds: Thresholds, *, most: int = 3) -> Selectio
             chosen, beam = best, [best]
             if not _lacking(chosen):
                 break
-        chosen = _pruned(arena, chosen, thresholds, tried)
+        chosen = _polished(arena, _pruned(arena, chosen, thresholds, tried), tried)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
 
 
@@ -119,3 +119,11 @@ def _without(arena: Arena, chosen: Hypothesis, k: int) -> Hypothesis:
     rest = [index for index in range(len(chosen.candidates)) if index != k]
     start = np.concatenate([chosen.parameters[index] for index in rest])
     return arena.fitted(tuple(chosen.candidates[index] for index in rest), start, chosen.fit.nuisances)
+
+
+def _polished(arena: Arena, chosen: Hypothesis, tried: list[Hypothesis]) -> Hypothesis:
+    """Fit what stands once more from where it is, with all derivatives taken anew at every step."""
+    again = arena.fitted(chosen.candidates, np.concatenate(chosen.parameters), chosen.fit.nuisances)
+    best = again if again.fit.cost < chosen.fit.cost else chosen
+    tried.append(best)
+    return best

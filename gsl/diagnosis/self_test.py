@@ -67,8 +67,9 @@ def simulated(found: Experiment, plant: Plant, step: float, rng: np.random.Gener
 def relogged(found: Experiment, arena: Arena, effects: Hypothesis, rng: np.random.Generator) -> Arena:
     """Return the arena with a simulated log in the real one's place, made with fresh nuisances."""
     simulator = arena.train.simulator
-    drawn = nuisance.bounded(nuisance.SIZES[:, None] * rng.standard_normal((len(nuisance.NAMES), len(found.joints))))
-    plant = nuisance.calibrated(applied(simulator.plant, built(effects.effects)), drawn)
+    plant = nuisance.calibrated(
+        applied(simulator.plant, built(effects.effects)), nuisance.drawn(rng, len(found.joints))
+    )
     made = simulated(found, plant, simulator.step, rng)
     length = found.pieces.real.shape[1]
     cut = pieces(made, found.robot, found.period, warm_up=found.pieces.warm_up, scored=length - found.pieces.warm_up)

@@ -34,7 +34,8 @@ def calibration(joints: Sequence[str], nuisances: np.ndarray, unit: np.ndarray) 
     rows = {joint: nuisances[:, k] for k, joint in enumerate(joints)}
     return {
         "servo_gain": [
-            {"kp": 1.0 + row[nuisance.KP], "kd": 1.0 + row[nuisance.KD], "joints": joint} for joint, row in rows.items()
+            {"kp": np.exp(row[nuisance.KP]), "kd": np.exp(row[nuisance.KD]), "joints": joint}
+            for joint, row in rows.items()
         ],
         "coulomb_friction": [
             {"torque": row[nuisance.COULOMB], "joints": joint}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -18,7 +19,9 @@ from gsl.diagnosis.diagnose import Options
 from gsl.stages.blind_files import (
     ANSWERS,
     BASELINES,
+    CASE,
     CASES,
+    LOG,
     REFERENCE,
     SEAL,
     SEALS,
@@ -31,6 +34,7 @@ from gsl.stages.logs import check_log, on_ground
 from gsl.stages.population import Workers, in_parallel
 from gsl.storage import documents
 from gsl.storage.hashing import file_hash
+from gsl.storage.trajectories import read
 from gsl.worlds.bullet import BulletWorld
 
 BEGUN = "data.json"
@@ -100,12 +104,18 @@ class BlindAnswer:
 
 
 def _leaders(cases: Sequence[Path]) -> dict[Path, Path]:
-    """Return for each case the first one with the same commands, simulator and manner of calibration."""
+    """Return for each case the first one with the same commands, simulator and manner of calibration.
+
+    One that has the whole library leads before one that has not.
+    """
+    asked = {case: document(case / CASE) for case in cases}
     first: dict[str, Path] = {}
     leaders = {}
-    for case in sorted(cases):
-        log, _, asked = read_case(case)
-        digest = hashlib.sha256(documents.text([asked["sim"], (case / REFERENCE).exists(), on_ground(log)]).encode())
+    for case in sorted(cases, key=lambda one: (bool(asked[one].get("without")), one)):
+        log = read(case / LOG)
+        digest = hashlib.sha256(
+            documents.text([asked[case]["sim"], (case / REFERENCE).exists(), on_ground(log)]).encode()
+        )
         for episode in log.episodes:
             digest.update(np.round(episode.action, 6).tobytes())
         leaders[case] = first.setdefault(digest.hexdigest(), case)
@@ -124,7 +134,7 @@ def _answer(frozen: bytes, task: _Task) -> None:
     """Answer one case; its own answer is written last, for it says that the case is done."""
     options, baselines = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
     question, without = _question(task.case)
-    asked = Options(tuple(without), options.most, options.duels, options.nulls, options.threads)
+    asked = replace(options, without=tuple(without))
     for name, told in (answered_by_baselines(question, asked, _quiet) if baselines else {}).items():
         (task.folder / BASELINES / name).mkdir(parents=True, exist_ok=True)
         documents.write_json(task.folder / BASELINES / name / f"{task.case.name}.json", told)

@@ -75,9 +75,7 @@ def in_parallel(function: Any, shared: Any, jobs: Sequence[Any], workers: int, p
             progress.advance()
         if len(done) == len(jobs):
             return [done[index] for index in range(len(jobs))]
-    raise GslError(
-        f"worker processes died {TRIES} times in one batch of jobs; try workers=1 or look at free memory"
-    )
+    raise GslError(f"worker processes died {TRIES} times in one batch of jobs; try workers=1 or look at free memory")
 
 
 def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: list[int], workers: int) -> Iterator[Any]:

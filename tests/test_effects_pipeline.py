@@ -1,0 +1,101 @@
+"""A diagnosis used: iterate and compare with diagnosed effects, its world file, its next experiment, on toy sizes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from commands import SMALL, Said, done
+
+from gsl.storage.policies import read_policies
+from gsl.storage.trajectories import read
+
+LATE = ("real=nao_ideal", "real.effects.command_latency.delay=0.02")
+LINE = ("iterate", *SMALL, *LATE, "name=air", "accept=true")
+FIRST = "runs/air/iteration_01"
+
+
+@pytest.fixture(scope="module")
+def air(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Said]:
+    """One iteration with diagnosed effects, against a robot whose commands arrive late."""
+    folder = tmp_path_factory.mktemp("air")
+    return folder, done(*LINE, "grounding=effects", folder=folder)
+
+
+def loaded(path: Path) -> Any:
+    return json.loads(path.read_text()) if path.suffix == ".json" else yaml.safe_load(path.read_text())
+
+
+def test_iterate_names_what_the_simulator_lacks_and_what_it_cost(air: tuple[Path, Said]) -> None:
+    folder, said = air
+    metrics = loaded(folder / "runs/air/iterate/metrics.json")
+    assert (metrics["diagnosis"]["verdict"], metrics["diagnosis"]["causes"]) == ("causes", ["command_latency"])
+    assert metrics["excitation"] == {"episodes": 5, "real_seconds": pytest.approx(7.5)}
+    measured = loaded(folder / FIRST / "evaluate/metrics.json")["real_episodes"]
+    assert (metrics["learned_from"], metrics["real_episodes"]) == (0, measured + 5)
+    table = (folder / "runs/air/iterate/table.md").read_text()
+    for told in ("Diagnosis: causes. ", "Switched on in the simulator: command_latency.", f"{measured} + 5 in the air"):
+        assert told in said.out and told in table
+    spent = f"5 motions in the air (8 s) to diagnose, 0 episodes to learn from, {measured} to measure"
+    assert f"real data: {spent}, {measured + 5} in all\n" in said.out
+
+
+def test_every_link_is_there_and_nothing_is_done_twice(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    links = {"collect_excitation", "diagnose", "optimize", "evaluate"}
+    assert {path.name for path in (folder / FIRST).iterdir()} >= links
+    assert [one["role"] for one in loaded(folder / FIRST / "optimize/manifest.json")["parents"]] == [
+        "grounding.diagnosis"
+    ]
+    assert "(unchanged)" in done(*LINE, "grounding=effects", folder=folder).out.splitlines()[-1]
+
+
+def test_a_transformation_inside_learns_from_the_diagnosed_simulator(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    said = done(*LINE, "grounding=effects_gat", "out=runs/air/with_gat", folder=folder)
+    assert any(line.startswith(f"{FIRST}/diagnose: ") and "(unchanged)" in line for line in said.lines)
+    assert "command_latency" in loaded(folder / FIRST / "collect_sim/config.yaml")["world"]["effects"]
+    assert loaded(folder / FIRST / "optimize/metrics.json")["effects"] == ["command_latency"]
+    assert 0.0 < loaded(folder / FIRST / "optimize/metrics.json")["alpha"] <= 1.0
+    assert (folder / "runs/air/with_gat/joint_trace.png").is_file()
+
+
+def test_the_world_file_and_the_grounding_are_one_simulator_and_the_terminal_says_how(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    told = done("show", "air/iteration_01/diagnose", folder=folder).out
+    chosen = ("--config-dir", f"{FIRST}/diagnose", "world=diagnosed")
+    assert f"gsl optimize {' '.join(chosen)} grounding=none" in told
+    line = ("optimize", *SMALL, "optimizer.generations=1")
+    done(*line, "name=file", *chosen, "grounding=none", folder=folder)
+    done(*line, "name=grounded", "grounding=effects", f"grounding.diagnosis={FIRST}/diagnose", folder=folder)
+    one, other = (read_policies(folder / f"runs/{name}/optimize/policies.json") for name in ("file", "grounded"))
+    assert one.records == other.records
+
+
+def test_the_next_experiment_can_be_played_and_has_a_repeat(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    report = loaded(folder / FIRST / "diagnose/report.json")["next_experiment"]
+    assert report["file"] == "next_experiment.json" and report["separates"] and report["why"]
+    file = f"{FIRST}/diagnose/next_experiment.json"
+    done("collect", "task=excite", "workers=1", "name=next", f"policy.file={file}", folder=folder)
+    batch = read(folder / "runs/next/collect_real/trajectories.parquet")
+    labels = [one["policy"] for one in batch.metadata["episodes"]]
+    assert labels == [f"{report['excitation']}_{variant}" for variant in ("a", "b", "a")]
+    assert file in done("show", "air/iteration_01/diagnose", folder=folder).out
+
+
+def test_compare_sets_effects_beside_the_others(tmp_path: Path) -> None:
+    left = ("ane_01", "ane_02", "gat", "gat_005")
+    chosen = [f"~methods.{name}" for name in left] + ["~worlds.nao_weak", "trials=1", "preset=toy"]
+    small = ("iterate.task.duration=1.6", "iterate.workers=1", "worlds.nao_worn.effects={command_latency:{delay:0.02}}")
+    done("compare", *chosen, *small, "name=c", folder=tmp_path)
+    trials = {one["method"]: one for one in loaded(tmp_path / "runs/c/compare/trials.json")}
+    assert list(trials) == ["none", "effects", "effects_gat"]
+    home = tmp_path / "runs/c/nao_worn"
+    for method, learned in {"effects": 0, "effects_gat": 6}.items():
+        measured = loaded(home / method / "trial_01/evaluate/metrics.json")["real_episodes"]
+        assert trials[method]["real_episodes"] == measured + 5 + learned
+    assert {path.name for path in (home / "diagnosis/trial_01").iterdir()} == {"collect_excitation", "diagnose"}
