@@ -69,7 +69,6 @@ def servo_gain(joint: str = "LKneePitch") -> dict[str, Any]:
         },
         "probability": 0.97,
         "gain": {"value": 0.81, "low": 0.7, "high": 0.9},
-        "documented": True,
         "meaning": "Factors on the proportional and the derivative gain.",
     }
 
@@ -84,13 +83,12 @@ def zero_offset() -> dict[str, Any]:
         "parameters": {"offset": {"value": 0.0175, "low": 0.0157, "high": 0.0192, "unit": "rad"}},
         "probability": 0.6,
         "gain": {"value": 0.9, "low": 0.8, "high": 0.95},
-        "documented": True,
         "meaning": "A joint that was calibrated wrongly, in the servo: it stands elsewhere than it was told.",
     }
 
 
 def latency() -> dict[str, Any]:
-    """A cause with one parameter, outside its documented range."""
+    """A cause with one parameter."""
     return {
         "effect": "command_latency",
         "joints": list(NAO),
@@ -99,7 +97,6 @@ def latency() -> dict[str, Any]:
         "parameters": {"delay": {"value": 0.0312, "low": 0.029, "high": 0.0335, "unit": "s"}},
         "probability": 0.999,
         "gain": {"value": 0.14, "low": 0.1, "high": 0.19},
-        "documented": False,
         "meaning": "The target arrives later.",
     }
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from gsl.diagnosis.attribute import Arena, Hypothesis, scopes_of
 from gsl.diagnosis.candidates import library
 from gsl.diagnosis.experiment import Experiment, experiment, fitting_step
 from gsl.diagnosis.on_ground import Walking, restart_error
+from gsl.diagnosis.refuted import refuted
 from gsl.diagnosis.replay import Effects, Simulator
 from gsl.diagnosis.select import Selection, Thresholds, selected
 from gsl.diagnosis.self_test import Trial, duels, null_gains
@@ -80,6 +81,7 @@ class Findings:
         trials: Duels of the surviving causes in simulated logs.
         baseline: From the reference, if there is one.
         shift: Between the clocks of commands and measurements, taken out first [s], if they are apart.
+        refuted: Effects that fitted but lost their claim to the name, with the reason.
     """
 
     experiment: Experiment
@@ -91,6 +93,7 @@ class Findings:
     trials: tuple[Trial, ...]
     baseline: Baseline | None
     shift: float = 0.0
+    refuted: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def answer(self) -> Hypothesis:
@@ -146,12 +149,26 @@ def diagnosed(
     chance = ON_FOOT if walking else 0.0
     thresholds = Thresholds(gain=max(GAIN, CHANCE * max(nulls, default=0.0)), share=chance)
     tick("trying the library on the log")
-    selection = selected(arena, thresholds, most=options.most)
+    selection, wrong = _upheld(found, arena, thresholds, options)
     survivors = _survivors(selection)
     tick("self-test: can the causes that are left be told apart")
     trials = tuple(duels(found, arena, survivors, options.duels, tick)) if options.duels and not walking else ()
     verdict = judged(selection, _expected(selection, trials) * (1.0 + found.noise.slack), _margins(trials, survivors))
-    return Findings(found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift)
+    return Findings(found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong)
+
+
+def _upheld(
+    found: Experiment, arena: Arena, thresholds: Thresholds, options: Options
+) -> tuple[Selection, dict[str, str]]:
+    """Search again without the effects that lose their claim to the name; return them with the reasons."""
+    wrong: dict[str, str] = {}
+    while True:
+        selection = selected(arena, thresholds, most=options.most)
+        reasons = refuted(selection.chosen, found, arena.train.simulator.plant)
+        if not reasons:
+            return selection, wrong
+        wrong |= reasons
+        arena = replace(arena, library=tuple(one for one in arena.library if one.effect not in wrong))
 
 
 def arena_of(found: Experiment, plant: Plant, step: float, options: Options, tick: Callable[[str], None]) -> Arena:

@@ -77,7 +77,6 @@ def _cause(found: Findings, one: Cause) -> dict[str, Any]:
         "parameters": _parameters(candidate, values, sd * _widening(found)),
         "probability": one.probability,
         "gain": {"value": one.value, "low": one.low, "high": one.high},
-        "documented": candidate.claims_its_name(values),
         "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
     }
 
@@ -167,9 +166,7 @@ def _caveats(found: Findings) -> list[str]:
         said.append(
             f"These joints are never commanded to move, so hardly anything can be said of them: {', '.join(still)}."
         )
-    for index, candidate in enumerate(found.selection.chosen.candidates):
-        if not candidate.claims_its_name(found.selection.chosen.parameters[index]):
-            said.append(f"{candidate.effect} fits with values outside its documented range: its name is doubtful.")
+    said += [f"{effect} would explain much, but {reason}." for effect, reason in found.refuted.items()]
     if 0.0 < found.verdict.explained < 0.9 and found.verdict.word in ("causes", "inseparable"):
         said.append(f"{1.0 - found.verdict.explained:.0%} of the excess remains: something else is at work as well.")
     return said

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +33,7 @@ class Record:
         base: Of a robot on the ground: place [m] and roll, pitch, yaw [rad] as in BASE, quaternion, velocity in world
             axes [m/s], angular velocity in base axes [rad/s], shape (T + 1, 16); None in the air.
         feet: Whether the left and the right foot carry load, shape (T + 1, 2), if it was logged.
+        sensors: Further columns of the log by name, each of shape (T + 1,).
     """
 
     name: str
@@ -41,6 +42,7 @@ class Record:
     velocity: np.ndarray
     base: np.ndarray | None = None
     feet: np.ndarray | None = None
+    sensors: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Control periods T."""
@@ -76,7 +78,9 @@ def _record(
     position = episode.position[: ticks + 1, order]
     base = _base(episode, period)[: ticks + 1] if walking else None
     feet = _columns(episode, "foot_force", ("left", "right"))[: ticks + 1] > LOADED if _has_feet(episode) else None
-    return Record(name, episode.action[:ticks][:, order][:, robot.drive], position, slope(position, period), base, feet)
+    sensors = {column: values[: ticks + 1] for column, values in episode.sensors.items()}
+    targets = episode.action[:ticks][:, order][:, robot.drive]
+    return Record(name, targets, position, slope(position, period), base, feet, sensors)
 
 
 def _has_feet(episode: Trajectory) -> bool:

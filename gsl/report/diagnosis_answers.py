@@ -18,7 +18,6 @@ from gsl.report.diagnosis_verdict import (
 from gsl.report.diagnosis_words import Document, entries, interval, name, part, value
 
 _MARKS = {"no_gap": "✓", "causes": "!", "inseparable": "?", "unknown": "?"}
-OUTSIDE = "outside its documented range: something of this form is there, but it may have another name"
 
 
 def answers(document: Document) -> Html:
@@ -74,14 +73,12 @@ def _nothing(document: Document) -> str:
 
 def _one(cause: Document) -> Html:
     rows = [_parameter(key, found or {}) for key, found in part(cause, "parameters").items()]
-    flag = f"⚠ {OUTSIDE}." if cause.get("documented") is False else None
     return element(
         "div",
         element("p", element("strong", cause_name(cause)), class_="cause"),
         element("p", str(cause["meaning"]), class_="note") if cause.get("meaning") else None,
         element("p", *(part for row in rows for part in row), class_="parameters") if rows else None,
         element("p", prose(sureness(cause))) if sureness(cause) else None,
-        element("p", flag, class_="flag") if flag else None,
     )
 
 

@@ -30,7 +30,6 @@ pre { margin: .2rem 0 .6rem; padding: .4rem .6rem; background: var(--paper); bor
   border-radius: 4px; white-space: pre-wrap; }
 pre code { display: block; padding-left: 1.2rem; text-indent: -1.2rem; }
 .note, .kicker, figcaption { color: var(--soft); font-size: .88rem; }
-.flag { color: var(--warn); }
 .verdict { border-left: 6px solid var(--hue, var(--faint)); padding: .2rem 0 .2rem .9rem; margin-bottom: 1rem; }
 .verdict .kicker { margin: 0; }
 .verdict .mark { color: var(--hue, var(--faint)); font-weight: 800; }

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from gsl.report.diagnosis_answers import OUTSIDE
 from gsl.report.diagnosis_html import Html, Part, bullets, element, section, table
-from gsl.report.diagnosis_verdict import cause_name, undocumented
 from gsl.report.diagnosis_words import NONE, Document, entries, finite, level, listed, name, part, said, short
 
 _ENGINES = {"chain": "chain model, robot in the air", "bullet": "Bullet, with the ground"}
@@ -15,13 +13,7 @@ _ENGINES = {"chain": "chain model, robot in the air", "bullet": "Bullet, with th
 
 def caveats(document: Document) -> Html | None:
     """Return what to be careful with."""
-    given = [str(caveat) for caveat in entries(document, "caveats")]
-    told: list[Part] = [
-        f"{cause_name(cause)} is {OUTSIDE}."
-        for cause in undocumented(document)
-        if not any(str(cause.get("effect")) in caveat for caveat in given)
-    ]
-    told += given
+    told: list[Part] = [str(caveat) for caveat in entries(document, "caveats")]
     unseen = entries(document, "invisible")
     if unseen:
         told.append(f"This log cannot show: {listed([name(effect) for effect in unseen], most=99)}.")

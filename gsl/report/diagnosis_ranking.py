@@ -33,21 +33,20 @@ SHOWN = 12
 def causes(document: Document) -> Html | None:
     """Return every fitted parameter of the causes as it stands in the corrected simulator."""
     rows = [row for cause in entries(document, "causes") for row in _parameters(cause)]
-    columns = ("cause", "parameter", "value", "95 % interval", "in the file", "documented range", "sure", "explains")
+    columns = ("cause", "parameter", "value", "95 % interval", "in the file", "sure", "explains")
     return section("The causes in numbers", table(columns, rows) if rows else None)
 
 
 def _parameters(cause: Document) -> list[tuple[Part, ...]]:
     """The rows of a cause; its name and what holds for all its parameters are told in the first."""
-    range_ = element("span", "outside ⚠", class_="flag") if cause.get("documented") is False else "inside"
-    whole = (range_, probability(cause.get("probability")), share(part(cause, "gain").get("value")))
+    whole = (probability(cause.get("probability")), share(part(cause, "gain").get("value")))
     rows: list[tuple[Part, ...]] = []
     for key in part(cause, "parameters"):
         found = part(part(cause, "parameters"), key)
         number = finite(found.get("value"))
         file = element("code", NONE if number is None else f"{number:.4g} {found.get('unit') or ''}".strip())
         fitted = (element("code", str(key)), shown(found), interval(found) or NONE, file)
-        rows.append((None, *fitted, None, None, None) if rows else (cause_name(cause), *fitted, *whole))
+        rows.append((None, *fitted, None, None) if rows else (cause_name(cause), *fitted, *whole))
     return rows
 
 

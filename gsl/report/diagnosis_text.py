@@ -14,7 +14,6 @@ from gsl.report.diagnosis_verdict import (
     nearest,
     places,
     shrinkage_sentence,
-    undocumented,
 )
 from gsl.report.diagnosis_words import (
     Document,
@@ -56,7 +55,6 @@ def _causes(document: Document) -> Told:
         return Told(headline(document), ("", ""), [*alike, *_shrinkage(document)], summary)
     columns = ("cause", "parameter", "value", "95 % interval", "probability", "explains")
     caption = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
-    caption += [f"{cause_name(cause)}: outside its documented range" for cause in undocumented(document)]
     more = [f"and {len(rows) - CAUSES} more, in the report"] if len(rows) > CAUSES else []
     told = "\n".join([*more, *filter(None, [summary]), *caption])
     return Told(headline(document), columns, rows[:CAUSES], told or None)

@@ -94,11 +94,6 @@ def sureness(cause: Document) -> str:
     return ", ".join(told)
 
 
-def undocumented(document: Document) -> list[Document]:
-    """Return the causes with a parameter outside its documented range."""
-    return [cause for cause in entries(document, "causes") if cause.get("documented") is False]
-
-
 class Place(NamedTuple):
     """A joint that stands out of the noise.
 

@@ -1,0 +1,80 @@
+"""Claims that a log's further channels, or an effect's documented range, refute."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from test_diagnosis import PERIOD, arm, found, log
+
+from gsl.core.plant import nominal
+from gsl.core.trajectory import Batch
+from gsl.diagnosis.attribute import Hypothesis
+from gsl.diagnosis.candidates import library
+from gsl.diagnosis.document import document
+from gsl.diagnosis.experiment import experiment
+from gsl.diagnosis.fit import Fit
+from gsl.diagnosis.nuisance import none
+from gsl.diagnosis.refuted import refuted
+
+
+def with_channels(batch: Batch, channels: Mapping[str, Any]) -> Batch:
+    """The log with further columns, each from an episode's ticks of positions [rad] and targets [rad]."""
+    episodes = []
+    for episode in batch.episodes:
+        target = np.vstack([episode.action, episode.action[-1:]])
+        columns = {name: np.asarray(make(target, episode.position), dtype=float) for name, make in channels.items()}
+        episodes.append(replace(episode, sensors=columns))
+    return replace(batch, episodes=tuple(episodes))
+
+
+def claim(effect: str, values: list[float], free: tuple[str, ...]) -> Hypothesis:
+    """A hypothesis with fitted values, its fit left out."""
+    candidate = next(one for one in library(arm()) if one.effect == effect and one.free == free)
+    fit = Fit(np.array(values), none(2), 0.0, np.eye(len(values)))
+    return Hypothesis((candidate,), (np.array(values),), fit, np.zeros(1), np.ones(1))
+
+
+def steady(voltage: float) -> Any:
+    return lambda target, position: np.full(len(position), voltage)
+
+
+def test_a_voltage_that_does_not_sag_refutes_a_sagging_supply() -> None:
+    said = claim("supply_sag", [1.0], ("resistance",))
+    for voltage, is_wrong in ((steady(21.6), True), (lambda t, q: 21.6 - 8.0 * np.abs(t - q).sum(axis=1), False)):
+        exp = experiment(with_channels(log({}), {"voltage": voltage}), arm())
+        assert ("supply_sag" in refuted(said, exp, nominal(arm()))) == is_wrong
+    assert not refuted(said, experiment(log({}), arm()), nominal(arm()))
+
+
+def test_a_motor_that_stays_cold_refutes_a_gain_that_fades_with_warmth() -> None:
+    said = claim("gain_fade", [0.01], ("rate",))
+    warm = lambda t, q: 30.0 + PERIOD * np.arange(len(q))  # noqa: E731
+    for temperature, is_wrong in ((steady(30.0), True), (warm, False)):
+        channels = {"temperature.shoulder": temperature, "temperature.elbow": temperature}
+        exp = experiment(with_channels(log({}), channels), arm())
+        assert ("gain_fade" in refuted(said, exp, nominal(arm()))) == is_wrong
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.5])
+def test_a_logged_torque_refutes_a_gain_that_it_does_not_have(factor: float) -> None:
+    servo = nominal(arm()).servo
+
+    def told(target: np.ndarray, position: np.ndarray, k: int) -> np.ndarray:
+        speed = np.gradient(position[:, k], PERIOD)
+        wanted = factor * servo.kp[k] * (target - position)[:, k] - servo.kd[k] * speed
+        return np.asarray(np.clip(wanted, -servo.limit[k], servo.limit[k]))
+
+    torque = {f"torque.{name}": lambda t, q, k=k: told(t, q, k) for k, name in enumerate(("shoulder", "elbow"))}
+    exp = experiment(with_channels(log({"servo_gain": {"kp": factor}}), torque), arm())
+    assert ("servo_gain" in refuted(claim("servo_gain", [0.5], ("kp",)), exp, nominal(arm()))) == (factor == 1.0)
+
+
+def test_a_value_beyond_the_documented_range_is_no_cause() -> None:
+    result = found({"command_latency": {"delay": 0.085}})
+    assert "command_latency" in result.refuted
+    assert "command_latency" not in result.selection.chosen.names
+    assert any("command_latency would explain much" in caveat for caveat in document(result)["caveats"])
