@@ -17,6 +17,7 @@ from scenarios import AIR, QUIET, REACH
 from test_bad_input import refused
 
 from gsl.core.described import described, rebuilt
+from gsl.core.seeds import derived_seed
 from gsl.core.statistics import bootstrap_interval, rank_correlation
 from gsl.effects.effect import names
 from gsl.errors import ConfigError
@@ -134,6 +135,21 @@ def test_an_iterate_stands_for_its_evaluations(arms: Path, tmp_path: Path, monke
     assert [one.name for one in real_returns("whole", AIR).policies] == ["pi0", "generation_01", "generation_02"]
 
 
+def test_a_policy_that_was_stopped_at_its_fall_is_told_apart(arms: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(arms)
+    whole = real_returns("arm", AIR)
+    fallen = whole.policies[1]._replace(values=np.array([0.3, 0.0]), falls=1, stopped=True)
+    found = policy_gap(
+        replace(whole, policies=(whole.policies[0], fallen, *whole.policies[2:])), AIR, replace(AIR, effects=WORN),
+        named=True, effort=Effort(1, 1, 1), console=QUIET,
+    )  # fmt: skip
+    assert found["rows"][1]["real"] == {"value": 0.15, "low": None, "high": None, "falls": 1, "episodes": 2}
+    assert found["never_stopped"]["policies"] == 3
+    assert found["never_stopped"]["gap"]["after"]["value"] < found["gap"]["after"]["value"]
+    assert found["caveats"][0].startswith("1 policy was stopped at the first fall in real")
+    assert "rank correlations" in found["caveats"][0]
+
+
 # --- the command
 
 
@@ -166,10 +182,11 @@ def test_the_diagnosis_tells_of_policies(arms: Path) -> None:
 
 def _played_as_written(found: Mapping[str, Any], world: Mapping[str, Any]) -> None:
     """The second simulator is the one in the written file, held in the air as the real one was."""
-    second = replace(rebuilt(world), floating=False, settle=0.1)
+    second = replace(rebuilt(world), floating=False, settle=0.1, start_noise=0.02)
     scenario = Scenario(second, TASK, REACH, "real", NoGrounding())
-    values = [one.value for one in episodes(scenario, [Job(lifting(4)[0], 1)], workers=1, progress=_Silent())]
-    assert found["rows"][0]["diagnosed"]["value"] == pytest.approx(np.mean(values), rel=0.05)
+    jobs = [Job(lifting(4)[0], derived_seed(1, "policy_gap", "lift_0", number)) for number in range(2)]
+    values = [one.value for one in episodes(scenario, jobs, workers=1, progress=_Silent())]
+    assert found["rows"][0]["diagnosed"]["value"] == pytest.approx(np.mean(values), rel=1e-12)
 
 
 class _Silent:

@@ -44,6 +44,7 @@ def policy_gap(
     """
     with console.progress(2 * effort.episodes * len(measured.policies), "policies in both simulators") as progress:
         sim, diagnosed = (_played(measured, measured.setup(one), effort, progress) for one in (before, after))
+    seed = derived_seed(effort.seed, "policy_gap")
     rows = [
         {
             "name": one.name,
@@ -61,9 +62,11 @@ def policy_gap(
         "episodes": effort.episodes,
         "simulator": "diagnosed" if named else "calibrated",
         "rows": rows,
-        **_agreement(rows, derived_seed(effort.seed, "policy_gap")),
+        **_agreement(rows, seed),
     }
-    return {**found, "caveats": _caveats(found, sum(one.stopped for one in measured.policies))}
+    whole = [row for row, one in zip(rows, measured.policies, strict=True) if not one.stopped]
+    rest = {"policies": len(whole), **_agreement(whole, seed)} if 0 < len(whole) < len(rows) else None
+    return {**found, "never_stopped": rest, "caveats": _caveats(found, len(rows) - len(whole), rest)}
 
 
 def _played(measured: RealReturns, world: BulletWorld, effort: Effort, progress: Any) -> list[list[Episode]]:
@@ -120,7 +123,7 @@ def _bounded(interval: Interval) -> dict[str, float | None]:
     return {name: one if np.isfinite(one) else None for name, one in zip(names, interval, strict=True)}
 
 
-def _caveats(found: Mapping[str, Any], stopped: int) -> list[str]:
+def _caveats(found: Mapping[str, Any], stopped: int, rest: Mapping[str, Any] | None) -> list[str]:
     said = []
     if found["policies"] < found["measured"]:
         said.append(f"{found['measured']} policies were measured; these {found['policies']} are spread over the list.")
@@ -132,5 +135,16 @@ def _caveats(found: Mapping[str, Any], stopped: int) -> list[str]:
         said.append("The verdict names no cause: the second simulator is the first one calibrated joint by joint.")
     if stopped:
         told = "1 policy was" if stopped == 1 else f"{stopped} policies were"
-        said.append(f"{told} stopped at the first fall in real: the real return has no interval there.")
+        without = f" {_without(found, rest)}" if rest else ""
+        said.append(
+            f"{told} stopped at the first fall in real: the real return is rough there, with no interval.{without}"
+        )
     return said
+
+
+def _without(found: Mapping[str, Any], rest: Mapping[str, Any]) -> str:
+    """Return the figures of the policies that did all their real episodes."""
+    gaps = [f"{found['shown'] * one['value']:.3g}" for one in rest["gap"].values()]
+    orders = [one and f"{one['value']:.2f}" for one in rest["correlation"].values()]
+    ranks = f", rank correlations {' and '.join(orders)}" if all(orders) else ""
+    return f"Without: {' and '.join(gaps)} {found['unit']} from real{ranks}."
