@@ -18,6 +18,7 @@ from gsl.report.diagnosis_bars import Bar, bar_chart
 from gsl.report.diagnosis_curves import Curve, line_chart, ticks
 from gsl.report.diagnosis_html import element, escaped, prose
 from gsl.report.diagnosis_next import steps
+from gsl.report.diagnosis_scatter import Pair, Span, scatter
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.diagnosis_verdict import cause_name, headline, where_sentence
 from gsl.report.diagnosis_words import between, interval, level, listed, probability, share, short, value
@@ -214,7 +215,7 @@ def test_whatever_is_missing_the_rest_is_told(absent: bool) -> None:
 
 def test_empty_lists_make_no_sections() -> None:
     found = {key: [] if isinstance(one, list) else one for key, one in made.document().items()}
-    found |= dict.fromkeys(("horizon", "shrinkage", "floor", "policies", "self_test", "next_experiment"))
+    found |= dict.fromkeys(("horizon", "shrinkage", "floor", "policy_gap", "self_test", "next_experiment"))
     page = Page(report_html(found | {"verdict": "no_gap"}))
     assert page.tags["section"] == 1  # how it was measured
 
@@ -304,10 +305,37 @@ def test_a_side_is_worse_only_where_it_is_more_than_noise_and_chance() -> None:
 
 
 def test_the_verdict_is_marked_among_the_explanations() -> None:
-    found = made.document()
+    found = made.document() | {"policy_gap": None}  # whose dots are other ones
     assert re.findall(r'<circle[^>]*class="fill (\w+)"', report_html(found)) == ["after"] + 5 * ["other"]
     found["ranking"] = found["ranking"][::-1]
     assert re.findall(r'<circle[^>]*class="fill (\w+)"', report_html(found)) == 5 * ["other"] + ["after"]
+
+
+def test_policies_are_told_in_the_unit_of_their_task() -> None:
+    found = words(report_html(made.document()))
+    assert (
+        "policy simulator [cm/s] 95 % interval diagnosed [cm/s] 95 % interval real [cm/s] 95 % interval falls" in found
+    )
+    assert "generation_05 31.0 30.0 to 32.0 21.0 19.0 to 23.0 16.0 0 of 5, 1 of 5, 1 of 5" in found
+    assert "3 policies: returns are 6.70 (2.00 to 15.0) cm/s from real in the simulator, 2.00 (0.400 to 5.00)" in found
+    assert (
+        "Rank correlation with real: −0.50 (−1.0 to 1.0) in the simulator, 1.0 (1.0 to 1.0) in the diagnosed" in found
+    )
+    assert "25 policies were measured" in found
+    none = made.document() | {"policy_gap": None}
+    assert "Policies" not in words(report_html(none))
+    assert [told for told in summary_lines(none) if "Rank" in str(told)] == []
+
+
+def test_dots_are_on_the_line_where_both_worlds_agree_and_whiskers_stay_inside() -> None:
+    spans = [Span(1.0, 0.9, 1.1), Span(2.0), Span(3.0, -50.0, 50.0)]
+    chart = scatter([Pair("p", "after", span, span) for span in spans], {"after": "told"}, x="real", y="sim")
+    assert chart is not None
+    places = [tuple(map(float, one)) for one in re.findall(r'cx="([\d.]+)%" cy="([\d.]+)%"', chart)]
+    assert len(places) == 3 and all(x + y == pytest.approx(100.0) for x, y in places)
+    ends = [float(one) for one in re.findall(r'class="line thin after" x1="([\d.]+)%"', chart)]
+    assert len(ends) == 4 and min(ends) == 0.0
+    assert scatter([], {}, x="real", y="sim") is None
 
 
 def test_text_is_escaped_once_and_markup_never() -> None:

@@ -1,10 +1,17 @@
-"""A component as plain data again: what a configuration file would say to build it."""
+"""A component as plain data, what a configuration file would say to build it; and the component again."""
 
 from __future__ import annotations
 
+import importlib
+import inspect
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
+
+from gsl.core.validation import make
+from gsl.errors import ConfigError
+
+_OURS = "gsl"
 
 
 def described(thing: Any) -> Any:
@@ -18,3 +25,39 @@ def described(thing: Any) -> Any:
     if isinstance(thing, list | tuple):
         return [described(value) for value in thing]
     return thing
+
+
+def rebuilt(told: Any, *, trust: bool = False, where: str = "") -> Any:
+    """Return what `described` told, read from a file, as components again.
+
+    Args:
+        told: Plain data; every mapping with a `_target_` is a component.
+        trust: Whether classes that are not gsl's may be imported.
+        where: Dotted path of the data, for errors.
+
+    Raises:
+        ConfigError: A setting is wrong, or names a class that is not there or may not be imported.
+    """
+    if isinstance(told, Mapping):
+        settings = {key: rebuilt(value, trust=trust, where=f"{where}.{key}".lstrip(".")) for key, value in told.items()}
+        if "_target_" not in settings:
+            return settings
+        return make(_class_of(settings.pop("_target_"), trust, where), settings, where=where)
+    if isinstance(told, list | tuple):
+        return [rebuilt(value, trust=trust, where=f"{where}.{index}") for index, value in enumerate(told)]
+    return told
+
+
+def _class_of(name: Any, trust: bool, where: str) -> Any:
+    place, _, attribute = str(name).rpartition(".")
+    setting = f"{where}._target_".lstrip(".")
+    if not trust and place.partition(".")[0] != _OURS:
+        problem = "is no class of gsl; trust=true if you know where this file comes from"
+        raise ConfigError(setting, problem, given=str(name))
+    try:
+        found = getattr(importlib.import_module(place), attribute)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise ConfigError(setting, f"cannot be loaded: {error}", given=str(name)) from error
+    if not inspect.isclass(found) or not (trust or found.__module__.partition(".")[0] == _OURS):
+        raise ConfigError(setting, "is no class of gsl", given=str(name))
+    return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -55,8 +55,34 @@ def quantile_interval(values: Sequence[float] | np.ndarray, *, confidence: float
 
 
 def rank_correlation(first: np.ndarray, second: np.ndarray) -> float:
-    """Return Spearman's rho of two samples of equal length."""
+    """Return Spearman's rho of two samples of equal length, NaN if one of them does not vary."""
+    if np.ptp(first) == 0.0 or np.ptp(second) == 0.0:
+        return np.nan
     return float(stats.spearmanr(first, second).statistic)
+
+
+def bootstrap_interval(
+    statistic: Callable[[np.ndarray], float],
+    count: int,
+    rng: np.random.Generator,
+    *,
+    confidence: float = 0.95,
+    samples: int = 1000,
+) -> Interval:
+    """Return a statistic of `count` things with its percentile interval over things drawn again (Efron 1979).
+
+    Args:
+        statistic: Of the things with these indices, shape (count,); draws for which it is NaN are left out.
+        count: How many things there are.
+        rng: Draws them.
+        confidence: Of the two-sided interval.
+        samples: How often they are drawn.
+    """
+    drawn = np.array([statistic(rng.integers(count, size=count)) for _ in range(samples)])
+    drawn = drawn[np.isfinite(drawn)]
+    tails = (1.0 - confidence) / 2
+    low, high = np.quantile(drawn, [tails, 1.0 - tails]) if len(drawn) else (-np.inf, np.inf)
+    return Interval(float(statistic(np.arange(count))), float(low), float(high))
 
 
 def _t_interval(mean: float, variance_of_mean: float, freedom: float, confidence: float) -> Interval:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from gsl.report.diagnosis_answers import answers
 from gsl.report.diagnosis_html import element
 from gsl.report.diagnosis_look import STYLE
-from gsl.report.diagnosis_method import calibration, caveats, method, noise_floor, policies, self_test
+from gsl.report.diagnosis_method import calibration, caveats, method, noise_floor, self_test
+from gsl.report.diagnosis_policies import policies
 from gsl.report.diagnosis_ranking import causes, ranking
 from gsl.report.diagnosis_replays import replays
 from gsl.report.diagnosis_shrinkage import parts, shrinkage

@@ -107,12 +107,13 @@ def _plot(frame: _Frame, lines: Sequence[Html], mark: float | None, title: str) 
     drawn = element(
         "svg", element("title", title), *parts, viewBox="0 0 1000 1000", preserveAspectRatio="none", role="img"
     )
-    marks = [_tick("y", f"top:{frame.place(frame.left, at)[1] / 10:.1f}%", at) for at in heights]
-    marks += [_tick("x", f"left:{frame.place(at, frame.low)[0] / 10:.1f}%", at) for at in across]
+    marks = [tick("y", f"top:{frame.place(frame.left, at)[1] / 10:.1f}%", at) for at in heights]
+    marks += [tick("x", f"left:{frame.place(at, frame.low)[0] / 10:.1f}%", at) for at in across]
     return element("div", drawn, *marks, class_="plot")
 
 
-def _tick(axis: str, style: str, at: float) -> Html:
+def tick(axis: str, style: str, at: float) -> Html:
+    """Return the number at a tick of the axis `x` or `y`."""
     return element("span", f"{at:.6g}".replace("-", "−"), class_=f"tick {axis}", style=style)
 
 

@@ -67,6 +67,7 @@ figure { margin: .4rem 0 1rem; }
 .axis.right { text-align: right; margin-top: 1.5rem; }
 .plot { position: relative; height: 15rem; margin: 0 .6rem 0 2.8rem; }
 .plot svg { position: absolute; width: 100%; height: 100%; overflow: visible; }
+.square { max-width: 24rem; } .plot.square { height: 20rem; } .line.thin { stroke-width: 1; opacity: .7; }
 .tick { position: absolute; font-size: .75rem; line-height: 1; color: var(--soft); white-space: nowrap; }
 .tick.y { right: 100%; transform: translate(-.4rem, -50%); } .tick.x { top: 100%; transform: translate(-50%, .4rem); }
 .line { fill: none; stroke: var(--stroke, var(--ink)); stroke-width: 2; vector-effect: non-scaling-stroke;

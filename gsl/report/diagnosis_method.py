@@ -59,22 +59,6 @@ def _scaled(value: object, factor: float, *, decimals: int) -> str:
     return NONE if number is None else f"{round(factor * number, decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
 
-def policies(document: Document) -> Html | None:
-    """Return what policies are worth in real, in simulation and with the effects."""
-    found = part(document, "policies")
-    rows = [
-        (said(one, "name"), *(short(one.get(key)) for key in ("real", "sim", "with_effects")))
-        for one in entries(found, "rows")
-    ]
-    before, after = (found.get(f"correlation_{when}") for when in ("before", "after"))
-    told = f"Rank correlation with the real robot: {short(before, 2)} before, {short(after, 2)} with the effects."
-    return section(
-        "Policies",
-        table(("policy", "real", "simulator", "with the effects"), rows) if rows else None,
-        element("p", told) if finite(before) is not None or finite(after) is not None else None,
-    )
-
-
 def self_test(document: Document) -> Html | None:
     """Return how the diagnosis did on simulated logs whose cause it was not told."""
     found = part(document, "self_test")

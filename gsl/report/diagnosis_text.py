@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from gsl.report.diagnosis_next import steps
+from gsl.report.diagnosis_policies import policy_lines
 from gsl.report.diagnosis_verdict import (
     alternatives,
     cause_name,
@@ -47,7 +48,7 @@ def summary_lines(document: Document) -> list[Told]:
 
 
 def _causes(document: Document) -> Told:
-    summary = str(document.get("summary") or "") or None
+    summary = "\n".join(filter(None, [str(document.get("summary") or ""), *policy_lines(document)])) or None
     rows = [*_found(document)]
     if not rows:
         alike = [("either", alternatives(group)) for group in entries(document, "inseparable")]

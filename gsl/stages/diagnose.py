@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -22,6 +23,8 @@ from gsl.report.diagnosis import report_html
 from gsl.stages.diagnosis_files import PAGE, REPORT, WORLD, report_of
 from gsl.stages.experiment_file import write_next_experiment
 from gsl.stages.logs import check_log, log_files, on_ground, read_logs
+from gsl.stages.policy_gap import Effort, policy_gap
+from gsl.stages.real_returns import RealReturns, measured_parents, real_returns
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
 
@@ -37,6 +40,10 @@ class Diagnose:
     reference: Annotated[str | None, setting("trajectories without the effect, to calibrate the simulator first")] = (
         None
     )
+    policies: Annotated[
+        str | None, setting("policies with real returns, of evaluate or iterate, to be simulated before and after")
+    ] = None
+    episodes: Annotated[int, setting("simulated episodes of each of these policies", ge=1)] = 5
     without: Annotated[tuple[str, ...], setting("effects that are left out of the library")] = ()
     clocks: Annotated[
         Literal["synchronised", "unsynchronised"],
@@ -46,6 +53,7 @@ class Diagnose:
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
     workers: Annotated[int, setting("threads that replay; -1 takes all cores")] = -1
+    trust: Annotated[bool, setting("let the policies' files name classes that are not gsl's")] = False
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def parents(self) -> Mapping[str, Path]:
@@ -55,12 +63,13 @@ class Diagnose:
         for role, reference in named.items():
             files = log_files(reference)
             found |= {role if len(files) == 1 else f"{role}.{k}": path for k, path in enumerate(files)}
-        return found
+        return found | (measured_parents(self.policies) if self.policies else {})
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write report.json, report.html, the diagnosed world and the next experiment."""
         begin = time.perf_counter()
         robot = lumped(self.sim.plant.robot)
+        measured = real_returns(self.policies, self.sim, trust=self.trust) if self.policies else None
         logs = {role: self._read(role) for role in ("real", "reference") if getattr(self, role)}
         found = diagnosed(
             logs["real"],
@@ -72,7 +81,8 @@ class Diagnose:
             reference=logs.get("reference"),
             walking=on_ground(logs["real"]),
         )
-        return self._written(found, logs["real"], folder, time.perf_counter() - begin)
+        gap = self._policy_gap(measured, found, console) if measured else None
+        return self._written(found, logs["real"], gap, folder, time.perf_counter() - begin)
 
     def document(self, folder: Path) -> dict[str, Any]:
         """Return what --json shows of an artifact: the report without its curves."""
@@ -85,18 +95,30 @@ class Diagnose:
         return batch
 
     def _options(self) -> Options:
+        return Options(self.without, self.most, self.duels, self.nulls, self._threads, self.clocks == "synchronised")
+
+    @property
+    def _threads(self) -> int:
         from joblib import cpu_count
 
-        threads = self.workers if self.workers > 0 else cpu_count()
-        return Options(self.without, self.most, self.duels, self.nulls, threads, self.clocks == "synchronised")
+        return self.workers if self.workers > 0 else int(cpu_count())
 
-    def _written(self, found: Findings, batch: Batch, folder: Path, seconds: float) -> Mapping[str, Any]:
+    def _policy_gap(self, measured: RealReturns, found: Findings, console: Any) -> Mapping[str, Any]:
+        effort = Effort(self.episodes, self._threads, self.seed)
+        after = replace(self.sim, effects=self._effects(found))
+        named = bool(found.answer.candidates)
+        return policy_gap(measured, self.sim, after, named=named, effort=effort, console=console)
+
+    def _written(
+        self, found: Findings, batch: Batch, gap: Mapping[str, Any] | None, folder: Path, seconds: float
+    ) -> Mapping[str, Any]:
         checked = found.verdict.word in ("causes", "inseparable") and not found.experiment.walking
         told = document(
             found,
             verified=in_bullet(found, iterations=self.sim.iterations) if checked else None,
             next_experiment=write_next_experiment(found, self.sim.robot, folder),
             effects=diagnosed_effects(found),
+            policy_gap=gap,
             world_file=WORLD,
             report=PAGE,
             data=self._data(found, batch),
@@ -133,9 +155,12 @@ class Diagnose:
             "engine": "bullet" if exp.walking else "chain",
         }
 
+    def _effects(self, found: Findings) -> dict[str, Any]:
+        """Return all effects of the diagnosed simulator, those that it had before included."""
+        return joined([described(self.sim)["effects"], diagnosed_effects(found)])
+
     def _world(self, found: Findings, summary: str) -> str:
-        config = described(self.sim)
-        config["effects"] = joined([config["effects"], diagnosed_effects(found)])
+        config = described(self.sim) | {"effects": self._effects(found)}
         text = yaml.safe_dump(documents.plain(config), sort_keys=False, allow_unicode=True)
         told = "with it switched on, and calibrated" if found.answer.candidates else "calibrated"
         return f"# {summary}\n# The simulator {told} joint by joint.\n{text}"

@@ -1,0 +1,104 @@
+"""The policy-level gap: what policies return in real, in the simulator as it was, and in the diagnosed one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from gsl.report.diagnosis_html import Html, bullets, element, prose, section, table
+from gsl.report.diagnosis_scatter import Pair, Span, scatter
+from gsl.report.diagnosis_words import NONE, Document, between, entries, finite, part, said, short
+
+_COLUMNS = {"sim": "simulator", "diagnosed": "", "real": "real"}  # the second is named by the document
+
+
+def policies(document: Document) -> Html | None:
+    """Return the table, the plot and what is to be said of them."""
+    found = part(document, "policy_gap")
+    rows, unit = entries(found, "rows"), said(found, "unit")
+    if not rows:
+        return None
+    told = _values(found)
+    titles = [f"{words or _second(found)} [{unit}]" for words in _COLUMNS.values()]
+    columns = ["policy", *(title for one in titles for title in (one, "95 % interval")), "falls"]
+    cells = [[said(row, "name"), *_cells(row, told), _falls(row)] for row in rows]
+    note = (
+        "Returns of the same policies in three worlds, counted as in real. Both simulators play the same seeds. A "
+        "simulator in which policies can be chosen has its dots on the thin line, or at least in the right order."
+    )
+    return section(
+        "Policies",
+        *(element("p", prose(line)) for line in policy_lines(document)),
+        table(columns, cells),
+        _plot(found, rows),
+        bullets([str(one) for one in entries(found, "caveats")]),
+        note=note,
+    )
+
+
+def policy_lines(document: Document) -> list[str]:
+    """Return gap and rank correlation before and after, a sentence each; nothing if no policies were given."""
+    found = part(document, "policy_gap")
+    gap, order, unit = part(found, "gap"), part(found, "correlation"), said(found, "unit")
+    if not gap:
+        return []
+    count, told, second = said(found, "policies"), _values(found), _second(found)
+    before, after = (_told(part(gap, when), told) for when in ("before", "after"))
+    many = "policy" if count == "1" else "policies"
+    lines = [f"{count} {many}: returns are {before} {unit} from real in the simulator, {after} in the {second} one."]
+    if any(part(order, when) for when in ("before", "after")):
+        before, after = (_told(part(order, when), lambda value: short(value, 2)) for when in ("before", "after"))
+        lines.append(f"Rank correlation with real: {before} in the simulator, {after} in the {second} one.")
+    return lines
+
+
+def _second(found: Document) -> str:
+    return str(found.get("simulator") or "diagnosed")
+
+
+def _values(found: Document) -> Callable[[Any], str]:
+    """Return how returns are told, in the unit of the task."""
+    factor = finite(found.get("shown")) or 1.0
+
+    def told(value: Any) -> str:
+        number = finite(value)
+        return NONE if number is None else short(factor * number)
+
+    return told
+
+
+def _told(bounds: Document, form: Callable[[Any], str]) -> str:
+    interval = between(bounds, form)
+    return form(bounds.get("value")) + (f" ({interval})" if interval else "")
+
+
+def _cells(row: Document, told: Callable[[Any], str]) -> list[str]:
+    sides = [part(row, key) for key in _COLUMNS]
+    return [cell for side in sides for cell in (told(side.get("value")), between(side, told))]
+
+
+def _falls(row: Document) -> str:
+    """Return the falls in each world, nothing where there was none in any."""
+    sides = [part(row, key) for key in _COLUMNS]
+    if not any(side.get("falls") for side in sides):
+        return ""
+    return ", ".join(f"{said(side, 'falls')} of {said(side, 'episodes')}" for side in sides)
+
+
+def _plot(found: Document, rows: list[Any]) -> Html | None:
+    factor, unit = finite(found.get("shown")) or 1.0, said(found, "unit")
+    legend = {"before": "simulator as it was", "after": f"{_second(found)} simulator"}
+    pairs = []
+    for key, kind in (("sim", "before"), ("diagnosed", "after")):
+        for row in rows:
+            across, up = (_span(part(row, side), factor) for side in ("real", key))
+            if across and up:
+                pairs.append(Pair(said(row, "name"), kind, across, up))
+    return scatter(pairs, legend, x=f"real [{unit}]", y=f"simulated [{unit}]")
+
+
+def _span(side: Document, factor: float) -> Span | None:
+    value, low, high = (finite(side.get(key)) for key in ("value", "low", "high"))
+    if value is None:
+        return None
+    return Span(factor * value, None if low is None else factor * low, None if high is None else factor * high)
