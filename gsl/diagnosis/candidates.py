@@ -134,8 +134,9 @@ def _of(name: str, links: Sequence[str], given: Mapping[str, Any], shares: Seque
     proportional = target.kind in ("body", "environment") and "joints" not in known
     strengths = [key for key, value in numbers.items() if _neutral(value) is not None]
     shapes = [key for key in numbers if key not in strengths]
-    pairs = [tuple(strengths)] if len(strengths) == 2 else []
-    subsets = [(key,) for key in strengths] + pairs if strengths else [()]
+    together = [tuple(strengths)] if len(strengths) > 1 else []
+    alone = [] if proportional and together else [(key,) for key in strengths]
+    subsets = alone + together if strengths else [()]
     rest = {key: _neutral(numbers[key]) for key in strengths}
     return [
         _candidate(

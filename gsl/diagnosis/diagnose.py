@@ -19,6 +19,7 @@ from gsl.diagnosis.refuted import refuted
 from gsl.diagnosis.replay import Effects, Simulator
 from gsl.diagnosis.select import Selection, Thresholds, selected
 from gsl.diagnosis.self_test import Trial, duels, null_gains
+from gsl.diagnosis.transient import Transient, transient
 from gsl.diagnosis.verdict import Verdict, judged
 from gsl.effects.effect import applied, built, effect_class, names
 
@@ -28,6 +29,7 @@ RIVALS = 3  # hypotheses that duel, at most
 ON_FOOT = 0.1  # share of the cost that chance gains on the ground, where no log can be simulated: measured on walks
 RESTARTS = 40  # windows that measure what a log does not show of a walk
 LATENCY, SHIFTS = "command_latency", (0.002, 0.02, 0.05)  # and where a fit of two clocks' shift starts [s]
+PUSH = "external_push"
 ON_GROUND = ("contact",)  # kinds of effects that a robot in the air cannot show
 
 
@@ -142,14 +144,18 @@ def diagnosed(
         shift = clock_shift(found, plant, step, options, tick)
         plant = applied(plant, built({LATENCY: {"delay": shift}}))
     arena = arena_of(found, plant, step, options, tick)
+    none = arena.calibration()
+    everything = found.bench(arena.train.simulator, "all")
+    if moment := transient(found, everything.residual({}, none.fit.nuisances)):
+        arena = arena_of(found, plant, step, options, tick, moment)
     nulls = tuple(known_nulls or ())
     if options.nulls and not nulls and not walking:
         tick("self-test: what chance gains on these commands")
-        nulls = tuple(null_gains(found, arena, arena.calibration(), options.nulls, tick))
+        nulls = tuple(null_gains(found, arena, none, options.nulls, tick))
     chance = ON_FOOT if walking else 0.0
     thresholds = Thresholds(gain=max(GAIN, CHANCE * max(nulls, default=0.0)), share=chance)
     tick("trying the library on the log")
-    selection, wrong = _upheld(found, arena, thresholds, options)
+    selection, wrong = _upheld(found, arena, none, thresholds, options)
     survivors = _survivors(selection)
     tick("self-test: can the causes that are left be told apart")
     trials = tuple(duels(found, arena, survivors, options.duels, tick)) if options.duels and not walking else ()
@@ -158,12 +164,12 @@ def diagnosed(
 
 
 def _upheld(
-    found: Experiment, arena: Arena, thresholds: Thresholds, options: Options
+    found: Experiment, arena: Arena, none: Hypothesis, thresholds: Thresholds, options: Options
 ) -> tuple[Selection, dict[str, str]]:
     """Search again without the effects that lose their claim to the name; return them with the reasons."""
     wrong: dict[str, str] = {}
     while True:
-        selection = selected(arena, thresholds, most=options.most)
+        selection = selected(arena, thresholds, none, most=options.most)
         reasons = refuted(selection.chosen, found, arena.train.simulator.plant)
         if not reasons:
             return selection, wrong
@@ -171,15 +177,23 @@ def _upheld(
         arena = replace(arena, library=tuple(one for one in arena.library if one.effect not in wrong))
 
 
-def arena_of(found: Experiment, plant: Plant, step: float, options: Options, tick: Callable[[str], None]) -> Arena:
-    """Return where hypotheses on a log compete."""
+def arena_of(
+    found: Experiment,
+    plant: Plant,
+    step: float,
+    options: Options,
+    tick: Callable[[str], None],
+    moment: Transient | None = None,
+) -> Arena:
+    """Return where hypotheses on a log compete, a push among them if something happens at one moment."""
     simulator = found.simulator(plant, step, options.threads)
     contact = () if found.walking else ON_GROUND
     hidden = [name for name in names() if getattr(effect_class(name), "kind", "") in contact]
     hidden += [] if options.clocks else [LATENCY]
     shaking = bool(found.comparison.shaking.any())
-    without = (*options.without, *hidden, "external_push")
-    candidates = library(found.robot, without, dense=shaking, floating=found.walking)
+    hidden += [] if moment else [PUSH]
+    known = {PUSH: moment._asdict()} if moment else {}
+    candidates = library(found.robot, (*options.without, *hidden), known, dense=shaking, floating=found.walking)
     scopes = scopes_of({} if found.walking else found.robot.groups, found.channels, apart=not found.walking)
     return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick)
 

@@ -51,15 +51,16 @@ class Selection:
         return gain(self.chosen, self.none)
 
 
-def selected(arena: Arena, thresholds: Thresholds, *, most: int = 3) -> Selection:
+def selected(arena: Arena, thresholds: Thresholds, none: Hypothesis | None = None, *, most: int = 3) -> Selection:
     """Search for the effects.
 
     Args:
         arena: Where they compete.
         thresholds: What counts.
+        none: Calibration alone, if it is fitted already.
         most: Effects at once.
     """
-    none = arena.calibration()
+    none = none or arena.calibration()
     singles, screening = arena.successors(none)
     tried, chosen = [none, *singles], none
     if singles and _stands(singles[0], none, max(thresholds.gain, thresholds.share * none.cost)):

@@ -1,0 +1,53 @@
+"""A deviation that comes at one time of every episode, whatever is commanded: somebody pushes, or a cable pulls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gsl.diagnosis.experiment import Experiment
+
+LEAST = 3  # records that have to show it at the same time
+HIGH = 4.0  # times the usual power
+LONGEST = 0.8  # [s]: a push and what rings after it
+RINGING = 0.04  # for which a stiff servo is still off afterwards [s]
+
+
+class Transient(NamedTuple):
+    """When something happens in every episode, from its start [s]."""
+
+    start: float
+    duration: float
+
+
+def transient(found: Experiment, z: np.ndarray) -> Transient | None:
+    """Return when residuals are high at one time of most records and not elsewhere, None if they are not.
+
+    Args:
+        found: The log.
+        z: Residuals of all windows with everything else fitted, in units of the floor, shape (W, scored, n_joints).
+    """
+    power = np.mean(np.minimum(z**2, 100.0), axis=2)
+    ticks = found.pieces.tick[:, None] + found.pieces.warm_up + 1 + np.arange(z.shape[1])
+    own = [np.median(power[found.pieces.record == record]) for record in found.pieces.record]
+    by_tick: dict[int, list[float]] = {}
+    for tick, value in zip(ticks.ravel(), (power / np.maximum(own, 1e-9)[:, None]).ravel(), strict=True):
+        by_tick.setdefault(int(tick), []).append(float(value))
+    high = [tick for tick, values in sorted(by_tick.items()) if len(values) >= LEAST and np.median(values) > HIGH]
+    run = _longest(high)
+    length = len(run) * found.period
+    if len(run) < 2 or length > LONGEST or len(run) < 0.5 * len(high):
+        return None
+    return Transient((run[0] - 1) * found.period, max(found.period, length - RINGING))
+
+
+def _longest(ticks: Sequence[int]) -> list[int]:
+    """Return the longest run of ticks, gaps of one allowed, which a deviation that swings through zero leaves."""
+    best: list[int] = []
+    run: list[int] = []
+    for tick in ticks:
+        run = [*run, tick] if run and tick - run[-1] <= 2 else [tick]
+        best = run if len(run) > len(best) else best
+    return best
