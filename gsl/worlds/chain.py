@@ -17,6 +17,7 @@ import numpy as np
 from gsl.core.body import Robot, lumped
 from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
+from gsl.core.sine import sine_cosine
 
 # Columns of the scratch array, one row a link: see `_place` and `_bias`.
 _TURN, _AXIS, _ARM, _SPIN, _FLOW, _TURNING, _RUSH, _MOMENT, _FORCE = 0, 9, 12, 15, 18, 21, 24, 27, 30
@@ -117,7 +118,8 @@ def accelerate(
 def _place(chain: Chain, i: int, angle: float, work: np.ndarray) -> None:
     """Fill in link i's rotation, origin and joint screw, and its own inertia about the base's origin."""
     row, above, axis = work[i], chain.parent[i], chain.axis[i]
-    c, s, t = np.cos(angle), np.sin(angle), 1.0 - np.cos(angle)
+    s, c = sine_cosine(angle)
+    t = 1.0 - c
     x, y, z = axis[0], axis[1], axis[2]
     local = (
         c + t * x * x, t * x * y - s * z, t * x * z + s * y,
