@@ -7,12 +7,13 @@ import pytest
 
 from gsl.core.body import Robot, lumped
 from gsl.core.dynamics import forward_kinematics, jacobian, mass_matrix
+from gsl.core.lanes import LANES
 from gsl.core.plant import Plant, Push, nominal
 from gsl.robots.nao import nao
-from gsl.worlds.chain import COLUMNS, accelerate, chain
+from gsl.worlds.chain import COLUMNS, Pushed, accelerate, chain, nothing
 from gsl.worlds.engine import Engine, Physics
 from gsl.worlds.held import Held, Windows
-from gsl.worlds.servo import COMMANDS
+from gsl.worlds.servo import COMMANDS, encoder_motion, first_state, servo_torque
 from gsl.worlds.start import resting
 
 PERIOD, STEP = 0.02, 0.002
@@ -80,7 +81,7 @@ def test_rotors_in_bullet_are_an_approximation_that_gets_better_with_the_step() 
     assert rms[0] < 5e-5 and rms[1] < 0.6 * rms[0] and rms[2] < 0.6 * rms[1]
 
 
-def accelerations(plant: Plant, motion: np.ndarray, torque: np.ndarray, pushed: np.ndarray) -> np.ndarray:
+def accelerations(plant: Plant, motion: np.ndarray, torque: np.ndarray, pushed: Pushed) -> np.ndarray:
     n, result = len(torque), torque.copy()
     accelerate(chain(plant, plant.servo.armature), motion, pushed, result, np.zeros((n, COLUMNS)), np.zeros((n, n)))
     return result
@@ -89,25 +90,27 @@ def accelerations(plant: Plant, motion: np.ndarray, torque: np.ndarray, pushed: 
 def test_torques_move_it_as_the_mass_matrix_says() -> None:
     rng, n, plant = np.random.default_rng(1), len(NAO.motors), nominal(NAO)
     motion = np.array([rng.uniform(-0.5, 0.5, n), rng.uniform(-2.0, 2.0, n)])
-    torque, nothing = rng.uniform(-1.0, 1.0, n), np.zeros((n, 3))
-    change = accelerations(plant, motion, torque, nothing) - accelerations(plant, motion, np.zeros(n), nothing)
+    torque, free = rng.uniform(-1.0, 1.0, n), nothing()
+    change = accelerations(plant, motion, torque, free) - accelerations(plant, motion, np.zeros(n), free)
     inertia = mass_matrix(NAO, dict(zip(NAO.motors, motion[0], strict=True)))[6:, 6:] + np.diag(plant.servo.armature)
     np.testing.assert_allclose(change, np.linalg.solve(inertia, torque), rtol=1e-9)
 
 
-def test_a_push_acts_by_its_jacobian() -> None:
-    rng, n, plant = np.random.default_rng(2), len(NAO.motors), nominal(NAO)
-    angles, force = rng.uniform(-0.5, 0.5, n), np.array([3.0, -2.0, 1.0])
-    motion, pushed = np.array([angles, np.zeros(n)]), np.zeros((n, 3))
-    pushed[NAO.motors.index("LKneePitch")] = force
-    named = dict(zip(NAO.motors, angles, strict=True))
-    link = NAO.joint("LKneePitch").child
-    linear = jacobian(NAO, forward_kinematics(NAO, named), link, NAO.links[link].com)[1][:, 6:]
-    change = accelerations(plant, motion, np.zeros(n), pushed) - accelerations(plant, motion, np.zeros(n), 0.0 * pushed)
-    by_torque = accelerations(plant, motion, linear.T @ force, 0.0 * pushed) - accelerations(
-        plant, motion, np.zeros(n), 0.0 * pushed
+def test_pushes_act_by_their_jacobians_and_add_up() -> None:
+    rng, n, plant, link = np.random.default_rng(2), len(NAO.motors), nominal(NAO), NAO.joint("LKneePitch").child
+    angles, points, forces = rng.uniform(-0.5, 0.5, n), rng.uniform(-0.1, 0.1, (2, 3)), rng.uniform(-3.0, 3.0, (2, 3))
+    motion, frames = (
+        np.array([angles, np.zeros(n)]),
+        forward_kinematics(NAO, dict(zip(NAO.motors, angles, strict=True))),
     )
-    np.testing.assert_allclose(change, by_torque, rtol=1e-9, atol=1e-12)
+    torque = sum(jacobian(NAO, frames, link, p)[1][:, 6:].T @ f for p, f in zip(points, forces, strict=True))
+    pushed = Pushed(np.repeat(NAO.motors.index("LKneePitch"), 2), points, forces)
+    np.testing.assert_allclose(
+        accelerations(plant, motion, np.zeros(n), pushed),
+        accelerations(plant, motion, torque, nothing()),
+        rtol=1e-9,
+        atol=1e-12,
+    )
 
 
 def test_a_push_ends() -> None:
@@ -121,11 +124,73 @@ def test_a_push_ends() -> None:
     assert size[:10].max() == 0.0 and size[10:20].max() > 1e-3 and size[-1] < 0.02 * size.max()
 
 
+def test_pushes_act_as_in_bullet() -> None:
+    """On one link twice, on one that is welded to another, on the base, and not in whole physics steps."""
+    robot = with_heavy_links(nao())
+    pushes = (
+        Push("LFoot", np.array([3.0, 1.0, -2.0]), 0.2013, 0.4),
+        Push("LFoot", np.array([0.0, -2.0, 1.0]), 0.3, 0.3507),
+        Push("LHand", np.array([1.0, 0.0, 2.0]), 0.1, 0.25),
+        Push(robot.base, np.array([9.0, 0.0, 0.0]), 0.1, 0.3),
+    )
+    plant, fine = replace(nominal(robot), pushes=pushes), 0.5 * STEP
+    targets = np.repeat(sweep(robot, 1), 40, axis=0)
+    pushed = Held.of(plant, fine, PERIOD).replay(window(targets))[0]
+    assert np.abs(pushed - Held.of(nominal(robot), fine, PERIOD).replay(window(targets))[0]).max() > 1e-3
+    assert np.abs(pushed - in_bullet(plant, targets, fine)).max() < 1e-5
+
+
 def test_windows_do_not_know_of_each_other() -> None:
     targets, held = sweep(NAO, 60), Held.of(nominal(NAO), STEP, PERIOD)
     one, other = window(targets[:30]), window(targets[30:])
     both = Windows(*(np.concatenate(pair) for pair in zip(one, other, strict=True)))
     np.testing.assert_array_equal(held.replay(both), np.concatenate([held.replay(one), held.replay(other)]))
+
+
+def test_what_diverges_is_not_a_number_and_disturbs_no_other_window() -> None:
+    n, calm = len(NAO.motors), window(sweep(NAO, 50))
+    held = Held.of(nominal(NAO), STEP, PERIOD)
+    wild = Windows(calm.commands, np.stack([calm.motion[:, 0], np.full((1, n), 900.0)], axis=1), calm.clock)
+    told = held.replay(Windows(*(np.concatenate(three) for three in zip(calm, wild, calm, strict=True))))
+    assert np.isnan(told[1]).any() and (np.diff(np.isnan(told[1]).astype(int), axis=0) >= 0).all()
+    np.testing.assert_array_equal(told[[0, 2]], np.repeat(held.replay(calm), 2, axis=0))
+
+
+@pytest.mark.parametrize("count", [1, 2 * LANES - 3])
+def test_lanes_have_the_bits_of_one_robot_alone(count: int) -> None:
+    """Against the same kernel with floats, with all that a servo can have."""
+    rng, n = np.random.default_rng(3), len(NAO.motors)
+    given = {
+        "smoothing": 0.01, "play": 0.01, "compliance": 0.01, "delay": 0.013, "sensor_delay": 0.005, "quantum": 0.001,
+        "coulomb": 0.05, "stribeck": 0.05, "load_friction": 0.05, "duty_loss": 0.1, "fade": 0.1, "deadband": 0.002,
+        "supply_resistance": 0.2, "viscous": 0.01, "lower_stop": -0.3, "upper_stop": 0.3, "motor_encoder": 1.0,
+    }  # fmt: skip
+    plant = nominal(NAO).with_servo(**{name: np.full(n, value) for name, value in given.items()})
+    many = [window(sweep(NAO, 20) + 0.1 * rng.standard_normal(n)) for _ in range(count)]
+    held = Held.of(plant, STEP, PERIOD)
+    told = held.replay(Windows(*(np.concatenate(parts) for parts in zip(*many, strict=True))))
+    np.testing.assert_array_equal(told, [alone(held, one) for one in many])
+
+
+def alone(held: Held, one: Windows) -> np.ndarray:
+    n, motion, told = len(held.bias), one.motion[0].copy(), []
+    state, encoders, torque = (
+        first_state(one.commands[0, one.length :], motion, STEP),
+        np.empty_like(motion),
+        np.empty(n),
+    )
+    work, matrix, substeps = np.zeros((n, COLUMNS)), np.zeros((n, n)), round(PERIOD / STEP)
+    for t in range(one.length):
+        state.commands[:] = one.commands[0, one.length - 1 - t :][:COMMANDS]
+        for k in range(substeps):
+            servo_torque(held.servo, state, motion, k * STEP, STEP, substeps * STEP, torque)
+            accelerate(held.tree, motion, nothing(), torque, work, matrix)
+            motion[1] += STEP * torque
+            motion[0] += STEP * motion[1]
+        encoder_motion(held.servo, state, motion, STEP, encoders)
+        told.append(encoders[0].copy())
+        state.clock[0] += substeps * STEP
+    return np.array(told)
 
 
 def test_what_diverges_is_not_a_number() -> None:

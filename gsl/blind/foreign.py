@@ -16,7 +16,7 @@ from gsl.blind import foreign_servo as servo
 from gsl.blind.extras import extra_rows, extra_torque
 from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
-from gsl.worlds.chain import COLUMNS, Chain, accelerate, chain
+from gsl.worlds.chain import COLUMNS, Chain, accelerate, chain, nothing
 
 STEP = 0.0005  # physics period [s]
 SETTLE = 0.5  # for which the first command is held before a motion begins [s]
@@ -141,7 +141,7 @@ def _play(
     motion: np.ndarray, period: float, said: np.ndarray,
 ) -> None:  # fmt: skip
     n = motion.shape[1]
-    torque, work, matrix, pushed = np.zeros(n), np.zeros((n, COLUMNS)), np.zeros((n, n)), np.zeros((n, 3))
+    torque, work, matrix, pushed = np.zeros(n), np.zeros((n, COLUMNS)), np.zeros((n, n)), nothing()
     state, ring, wanted = np.zeros((7, n)), np.zeros((servo.REMEMBERED, 2, n)), np.zeros(n)
     state[servo.ANGLE], state[servo.FILTERED] = motion[0], path[0]
     ring[:, 0] = motion[0]

@@ -11,7 +11,7 @@ from gsl.blind.extras import extra_rows, extra_torque
 from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
 from gsl.effects.effect import applied, built
-from gsl.worlds.chain import COLUMNS, Chain, accelerate
+from gsl.worlds.chain import COLUMNS, Chain, accelerate, nothing
 from gsl.worlds.encoder import first_history
 from gsl.worlds.held import Held
 from gsl.worlds.servo import COMMANDS, DRIVE, SMOOTHED, SPEED, ServoState, encoder_motion, servo_torque
@@ -57,12 +57,13 @@ def _play(
     motion: np.ndarray, step: float, substeps: int, settle: int, told: np.ndarray,
 ) -> None:  # fmt: skip
     periods, n = told.shape
-    torque, work, matrix, pushed = np.zeros(n), np.zeros((n, COLUMNS)), np.zeros((n, n)), np.zeros((n, 3))
-    memory, clock, encoders = np.zeros((8, n)), np.array([-settle * substeps * step, 0.0]), np.zeros((2, n))
+    torque, work, matrix, pushed = np.zeros(n), np.zeros((n, COLUMNS)), np.zeros((n, n)), nothing()
+    memory, encoders, steps = np.zeros((8, n)), np.zeros((2, n)), np.zeros(1, dtype=np.int64)
+    clock = np.array([-settle * substeps * step])
     memory[1], memory[2], memory[SPEED], memory[SMOOTHED] = motion[0], motion[1], motion[1], commands[periods]
     history = first_history(motion, step)
     for t in range(periods):
-        state = ServoState(commands[periods - 1 - t : periods - 1 - t + COMMANDS], memory, history, clock)
+        state = ServoState(commands[periods - 1 - t : periods - 1 - t + COMMANDS], memory, history, clock, steps)
         for k in range(substeps):
             servo_torque(servo, state, motion, k * step, step, substeps * step, torque)
             extra_torque(rows, extras, rest, motion, memory[DRIVE], step, torque)

@@ -6,6 +6,7 @@ M by the composite rigid body algorithm, bias by recursive Newton-Euler, both wi
 origin; the sparse factorisation of M + A costs only where the tree has branches (Featherstone 2008, chapters 5, 6, 8).
 One physics step is a semi-implicit Euler step, as Bullet's is: with equal servos both agree far below an encoder's step
 (tests/test_chain.py), and this one is many times faster.
+The same code moves one robot and robots side by side (`lanes`).
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import lumped
 from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
+from gsl.core.sine import sine_cosine
 
 # Columns of the scratch array, one row a link: see `_place` and `_bias`.
 _TURN, _AXIS, _ARM, _SPIN, _FLOW, _TURNING, _RUSH, _MOMENT, _FORCE = 0, 9, 12, 15, 18, 21, 24, 27, 30
@@ -49,6 +51,20 @@ class Chain(NamedTuple):
     gravity: np.ndarray
 
 
+class Pushed(NamedTuple):
+    """Forces from outside, k of them.
+
+    Attributes:
+        motor: That moves the link, shape (k,).
+        point: Where it acts, in that motor's link axes [m], shape (k, 3).
+        force: [N], shape (k, 3).
+    """
+
+    motor: np.ndarray
+    point: np.ndarray
+    force: np.ndarray
+
+
 def chain(plant: Plant, armature: np.ndarray) -> Chain:
     """Return the tree of a plant.
 
@@ -73,26 +89,22 @@ def chain(plant: Plant, armature: np.ndarray) -> Chain:
     )
 
 
-def motor_of(robot: Robot, link: str) -> int:
-    """Return the motor that moves a link, -1 for the base and what is welded to it."""
-    parents = {joint.child: joint for joint in robot.joints}
-    while link in parents:
-        if parents[link].fixed_at is None:
-            return robot.motors.index(parents[link].name)
-        link = parents[link].parent
-    return -1
+@compiled
+def nothing() -> Pushed:
+    """Return no force from outside."""
+    return Pushed(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
 
 
 @compiled
 def accelerate(
-    chain: Chain, motion: np.ndarray, pushed: np.ndarray, torque: np.ndarray, work: np.ndarray, matrix: np.ndarray
+    chain: Chain, motion: np.ndarray, pushed: Pushed, torque: np.ndarray, work: np.ndarray, matrix: np.ndarray
 ) -> None:
     """Turn joint torques [N·m] into joint accelerations [rad/s²], in place.
 
     Args:
         chain: The tree.
         motion: Positions [rad] and velocities [rad/s], shape (2, n).
-        pushed: Forces from outside on the links' centres of mass [N], shape (n, 3).
+        pushed: Forces from outside.
         torque: Shape (n,), overwritten.
         work: Scratch, shape (n, COLUMNS).
         matrix: Scratch, shape (n, n).
@@ -100,7 +112,8 @@ def accelerate(
     for i in chain.order:
         _place(chain, i, motion[0, i], work)
         _bias(chain, i, motion[1, i], work)
-        _push(pushed[i], work[i])
+    for k in range(len(pushed.motor)):
+        _push(pushed.point[k], pushed.force[k], work[pushed.motor[k]])
     for index in range(len(chain.order) - 1, -1, -1):
         i = chain.order[index]
         row, above = work[i], chain.parent[i]
@@ -117,8 +130,8 @@ def accelerate(
 def _place(chain: Chain, i: int, angle: float, work: np.ndarray) -> None:
     """Fill in link i's rotation, origin and joint screw, and its own inertia about the base's origin."""
     row, above, axis = work[i], chain.parent[i], chain.axis[i]
-    c, s, t = np.cos(angle), np.sin(angle), 1.0 - np.cos(angle)
-    x, y, z = axis[0], axis[1], axis[2]
+    s, c = sine_cosine(angle)
+    t, x, y, z = 1.0 - c, axis[0], axis[1], axis[2]
     local = (
         c + t * x * x, t * x * y - s * z, t * x * z + s * y,
         t * x * y + s * z, c + t * y * y, t * y * z - s * x,
@@ -194,12 +207,17 @@ def _bias(chain: Chain, i: int, speed: float, work: np.ndarray) -> None:
 
 
 @compiled
-def _push(force: np.ndarray, row: np.ndarray) -> None:
-    """Take what a push from outside gives off the force that link needs; its own inertia is still in the row."""
+def _push(point: np.ndarray, force: np.ndarray, row: np.ndarray) -> None:
+    """Take what a force from outside at a point of the link gives off the force that the link needs."""
+    place = (
+        row[_PLACE] + row[0] * point[0] + row[1] * point[1] + row[2] * point[2],
+        row[_PLACE + 1] + row[3] * point[0] + row[4] * point[1] + row[5] * point[2],
+        row[_PLACE + 2] + row[6] * point[0] + row[7] * point[1] + row[8] * point[2],
+    )
     for k in range(3):
         a, b = (k + 1) % 3, (k + 2) % 3
         row[_FORCE + k] -= force[k]
-        row[_MOMENT + k] -= (row[_FIRST + a] * force[b] - row[_FIRST + b] * force[a]) / row[_MASS]
+        row[_MOMENT + k] -= place[a] * force[b] - place[b] * force[a]
 
 
 @compiled

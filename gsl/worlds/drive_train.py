@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsl.core.compiled import compiled
+from gsl.core.lanes import where
 
 TOOTH_STIFFNESS = 300.0  # of the gear teeth in contact, if there is play [N·m/rad]: an estimate
 STIFFEST = 1e-3  # compliance below which a spring counts as rigid, for at 2 ms it would not be stable [rad/(N·m)]
@@ -23,8 +24,9 @@ def limited(u: float, v: float, bound: float, no_load: float) -> float:
         bound: Torque limit [N·m].
         no_load: Speed at which driving torque vanishes [rad/s].
     """
-    high = bound * min(1.0, max(0.0, 1.0 - v / no_load)) if v > 0.0 else bound
-    low = bound * min(1.0, max(0.0, 1.0 + v / no_load)) if v < 0.0 else bound
+    share = v / no_load
+    high = where(v > 0.0, bound * min(1.0, max(0.0, 1.0 - share)), bound)
+    low = where(v < 0.0, bound * min(1.0, max(0.0, 1.0 + share)), bound)
     return min(high, max(-low, u))
 
 
@@ -58,7 +60,7 @@ def through_gear(
         bent = gap - min(half, max(-half, gap))
         push = stiffness * bent + damping * (speed - v)
         if play > 0.0:
-            push = max(0.0, push) if bent > 0.0 else min(0.0, push) if bent < 0.0 else 0.0
+            push = where(bent > 0.0, max(0.0, push), where(bent < 0.0, min(0.0, push), 0.0))
         drive = limited(u, speed, bound, no_load)
         speed += h * (drive - push) / inertia
         angle += h * speed

@@ -10,16 +10,14 @@ REMEMBERED = 128  # physics steps: the longest sensor delay
 
 
 @compiled
-def seen(
-    delay: float, history: np.ndarray, count: int, current: np.ndarray, row: int, i: int, step: float
-) -> float:  # fmt: skip
+def seen(delay: float, history: np.ndarray, count: int, now: float, row: int, i: int, step: float) -> float:
     """Return what an encoder tells, linear between the physics steps and so continuous in its delay.
 
     Args:
         delay: Age of what it tells [s].
         history: Of the physics steps so far, a ring, shape (REMEMBERED, 2, n_motors).
         count: Steps so far; the newest is at (count - 1) % REMEMBERED.
-        current: Positions [rad] and velocities [rad/s] at the encoder now, shape (2, n_motors).
+        now: What the encoder measures at this moment.
         row: 0 for the position, 1 for the velocity.
         i: Motor.
         step: Physics period [s].
@@ -27,9 +25,9 @@ def seen(
     age = delay / step
     whole = int(age)
     share = age - whole
-    newer = current[row, i] if whole == 0 else history[(count - whole) % REMEMBERED, row, i]
+    newer = now if whole == 0 else history[(count - whole) % REMEMBERED, row, i]
     older = history[(count - whole - 1) % REMEMBERED, row, i]
-    return float((1.0 - share) * newer + share * older)
+    return (1.0 - share) * newer + share * older
 
 
 @compiled
@@ -41,7 +39,14 @@ def first_history(motion: np.ndarray, step: float) -> np.ndarray:
         step: Physics period [s].
     """
     history = np.empty((REMEMBERED, 2, motion.shape[1]))
-    for k in range(REMEMBERED):
-        history[k, 0] = motion[0] - (REMEMBERED - k) * step * motion[1]
-        history[k, 1] = motion[1]
+    fill_history(history, motion, step)
     return history
+
+
+@compiled
+def fill_history(history: np.ndarray, motion: np.ndarray, step: float) -> None:
+    """Write the same into a given array; floats or lanes."""
+    for k in range(REMEMBERED):
+        for i in range(motion.shape[1]):
+            history[k, 0, i] = motion[0, i] - (REMEMBERED - k) * step * motion[1, i]
+            history[k, 1, i] = motion[1, i]

@@ -1,4 +1,7 @@
-"""Replays of a robot held in the air: recorded commands from measured states, through servos and chain."""
+"""Replays of a robot held in the air: recorded commands from measured states, through servos and chain.
+
+The windows of a log do not know of each other: eight are replayed side by side (`lanes`) in the time of one.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,25 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gsl.core.body import Robot, carrier
 from gsl.core.compiled import compiled
-from gsl.core.plant import Plant
-from gsl.worlds.chain import COLUMNS, Chain, accelerate, chain, motor_of
-from gsl.worlds.encoder import first_history
-from gsl.worlds.servo import COMMANDS, ROTOR, SMOOTHED, SPEED, ServoState, encoder_motion, packed, servo_torque
+from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
+from gsl.core.plant import Plant, Push
+from gsl.worlds.chain import COLUMNS, Chain, Pushed, accelerate, chain
+from gsl.worlds.encoder import REMEMBERED, fill_history
+from gsl.worlds.pushes import acting
+from gsl.worlds.servo import (
+    COMMANDS,
+    ROTOR,
+    ROTOR_ANGLE,
+    ROTOR_SPEED,
+    SMOOTHED,
+    SPEED,
+    ServoState,
+    encoder_motion,
+    packed,
+    servo_torque,
+)
 
 RUNAWAY = 1e3  # speed at which a replay has no meaning any more [rad/s]
 
@@ -43,7 +60,7 @@ class Held:
     Attributes:
         servo: Parameters of the servos.
         tree: The chain of its links.
-        pushes: Rows of motor, start, end [s], force [N]; shape (k, 6).
+        pushes: Rows of motor, start, end [s], force [N], point of the motor's link [m]; shape (k, 9).
         bias: Of the logged positions [rad], shape (n_motors,).
         step: Physics period [s].
         period: Control period [s].
@@ -60,9 +77,9 @@ class Held:
     def of(cls, plant: Plant, step: float, period: float) -> Held:
         """Prepare a plant."""
         servo = packed(plant.servo, plant.robot.supply_voltage)
-        pushes = [(motor_of(plant.robot, p.link), p.start, p.end, *p.force) for p in plant.pushes]
+        pushes = [row for push in plant.pushes for row in _aimed(push, plant.robot)]
         tree = chain(plant, plant.servo.armature - servo[ROTOR])
-        return cls(servo, tree, np.array(pushes).reshape(-1, 6), plant.sensors.bias, step, period)
+        return cls(servo, tree, np.array(pushes).reshape(-1, 9), plant.sensors.bias, step, period)
 
     def replay(self, windows: Windows) -> np.ndarray:
         """Return what the encoders tell after each control period [rad], shape (W, T, n_motors); NaN if it diverges."""
@@ -71,38 +88,90 @@ class Held:
         return told + self.bias
 
 
+def _aimed(push: Push, robot: Robot) -> list[tuple[float, ...]]:
+    """Return the row of a push, none if it is at the base, which is held."""
+    link, point = carrier(robot, push.link, robot.links[push.link].com)
+    motors = [k for k, name in enumerate(robot.motors) if robot.joint(name).child == link]
+    return [(k, push.start, push.end, *push.force, *point) for k in motors]
+
+
 @compiled
 def _replay(
     servo: np.ndarray, tree: Chain, pushes: np.ndarray, windows: Windows, step: float, substeps: int, told: np.ndarray
 ) -> None:
-    periods, n = told.shape[1], told.shape[2]
-    torque, work, matrix, pushed = np.zeros(n), np.zeros((n, COLUMNS)), np.zeros((n, n)), np.zeros((n, 3))
-    encoders = np.zeros((2, n))
-    for w in range(told.shape[0]):
-        motion, commands = windows.motion[w].copy(), windows.commands[w]
-        memory, clock = np.zeros((8, n)), np.array([windows.clock[w], 0.0])
-        memory[1], memory[2], memory[SPEED], memory[SMOOTHED] = motion[0], motion[1], motion[1], commands[periods]
-        history = first_history(motion, step)
-        for t in range(periods):
-            state = ServoState(commands[periods - 1 - t : periods - 1 - t + COMMANDS], memory, history, clock)
-            for k in range(substeps):
-                servo_torque(servo, state, motion, k * step, step, substeps * step, torque)
-                _pushes(pushes, clock[0] + k * step, pushed)
-                accelerate(tree, motion, pushed, torque, work, matrix)
-                for i in range(n):
-                    motion[1, i] += step * torque[i]
-                    motion[0, i] += step * motion[1, i]
-            if not np.all(np.abs(motion[1]) < RUNAWAY):
-                break
-            encoder_motion(servo, state, motion, step, encoders)
-            told[w, t] = encoders[0]
-            clock[0] += substeps * step
+    for first in range(0, told.shape[0], LANES):
+        _side_by_side(servo, tree, pushes, windows, first, step, substeps, told)
 
 
 @compiled
-def _pushes(pushes: np.ndarray, time: float, pushed: np.ndarray) -> None:
-    for row in pushes:
-        motor = int(row[0])
-        if motor >= 0:
-            for k in range(3):
-                pushed[motor, k] = row[3 + k] if row[1] <= time < row[2] else 0.0
+def _side_by_side(
+    servo: np.ndarray, tree: Chain, pushes: np.ndarray, windows: Windows, first: int, step: float, substeps: int,
+    told: np.ndarray,
+) -> None:  # fmt: skip
+    """Replay as many windows as there are lanes, from the first one on."""
+    periods, n = told.shape[1], told.shape[2]
+    numbers, speaking = zeros_in_lanes(2, n), zeros_in_lanes(2, n)
+    motion, encoders = side_by_side(numbers), side_by_side(speaking)
+    asked, since = zeros_in_lanes(periods + COMMANDS - 1, n), zeros_in_lanes(1, 1)
+    _fill(windows, first, numbers, asked, since)
+    commands, clock, steps = side_by_side(asked), side_by_side(since)[0], np.zeros(1, dtype=np.int64)
+    memory = side_by_side(zeros_in_lanes(8, n))
+    history = side_by_side(zeros_in_lanes(REMEMBERED, 2 * n).reshape((REMEMBERED, 2, n, LANES)))
+    _settle(memory, history, motion, commands[periods], step)
+    pushed = Pushed(pushes[:, 0].astype(np.int64), pushes[:, 6:].copy(), side_by_side(zeros_in_lanes(len(pushes), 3)))
+    torque, work = side_by_side(zeros_in_lanes(1, n))[0], side_by_side(zeros_in_lanes(n, COLUMNS))
+    matrix = side_by_side(zeros_in_lanes(n, n))
+    for t in range(periods):
+        state = ServoState(commands[periods - 1 - t : periods - 1 - t + COMMANDS], memory, history, clock, steps)
+        for k in range(substeps):
+            servo_torque(servo, state, motion, k * step, step, substeps * step, torque)
+            _push(pushes, state.clock[0] + k * step, step, pushed.force)
+            accelerate(tree, motion, pushed, torque, work, matrix)
+            for i in range(n):
+                motion[1, i] += step * torque[i]
+                motion[0, i] += step * motion[1, i]
+        encoder_motion(servo, state, motion, step, encoders)
+        if not _note(numbers[1], speaking[0], told[first : first + LANES], t):
+            break
+        state.clock[0] += substeps * step
+
+
+@compiled
+def _fill(windows: Windows, first: int, motion: np.ndarray, commands: np.ndarray, clock: np.ndarray) -> None:
+    """Write windows into lanes; lanes that are left over get the last window once more."""
+    for lane in range(LANES):
+        w = min(first + lane, len(windows.clock) - 1)
+        clock[0, 0, lane] = windows.clock[w]
+        for i in range(motion.shape[1]):
+            for k in range(2):
+                motion[k, i, lane] = windows.motion[w, k, i]
+            for k in range(len(commands)):
+                commands[k, i, lane] = windows.commands[w, k, i]
+
+
+@compiled
+def _settle(memory: np.ndarray, history: np.ndarray, motion: np.ndarray, target: np.ndarray, step: float) -> None:
+    """Fill in the state of settled servos, as `servo.first_state` does."""
+    for i in range(motion.shape[1]):
+        memory[ROTOR_ANGLE, i], memory[ROTOR_SPEED, i], memory[SPEED, i] = motion[0, i], motion[1, i], motion[1, i]
+        memory[SMOOTHED, i] = target[i]
+    fill_history(history, motion, step)
+
+
+@compiled
+def _push(pushes: np.ndarray, time: float, step: float, force: np.ndarray) -> None:
+    """Fill in the forces of one physics step."""
+    for j in range(len(pushes)):
+        share = acting(pushes[j, 1], pushes[j, 2], time, step)
+        for k in range(3):
+            force[j, k] = share * pushes[j, 3 + k]
+
+
+@compiled
+def _note(speeds: np.ndarray, position: np.ndarray, told: np.ndarray, t: int) -> bool:
+    """Write down the positions of replays that have not run away, now or before, and tell whether there are any."""
+    some = False
+    for lane in range(len(told)):
+        if (t == 0 or not np.isnan(told[lane, t - 1, 0])) and np.all(np.abs(speeds[:, lane]) < RUNAWAY):
+            told[lane, t], some = position[:, lane], True
+    return some

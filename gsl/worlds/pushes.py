@@ -1,4 +1,4 @@
-"""Pushes from outside on links of a robot in Bullet."""
+"""Pushes from outside on links of a robot: when they act, and where in Bullet."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from gsl.core.body import Robot, carrier
+from gsl.core.compiled import compiled
+from gsl.core.lanes import where
 from gsl.core.plant import Plant, Push
 from gsl.robots.urdf import principal_axes
 
@@ -44,8 +46,14 @@ def overlap(push: Push, time: float, step: float) -> float:
         time: At the beginning of the step, since the episode began [s].
         step: Physics period [s].
     """
-    share = (min(push.end, time + step) - max(push.start, time)) / step
-    return share if share > ROUNDING else 0.0
+    return acting(push.start, push.end, time, step)
+
+
+@compiled
+def acting(start: float, end: float, time: float, step: float) -> float:
+    """Return the same given start and end of the push [s]; `time` may be lanes."""
+    share = (min(end, time + step) - max(start, time)) / step
+    return where(share > ROUNDING, share, 0.0)
 
 
 def apply_push(bullet: Any, client: int, body: int, links: Mapping[str, int], push: Aimed, share: float) -> None:

@@ -1,5 +1,7 @@
 """The joint servo, compiled: from targets and joint motion to the torque of every joint at one physics step.
 
+The same for one robot and for robots side by side (`lanes`): then what changes in time is lanes where it says float.
+
     target <- command(t - delay), smoothed, rounded
     e = dead(target + offset - q)                     q as the encoder tells it
     u = clip(kp (1 - fade t) e - kd dq/dt)            driving torque falls to zero at the no-load speed, braking not
@@ -19,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.compiled import compiled
+from gsl.core.lanes import where
 from gsl.core.plant import Servo
 from gsl.worlds.drive_train import ROTOR_SHARE, STIFFEST, limited, through_gear
 from gsl.worlds.encoder import REMEMBERED, first_history, seen
@@ -44,13 +47,15 @@ class ServoState(NamedTuple):
             [rad]; at the last physics step: output speed [rad/s], motor torque, torque through the gear, friction
             [N·m]; shape (8, n_motors).
         history: What the encoders measured at the last physics steps, see `encoder.seen`.
-        clock: Time of the newest command since the episode began [s] and number of physics steps so far, shape (2,).
+        clock: Time of the newest command since the episode began [s], shape (1,).
+        steps: Number of physics steps so far, shape (1,).
     """
 
     commands: np.ndarray
     memory: np.ndarray
     history: np.ndarray
     clock: np.ndarray
+    steps: np.ndarray
 
 
 def packed(servo: Servo, supply_voltage: float) -> np.ndarray:
@@ -85,7 +90,11 @@ def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: fl
     memory = np.zeros((8, motion.shape[1]))
     memory[ROTOR_ANGLE], memory[ROTOR_SPEED], memory[SMOOTHED], memory[SPEED] = *motion, commands[0], motion[1]
     return ServoState(
-        np.vstack([commands, older])[:COMMANDS].copy(), memory, first_history(motion, step), np.array([clock, 0.0])
+        np.vstack([commands, older])[:COMMANDS].copy(),
+        memory,
+        first_history(motion, step),
+        np.array([clock]),
+        np.zeros(1, dtype=np.int64),
     )
 
 
@@ -110,30 +119,25 @@ def servo_torque(
         period: Control period [s].
         torque: Result, shape (n_motors,).
     """
-    memory, count = state.memory, int(state.clock[1])
+    memory, count = state.memory, state.steps[0]
     current = 0.0
     for i in range(motion.shape[1]):
         current += abs(memory[DRIVE, i]) * parameters[PER_AMPERE, i]
     for i in range(motion.shape[1]):
         target = _delayed(state.commands, i, (elapsed - parameters[DELAY, i]) / period, step / period)
         target = _shaped(parameters, memory, i, target, step)
-        encoder = (
-            memory[ROTOR_ANGLE : ROTOR_SPEED + 1]
-            if parameters[MOTOR_ENCODER, i] * parameters[ROTOR, i] > 0.0
-            else motion
-        )
-        q, v = encoder[0, i], encoder[1, i]
+        q, v = _measured(parameters, memory, i, motion)
         if parameters[SENSOR_DELAY, i] > 0.0:
-            delay = parameters[SENSOR_DELAY, i]
-            q = seen(delay, state.history, count, encoder, 0, i, step)
-            v = seen(delay, state.history, count, encoder, 1, i, step)
-            state.history[count % REMEMBERED, :, i] = encoder[:, i]
+            delay, now = parameters[SENSOR_DELAY, i], (q, v)
+            q, v = seen(delay, state.history, count, q, 0, i, step), seen(delay, state.history, count, v, 1, i, step)
+            for row in range(2):
+                state.history[count % REMEMBERED, row, i] = now[row]
         fade = max(0.0, 1.0 - parameters[FADE, i] * max(0.0, state.clock[0] + elapsed))
         error = target + parameters[OFFSET, i] - q
         error -= min(parameters[DEADBAND, i], max(-parameters[DEADBAND, i], error))
         u = fade * parameters[KP, i] * error - parameters[KD, i] * v
         torque[i] = _output(parameters, memory, i, motion, u, max(1e-3, 1.0 - parameters[SAG, i] * current), step)
-    state.clock[1] += 1.0
+    state.steps[0] += 1
 
 
 @compiled
@@ -141,17 +145,20 @@ def encoder_motion(
     parameters: np.ndarray, state: ServoState, motion: np.ndarray, step: float, told: np.ndarray
 ) -> None:
     """Fill `told` with what the encoders tell between two physics steps, given the outputs', both (2, n_motors)."""
-    count = int(state.clock[1])
     for i in range(motion.shape[1]):
-        encoder = (
-            state.memory[ROTOR_ANGLE : ROTOR_SPEED + 1]
-            if parameters[MOTOR_ENCODER, i] * parameters[ROTOR, i] > 0.0
-            else motion
-        )
-        told[0, i], told[1, i] = encoder[0, i], encoder[1, i]
+        told[0, i], told[1, i] = _measured(parameters, state.memory, i, motion)
         if parameters[SENSOR_DELAY, i] > 0.0:
             for row in range(2):
-                told[row, i] = seen(parameters[SENSOR_DELAY, i], state.history, count, encoder, row, i, step)
+                now, delay = told[row, i], parameters[SENSOR_DELAY, i]
+                told[row, i] = seen(delay, state.history, state.steps[0], now, row, i, step)
+
+
+@compiled
+def _measured(parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndarray) -> tuple[float, float]:
+    """Return position [rad] and velocity [rad/s] at the encoder now."""
+    if parameters[MOTOR_ENCODER, i] * parameters[ROTOR, i] > 0.0:
+        return memory[ROTOR_ANGLE, i], memory[ROTOR_SPEED, i]
+    return motion[0, i], motion[1, i]
 
 
 @compiled
@@ -166,9 +173,9 @@ def _delayed(commands: np.ndarray, i: int, start: float, length: float) -> float
     """
     index = min(max(int(np.ceil(-start - 1e-9)), 0), COMMANDS - 1)
     if index == 0:
-        return float(commands[0, i])
+        return commands[0, i]
     newer = min(1.0, max(0.0, (start + length + index - 1) / length))
-    return float((1.0 - newer) * commands[index, i] + newer * commands[index - 1, i])
+    return (1.0 - newer) * commands[index, i] + newer * commands[index - 1, i]
 
 
 @compiled
@@ -178,7 +185,7 @@ def _shaped(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, s
         memory[SMOOTHED, i] += (1.0 - np.exp(-step / parameters[SMOOTHING, i])) * (target - memory[SMOOTHED, i])
         target = memory[SMOOTHED, i]
     quantum = parameters[QUANTUM, i]
-    return float(quantum * np.rint(target / quantum)) if quantum > 0.0 else float(target)
+    return quantum * np.rint(target / quantum) if quantum > 0.0 else target
 
 
 @compiled
@@ -206,21 +213,22 @@ def _output(
 
 @compiled
 def _dry(parameters: np.ndarray, memory: np.ndarray, i: int, v: float, through: float, step: float) -> float:
+    if parameters[COULOMB, i] == 0.0 and parameters[STRIBECK, i] == 0.0 and parameters[LOAD, i] == 0.0:
+        return 0.0
     size = parameters[COULOMB, i]
     if parameters[STRIBECK, i] > 0.0:
-        size += parameters[STRIBECK, i] * np.exp(-((v / parameters[STRIBECK_VELOCITY, i]) ** 2))
+        ratio = v / parameters[STRIBECK_VELOCITY, i]
+        size += parameters[STRIBECK, i] * np.exp(-(ratio * ratio))
     if parameters[LOAD, i] > 0.0:
         inertial = parameters[OUTPUT_ARMATURE, i] * (v - memory[SPEED, i]) / step
         external = inertial - memory[THROUGH, i] + memory[FRICTION, i]
         size += parameters[LOAD, i] * abs(through - external)
-    if size == 0.0:
-        return 0.0
-    bent = min(BRISTLE, max(-BRISTLE, memory[BENT, i] + v * step))
-    memory[BENT, i] = bent
-    return float(size * bent / BRISTLE)
+    bent, free = min(BRISTLE, max(-BRISTLE, memory[BENT, i] + v * step)), size == 0.0
+    memory[BENT, i] = where(free, memory[BENT, i], bent)
+    return where(free, 0.0, size * bent / BRISTLE)
 
 
 @compiled
 def _stop(beyond: float, v: float) -> float:
     """Return the torque of a stop that only pushes back [N·m], `beyond` it [rad] at speed v away from it."""
-    return -max(0.0, STOP_STIFFNESS * beyond + STOP_DAMPING * v) if beyond > 0.0 else 0.0
+    return where(beyond > 0.0, -max(0.0, STOP_STIFFNESS * beyond + STOP_DAMPING * v), 0.0)

@@ -1,0 +1,50 @@
+"""Lanes against numpy, lane by lane; sine and cosine against the C library's."""
+
+import numpy as np
+
+from gsl.core.compiled import compiled
+from gsl.core.lanes import LANES, side_by_side, where, zeros_in_lanes
+from gsl.core.sine import sine_cosine
+
+
+@compiled
+def _formulas(one: float, other: float, result: np.ndarray) -> None:
+    result[0] = one + 2.0 * other - one / other
+    result[1] = where(one > other, -one, min(1.0, other))
+    result[2] = where(one < 0.0, max(one, other), abs(one))
+    result[3] = np.rint(3.0 * one) + np.exp(other)
+    total = 0.0
+    for k in range(4):
+        total += k * result[k]
+    result[4] = total
+    result[4] -= one
+    result[4] *= where(one == other, 0.0, 2.0)
+    result[5], result[6] = sine_cosine(20.0 * one)
+
+
+@compiled
+def _in_lanes(numbers: np.ndarray, result: np.ndarray) -> None:
+    columns = side_by_side(numbers)
+    _formulas(columns[0], columns[1], side_by_side(result))
+
+
+def test_every_lane_has_the_bits_of_a_float() -> None:
+    numbers, result = np.random.default_rng(0).standard_normal((2, LANES)), np.zeros((7, LANES))
+    numbers[1, 0] = numbers[0, 0]
+    _in_lanes(numbers, result)
+    for lane in range(LANES):
+        single = np.zeros(7)
+        _formulas(numbers[0, lane], numbers[1, lane], single)
+        np.testing.assert_array_equal(result[:, lane], single)
+
+
+def test_eight_never_lie_across_two_cache_lines() -> None:
+    kept = [zeros_in_lanes(3, k) for k in range(1, 6)]
+    assert all(one.shape == (3, k + 1, LANES) and not one.any() for k, one in enumerate(kept))
+    assert all(one.ctypes.data % (8 * LANES) == 0 for one in kept)
+
+
+def test_sine_and_cosine_are_those_of_the_c_library() -> None:
+    angles = np.r_[np.linspace(-10.0, 10.0, 20001), np.linspace(-1e4, 1e4, 20001)]
+    told = np.array([sine_cosine(angle) for angle in angles])
+    np.testing.assert_allclose(told, np.column_stack([np.sin(angles), np.cos(angles)]), rtol=0.0, atol=3e-16)
