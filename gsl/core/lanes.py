@@ -2,8 +2,7 @@
 
 A compiled function that adds, multiplies, compares by `where` and so on knows no difference between a float and lanes:
 what it gets is what it computes with, so one source serves one robot and eight at once. The eight fill a register of
-AVX-512 or two of AVX2, and every lane has the bits that it would have alone. LLVM's own vectoriser is no substitute: it
-gives up on arrays that may overlap and unrolls loops as short as eight.
+AVX-512 or two of AVX2, and every lane has the bits that it would have alone.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ against smaller ones on windows that no fit has seen, nuisances refitted for eac
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from gsl.diagnosis.screen import Ground, Screening, best_of, screened
 WIDTH = 8  # leads that are fitted after a screening
 BEAM = 2  # sets of effects that are continued
 ROUNDS = 4
+FEW = 20  # training windows of which none is left out at a first glance
 DOMINANT, LOCAL = 0.25, 2  # share of the excess that makes a joint a suspect, and how many there are at most
 
 
@@ -34,6 +35,7 @@ class Hypothesis:
         fit: On the training windows.
         costs: Robust cost of the held-out residuals, shape (n_held_out_records,).
         counts: Residuals in each of these records, shape (n_held_out_records,).
+        levels: Held-out cost of one residual of each joint, shape (n_joints,).
     """
 
     candidates: tuple[Candidate, ...]
@@ -41,6 +43,7 @@ class Hypothesis:
     fit: Fit
     costs: np.ndarray
     counts: np.ndarray
+    levels: np.ndarray
 
     @property
     def effects(self) -> Effects:
@@ -81,18 +84,20 @@ class Arena:
     scopes: Mapping[str, np.ndarray]
     tick: Callable[[str], None]
 
+    @property
+    def glance(self) -> Bench:
+        """Every second training window: enough to see which candidates are worth a fit."""
+        few = self.train.pieces.chosen(np.arange(0, len(self.train.pieces), 2 if len(self.train.pieces) > FEW else 1))
+        return replace(self.train, pieces=few)
+
     def calibration(self) -> Hypothesis:
         """Return the hypothesis without an effect."""
-        return self.fitted((), np.zeros(0), nuisance.none(self.train.joints))
+        return self.fitted((), np.zeros(0), nuisance.none(self.train.joints), every=1)
 
     def fitted(
-        self,
-        candidates: tuple[Candidate, ...],
-        start: np.ndarray,
-        at: np.ndarray,
-        slopes: np.ndarray | None = None,
+        self, candidates: tuple[Candidate, ...], start: np.ndarray, at: np.ndarray, *, every: int = 2
     ) -> Hypothesis:
-        """Fit a set of effects from a start, maybe with sensitivities taken near it, and score it."""
+        """Fit a set of effects from a start and score it; `every` as in `refined`."""
         sizes = np.cumsum([len(candidate.free) for candidate in candidates])[:-1]
 
         def parted(values: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -103,24 +108,25 @@ class Arena:
 
         bounds = np.hstack([candidate.bounds for candidate in candidates]) if candidates else np.zeros((2, 0))
         ratios = np.concatenate([np.zeros(0, dtype=bool), *(candidate.ratios for candidate in candidates)])
-        fit = refined(self.train, build, start, bounds, at, slopes, ratios=ratios, rounds=ROUNDS)
+        fit = refined(self.train, build, start, bounds, at, ratios=ratios, every=every, rounds=ROUNDS)
         return self._scored(candidates, parted(fit.parameters), fit, build)
 
     def _scored(
         self, candidates: tuple[Candidate, ...], parameters: tuple[np.ndarray, ...], fit: Fit, build: Build
     ) -> Hypothesis:
         z = self.held_out.residual(build(fit.parameters), fit.nuisances)
-        size, record = self.held_out.comparison.used(z.shape[1]).sum(), self.held_out.pieces.record
-        names = np.unique(record)
-        costs = np.array([loss(z[record == name]).sum() for name in names])
+        used, record = self.held_out.comparison.used(z.shape[1]), self.held_out.pieces.record
+        names, cost = np.unique(record), loss(z).sum(axis=1)
+        costs = np.array([cost[record == name].sum() for name in names])
+        counts = np.array([used.sum() * (record == name).sum() for name in names])
         self.tick("")
-        return Hypothesis(candidates, parameters, fit, costs, np.array([size * (record == k).sum() for k in names]))
+        return Hypothesis(candidates, parameters, fit, costs, counts, cost.mean(axis=0) / used)
 
     def ground(self, base: Hypothesis) -> Ground:
         """Return where a screening on top of a hypothesis starts: without its nuisances, which hide what is missing."""
-        at, effects = nuisance.none(self.train.joints), base.effects
-        z = self.train.residual(effects, at)
-        slopes = sensitivities(self.train, effects, at, z)
+        at, effects, bench = nuisance.none(self.train.joints), base.effects, self.glance
+        z = bench.residual(effects, at)
+        slopes = sensitivities(bench, effects, at, z)
         best, costs = projected(z, slopes, at)
         return Ground(effects, at, z, slopes, costs, best)
 
@@ -129,20 +135,18 @@ class Arena:
         ground = self.ground(base)
         used = {(candidate.effect, candidate.scope) for candidate in base.candidates}
         local = [one.on(joint) for joint in self._dominant(ground) for one in self.library if one.on_joints]
-        screening = screened(self.train, ground, (*self.library, *local), self.scopes, self.tick)
+        screening = screened(self.glance, ground, (*self.library, *local), self.scopes, self.tick)
         leads = [lead for lead in screening.leads if (lead.candidate.effect, lead.candidate.scope) not in used]
         start = np.concatenate([np.zeros(0), *base.parameters])
         found = [
-            self.fitted(
-                (*base.candidates, lead.candidate), np.r_[start, lead.parameters], lead.nuisances, ground.slopes
-            )
+            self.fitted((*base.candidates, lead.candidate), np.r_[start, lead.parameters], lead.nuisances)
             for lead in best_of(leads, width)
         ]
         return sorted(found, key=lambda one: one.cost), screening
 
     def _dominant(self, ground: Ground) -> list[str]:
         """Return the joints in which most of what calibration leaves lies: there every effect is tried alone."""
-        used = self.train.comparison.used(ground.residual.shape[1]) * len(ground.residual)
+        used = self.glance.comparison.used(ground.residual.shape[1]) * len(ground.residual)
         excess = np.maximum(0.0, ground.costs - used)
         order = np.argsort(excess)[::-1][:LOCAL]
         joints = [name for name, mask in self.scopes.items() if mask.sum() == 1]

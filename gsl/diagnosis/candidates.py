@@ -13,7 +13,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, carrier, lumped
 from gsl.core.setting import REQUIRED, Setting, settings_of
 from gsl.diagnosis.replay import Effects
 from gsl.effects.effect import effect_class, names
@@ -73,6 +73,10 @@ class Candidate:
         """Return the same on other joints."""
         return replace(self, fixed={**self.fixed, "joints": joints})
 
+    def beginning_at(self, value: float | None) -> Candidate:
+        """Return the same with one more value of its only parameter in the grid."""
+        return self if value is None else replace(self, grid=np.vstack([self.grid, [[value]]]))
+
     def entry(self, parameters: np.ndarray) -> dict[str, Any]:
         """Return the parameters of a world's `effects:` entry."""
         return {**self.fixed, **dict(zip(self.free, parameters.tolist(), strict=True))}
@@ -95,6 +99,7 @@ def library(
     robot: Robot,
     without: Sequence[str] = (),
     known: Mapping[str, Mapping[str, Any]] | None = None,
+    starts: Mapping[str, float] | None = None,
     *,
     dense: bool = False,
     floating: bool = False,
@@ -102,24 +107,29 @@ def library(
     """Return all candidates, those on joints with the scope `all`.
 
     Args:
-        robot: Whose links can be chosen.
+        robot: Whose links can be chosen; those that are welded to another one can be pushed only.
         without: Effects that are left out.
         known: Values of parameters that a look at the log has found already, by effect.
+        starts: And where a fit of effects of one parameter begins as well.
         floating: Whether the base is loaded, and no limb: their masses are found in the air.
         dense: Whether the grids of the strengths are fine.
     """
     shares = DENSE if dense else ONE_SIDED
     moving = [robot.base] if floating else [joint.child for joint in lumped(robot).joints]
+    pushed = [link for link in robot.links if floating or carrier(robot, link, np.zeros(3))[0] != robot.base]
     return tuple(
-        made
+        made.beginning_at((starts or {}).get(name))
         for name in names()
         if name not in without
-        for made in _of(name, moving, (known or {}).get(name, {}), shares)
+        for made in _of(name, (moving, pushed), (known or {}).get(name, {}), shares)
     )
 
 
-def _of(name: str, links: Sequence[str], given: Mapping[str, Any], shares: Sequence[float]) -> list[Candidate]:
+def _of(
+    name: str, places: tuple[Sequence[str], Sequence[str]], given: Mapping[str, Any], shares: Sequence[float]
+) -> list[Candidate]:
     target: Any = effect_class(name)
+    links = places[target.kind != "body"]
     known, hints = settings_of(target), get_type_hints(target)
     choices: list[list[tuple[str, Any]]] = []
     if "joints" in known:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +20,8 @@ from gsl.diagnosis.refuted import refuted
 from gsl.diagnosis.replay import Effects, Simulator
 from gsl.diagnosis.select import Selection, Thresholds, selected
 from gsl.diagnosis.self_test import Trial, duels, null_gains
-from gsl.diagnosis.transient import Transient, transient
+from gsl.diagnosis.staircase import staircase
+from gsl.diagnosis.transient import transient
 from gsl.diagnosis.verdict import Verdict, judged
 from gsl.effects.effect import applied, built, effect_class, names
 
@@ -29,7 +31,7 @@ RIVALS = 3  # hypotheses that duel, at most
 ON_FOOT = 0.1  # share of the cost that chance gains on the ground, where no log can be simulated: measured on walks
 RESTARTS = 40  # windows that measure what a log does not show of a walk
 LATENCY, SHIFTS = "command_latency", (0.002, 0.02, 0.05)  # and where a fit of two clocks' shift starts [s]
-PUSH = "external_push"
+PUSH, STEPS = "external_push", "quantisation"
 ON_GROUND = ("contact",)  # kinds of effects that a robot in the air cannot show
 
 
@@ -60,7 +62,7 @@ class Baseline:
 
     Attributes:
         effects: Which the reference shows already.
-        nuisances: Shape (4, n_joints).
+        nuisances: Shape (6, n_joints).
         error: What is left of the model's error [rad], shape (n_joints,).
     """
 
@@ -145,9 +147,8 @@ def diagnosed(
         plant = applied(plant, built({LATENCY: {"delay": shift}}))
     arena = arena_of(found, plant, step, options, tick)
     none = arena.calibration()
-    everything = found.bench(arena.train.simulator, "all")
-    if moment := transient(found, everything.residual({}, none.fit.nuisances)):
-        arena = arena_of(found, plant, step, options, tick, moment)
+    left = found.bench(arena.train.simulator, "all").residual({}, none.fit.nuisances)
+    arena = arena_of(found, plant, step, options, tick, looked_at(found, left))
     nulls = tuple(known_nulls or ())
     if options.nulls and not nulls and not walking:
         tick("self-test: what chance gains on these commands")
@@ -177,23 +178,43 @@ def _upheld(
         arena = replace(arena, library=tuple(one for one in arena.library if one.effect not in wrong))
 
 
+class Looks(NamedTuple):
+    """What a look at the log finds of effects that no search over their range would.
+
+    Attributes:
+        known: Parameters by effect that are fixed from now on.
+        starts: Values by effect from which a fit begins as well.
+    """
+
+    known: Mapping[str, Mapping[str, float]]
+    starts: Mapping[str, float]
+
+
+def looked_at(found: Experiment, left: np.ndarray) -> Looks:
+    """Look for pushes and staircases in the residuals of all windows, shape (W, scored, n_channels)."""
+    moment = transient(found, left)
+    return Looks({PUSH: moment._asdict()} if moment else {}, {} if found.walking else {STEPS: staircase(found, left)})
+
+
 def arena_of(
     found: Experiment,
     plant: Plant,
     step: float,
     options: Options,
     tick: Callable[[str], None],
-    moment: Transient | None = None,
+    looks: Looks | None = None,
 ) -> Arena:
-    """Return where hypotheses on a log compete, a push among them if something happens at one moment."""
+    """Return where hypotheses on a log compete, a push among them only if a look found one."""
     simulator = found.simulator(plant, step, options.threads)
     contact = () if found.walking else ON_GROUND
     hidden = [name for name in names() if getattr(effect_class(name), "kind", "") in contact]
     hidden += [] if options.clocks else [LATENCY]
     shaking = bool(found.comparison.shaking.any())
-    hidden += [] if moment else [PUSH]
-    known = {PUSH: moment._asdict()} if moment else {}
-    candidates = library(found.robot, (*options.without, *hidden), known, dense=shaking, floating=found.walking)
+    looks = looks or Looks({}, {})
+    hidden += [] if PUSH in looks.known else [PUSH]
+    candidates = library(
+        plant.robot, (*options.without, *hidden), looks.known, looks.starts, dense=shaking, floating=found.walking
+    )
     scopes = scopes_of({} if found.walking else found.robot.groups, found.channels, apart=not found.walking)
     return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick)
 
@@ -213,7 +234,7 @@ def calibrated_on(
     """Fit the nominal to a log without the effect: whatever is found there belongs to the nominal from now on."""
     found = experiment(reference, robot)
     arena = arena_of(found, plant, step, replace(options, without=()), tick)
-    chosen = selected(arena, Thresholds(), most=options.most).chosen
+    chosen = selected(arena, Thresholds(), most=options.most, width=1).chosen
     z = arena.held_out.residual(chosen.effects, chosen.fit.nuisances)
     left = np.sqrt(np.maximum(0.0, np.mean(np.minimum(z**2, 25.0), axis=(0, 1)) - 1.0))
     return Baseline(chosen.effects, chosen.fit.nuisances, left * found.comparison.floor)

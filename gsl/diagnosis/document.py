@@ -143,9 +143,9 @@ def _calibration(joints: Sequence[str], nuisances: np.ndarray) -> list[dict[str,
             "kp": float(np.exp(kp)),
             "kd": float(np.exp(kd)),
             "coulomb": float(coulomb),
-            "zero": float(zero),
+            "zero": float(zero + offset),
         }
-        for joint, (kp, kd, coulomb, zero, _) in zip(joints, nuisances.T, strict=True)
+        for joint, (kp, kd, coulomb, zero, offset, _) in zip(joints, nuisances.T, strict=True)
     ]
 
 
@@ -157,6 +157,11 @@ def _caveats(found: Findings) -> list[str]:
         )
     if exp.noise.source != "repeats":
         said.append("No command was played twice: the noise floor is estimated from the roughness of the log.")
+    if exp.noise.unsteady.any():
+        names = ", ".join(name for name, is_so in zip(exp.channels, exp.noise.unsteady, strict=True) if is_so)
+        said.append(
+            f"Repeats of the same commands differ here by far more than elsewhere, which counts as gap: {names}."
+        )
     if not exp.by_record:
         said.append("There is one trajectory only: every second part of it was held out, which is weak evidence.")
     if exp.comparison.shaking.any():

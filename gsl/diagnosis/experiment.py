@@ -27,7 +27,7 @@ LEAST = {
     "pitch": 2e-3,
     "yaw": 2e-3,
 }  # floor of the base [m], [rad]: estimate
-FIT_WINDOWS = 20  # windows that a fit uses, spread over the training records
+FIT_WINDOWS = 32  # windows that a fit uses, spread over the training records
 STILL = 1e-6  # a command that moves less rests [rad]
 
 

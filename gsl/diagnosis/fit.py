@@ -26,14 +26,14 @@ Build = Callable[[np.ndarray], Effects]
 
 
 def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """Return derivatives of the residuals to each joint's own nuisances, shape (5, W, scored, n_joints).
+    """Return derivatives of the residuals to each joint's own nuisances, shape (6, W, scored, n_joints).
 
     All joints are probed at once: a joint's answer to its neighbours' probes counts as its own.
 
     Args:
         bench: The log.
         effects: That are switched on.
-        at: Nuisances, shape (5, n_joints).
+        at: Nuisances, shape (6, n_joints).
         base: Residuals there.
     """
     if not bench.simulator.calibrates:
@@ -47,12 +47,12 @@ def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarr
 
 
 def projected(z: np.ndarray, slopes: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the best nuisances, shape (5, n_joints), and each joint's cost with them, shape (n_joints,).
+    """Return the best nuisances, shape (6, n_joints), and each joint's cost with them, shape (n_joints,).
 
     Args:
         z: Residuals with nuisances `at`, shape (W, scored, n_joints).
         slopes: From `sensitivities`.
-        at: Nuisances, shape (5, n_joints).
+        at: Nuisances, shape (6, n_joints).
     """
     flat = z.reshape(-1, z.shape[2])
     columns = slopes.reshape(len(slopes), -1, z.shape[2])
@@ -73,7 +73,7 @@ def proportional(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, at: np.ndar
         z: Residuals without the effects, nuisances `at`, shape (W, scored, n_joints).
         own: Derivatives to the parameters, shape (p, W, scored, n_joints).
         slopes: From `sensitivities`.
-        at: Nuisances, shape (5, n_joints).
+        at: Nuisances, shape (6, n_joints).
     """
     theta = np.zeros(len(own))
     for _ in range(REWEIGHTINGS):
@@ -90,7 +90,7 @@ class Fit:
 
     Attributes:
         parameters: Of the effects, shape (p,).
-        nuisances: Shape (4, n_joints).
+        nuisances: Shape (6, n_joints).
         cost: Robust cost of the residuals and of the nuisances.
         covariance: Of the parameters, nuisances free, shape (p, p).
     """
@@ -107,9 +107,9 @@ def refined(
     start: np.ndarray,
     bounds: np.ndarray,
     at: np.ndarray,
-    slopes: np.ndarray | None = None,
     *,
     ratios: np.ndarray | None = None,
+    every: int = 1,
     rounds: int = 4,
 ) -> Fit:
     """Descend from a start.
@@ -119,9 +119,9 @@ def refined(
         build: From parameters to effects.
         start: Parameters, shape (p,).
         bounds: Lower and upper, shape (2, p).
-        at: Nuisances to begin with, shape (5, n_joints).
-        slopes: From `sensitivities`, taken somewhere near.
+        at: Nuisances to begin with, shape (6, n_joints).
         ratios: Which parameters multiply, and are stepped in their logarithms as such nuisances are, shape (p,).
+        every: Steps for which sensitivities to the nuisances, which change little, are kept.
         rounds: Steps at most.
     """
     multiplies = np.zeros(len(start), dtype=bool) if ratios is None else ratios
@@ -129,9 +129,9 @@ def refined(
     first = np.clip(start, *bounds)
     z = bench.residual(build(first), at)
     here = _Point(first, at, z, float(loss(z).sum()) + nuisance.cost(at))
-    here, matrix = _descended(problem, here, slopes, rounds)
+    here, matrix = _descended(problem, here, every, rounds)
     if len(first) and (here.cost > POOR * z.size or bench.comparison.shaking.any()):
-        there, other = _descended(problem, _searched(bench, build, here, bounds), None, rounds)
+        there, other = _descended(problem, _searched(bench, build, here, bounds), every, rounds)
         here, matrix = (there, other) if there.cost < here.cost else (here, matrix)
     scale = problem.scale(here.theta)
     covariance = np.linalg.inv(matrix)[: len(first), : len(first)] * np.outer(scale, scale)
@@ -164,22 +164,22 @@ class _Point(NamedTuple):
     cost: float
 
 
-def _descended(problem: _Problem, here: _Point, slopes: np.ndarray | None, rounds: int) -> tuple[_Point, np.ndarray]:
-    """Take Levenberg-Marquardt steps as long as they pay; return the last point and normal matrix.
-
-    Sensitivities to the nuisances that are given serve the first step only, those taken after it all others.
-    """
+def _descended(problem: _Problem, here: _Point, every: int, rounds: int) -> tuple[_Point, np.ndarray]:
+    """Take Levenberg-Marquardt steps as long as they pay; return the last point and normal matrix."""
     bench, build = problem.bench, problem.build
-    given, matrix = slopes is not None, np.eye(len(here.theta) + here.nuisances.size)
-    for count in range(rounds):
-        if slopes is None or not given or count == 1:
-            slopes = sensitivities(bench, build(here.theta), here.nuisances, here.z)
+    matrix, age = np.eye(len(here.theta) + here.nuisances.size), every
+    for _ in range(rounds):
+        if age == every:
+            slopes, age = sensitivities(bench, build(here.theta), here.nuisances, here.z), 0
         own = _own_slopes(bench, build, here.theta, problem.bounds, here.nuisances, here.z)
         own = own * problem.scale(here.theta)[:, None, None, None]
         matrix, right = _normal(here.z, own, slopes, here.nuisances)
         before, here = here, _stepped(problem, here, matrix, right)
-        if before.cost - here.cost < ENOUGH * before.cost and (count or not given):
-            break
+        if before.cost - here.cost < ENOUGH * before.cost:
+            if age == 0:
+                break
+            age = every - 1
+        age += 1
     return here, matrix
 
 
@@ -236,7 +236,7 @@ def _own_slopes(
 
 
 def _normal(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal equations of (parameters, nuisances), of shapes (p + 5 n, p + 5 n) and (p + 5 n,)."""
+    """Return the normal equations of (parameters, nuisances), of shapes (p + 6 n, p + 6 n) and (p + 6 n,)."""
     p, joints = len(own), z.shape[2]
     w, size = weight(z), p + n.size
     matrix, right = np.zeros((size, size)), np.zeros(size)

@@ -12,6 +12,7 @@ from gsl.diagnosis.records import Record
 
 SETTLED = 15  # ticks after which the start of an episode is forgotten
 ESTIMATE = 200  # samples that an estimate from roughness is worth: other motion than noise is in it
+UNSTEADY = 4.0  # times the median of the joints
 QUIET = 0.3  # share of the ticks, those of the slowest commands, on which roughness is measured
 
 
@@ -21,6 +22,7 @@ class NoiseFloor:
 
     Attributes:
         sd: Standard deviation of a measured position [rad], shape (n_joints,).
+        unsteady: Joints whose repeats differ by much more than those of the others, whose floor they get, (n_joints,).
         source: `repeats` or `estimated`.
         pairs: Repeats that were compared.
         resolution: Of the encoders [rad].
@@ -28,6 +30,7 @@ class NoiseFloor:
     """
 
     sd: np.ndarray
+    unsteady: np.ndarray
     source: str
     pairs: int
     resolution: float
@@ -54,8 +57,12 @@ def noise_floor(found: Sequence[Record], resolution: float, least: np.ndarray | 
         square = sum(part.var(axis=0, ddof=1).sum(axis=0) for part in spread) / sum(part.shape[1] for part in spread)
         pairs = sum(len(group) - 1 for group in groups)
         samples = sum(part.shape[1] * (len(part) - 1) for part in spread) * len(square)
-        return NoiseFloor(np.maximum(np.sqrt(square), least), "repeats", pairs, resolution, samples)
-    return NoiseFloor(np.maximum(_roughness(found), least), "estimated", 0, resolution, ESTIMATE)
+        sd = np.maximum(np.sqrt(square), least)
+        usual = np.inf if least.ndim else float(np.median(sd))
+        unsteady = sd > UNSTEADY * usual
+        return NoiseFloor(np.where(unsteady, usual, sd), unsteady, "repeats", pairs, resolution, samples)
+    sd = np.maximum(_roughness(found), least)
+    return NoiseFloor(sd, np.zeros(len(sd), dtype=bool), "estimated", 0, resolution, ESTIMATE)
 
 
 def _repeats(found: Sequence[Record]) -> list[list[Record]]:

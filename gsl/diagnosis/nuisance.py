@@ -12,11 +12,11 @@ import numpy as np
 
 from gsl.core.plant import Plant, Servo
 
-NAMES = ("kp", "kd", "coulomb", "zero", "inertia")
-# Logarithms of factors, [N·m], [rad], in units of `inertia_unit`: spread of one make of servo (estimate).
-SIZES = np.array([0.04, 0.07, 0.012, 0.004, 1.0])
-PROBES = np.array([0.05, 0.10, 0.02, 0.002, 0.5])  # of the finite differences
-KP, KD, COULOMB, ZERO, INERTIA = range(5)
+NAMES = ("kp", "kd", "coulomb", "zero", "offset", "inertia")
+# Logarithms of factors, [N·m], [rad] in the log, [rad] in the servo, `inertia_unit`s: of one make of servo (estimate).
+SIZES = np.array([0.04, 0.07, 0.012, 0.003, 0.003, 1.0])
+PROBES = np.array([0.05, 0.10, 0.02, 0.002, 0.002, 0.5])  # of the finite differences
+KP, KD, COULOMB, ZERO, OFFSET, INERTIA = range(6)
 HALF_STEP = 1e-3  # of a simulator at 2 ms [s]
 FACTORS = (0.1, 10.0)  # of the gains, at most
 LEAST = 0.2  # share of the nominal inertia that is left
@@ -33,12 +33,12 @@ def inertia_unit(servo: Servo) -> np.ndarray:
 
 
 def none(joints: int) -> np.ndarray:
-    """Return nuisances that do nothing, shape (5, n_joints)."""
+    """Return nuisances that do nothing, shape (6, n_joints)."""
     return np.zeros((len(NAMES), joints))
 
 
 def drawn(rng: np.random.Generator, joints: int) -> np.ndarray:
-    """Return nuisances as one make of servo has them, shape (5, n_joints).
+    """Return nuisances as one make of servo has them, shape (6, n_joints).
 
     A robot's inertia is never below the simulator's: its time has no step that damping could lag behind.
     """
@@ -48,12 +48,12 @@ def drawn(rng: np.random.Generator, joints: int) -> np.ndarray:
 
 
 def cost(nuisances: np.ndarray) -> float:
-    """Return what nuisances, shape (5, n_joints), cost."""
+    """Return what nuisances, shape (6, n_joints), cost."""
     return float(((nuisances / SIZES[:, None]) ** 2).sum())
 
 
 def bounded(nuisances: np.ndarray) -> np.ndarray:
-    """Return the nearest nuisances that are possible, shape (5, n_joints)."""
+    """Return the nearest nuisances that are possible, shape (6, n_joints)."""
     result = nuisances.copy()
     result[INERTIA] = np.clip(result[INERTIA], -5.0, 20.0)
     result[: KD + 1] = np.clip(result[: KD + 1], *np.log(FACTORS))
@@ -65,7 +65,7 @@ def calibrated(plant: Plant, nuisances: np.ndarray) -> Plant:
 
     Args:
         plant: Its first motors are the logged joints.
-        nuisances: Shape (5, n_joints).
+        nuisances: Shape (6, n_joints).
     """
     wide = nuisances[:, plant.robot.drive]
     servo = plant.servo
@@ -73,6 +73,7 @@ def calibrated(plant: Plant, nuisances: np.ndarray) -> Plant:
         kp=servo.kp * np.exp(wide[KP]),
         kd=servo.kd * np.exp(wide[KD]),
         coulomb=np.maximum(0.0, servo.coulomb + wide[COULOMB]),
+        offset=servo.offset + wide[OFFSET],
         armature=np.maximum(LEAST * servo.armature, servo.armature + wide[INERTIA] * inertia_unit(servo)),
     )
     return replace(changed, sensors=replace(plant.sensors, bias=plant.sensors.bias + wide[ZERO]))

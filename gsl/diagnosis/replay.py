@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from gsl.core.lanes import LANES
 from gsl.core.plant import Plant
 from gsl.diagnosis.nuisance import calibrated
 from gsl.diagnosis.records import Pieces
@@ -40,12 +41,18 @@ class InTheAir:
     def told(self, effects: Effects, nuisances: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return the replayed positions [rad], shape (W, T, n_joints); NaN where a replay diverges."""
         held = Held.of(calibrated(applied(self.plant, built(effects)), nuisances), self.step, self.period)
-        shares = [slice(k, None, self.threads) for k in range(self.threads)]
-        parts = [Windows(*(np.ascontiguousarray(part[share]) for part in pieces.windows)) for share in shares]
+        shares = _shares(len(pieces), self.threads)
+        parts = [Windows(*(part[share] for part in pieces.windows)) for share in shares]
         result = np.empty((len(pieces), pieces.windows.length, len(self.plant.robot.motors)))
         for share, told in zip(shares, self._pool.map(held.replay, parts), strict=True):
             result[share] = told
         return result[..., : nuisances.shape[1]]
+
+
+def _shares(windows: int, threads: int) -> list[slice]:
+    """Return windows in a share for each thread, whole lanes in all but the last."""
+    size = -(-windows // (LANES * threads)) * LANES
+    return [slice(start, start + size) for start in range(0, windows, size)]
 
 
 class Simulator(Protocol):

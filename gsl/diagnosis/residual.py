@@ -17,6 +17,7 @@ POWER_SD = (
 )
 COLOURED = 0.4  # correlation of a resting joint's log with itself some ticks later: noise has none
 LAGS = 4
+USUAL = 0.75  # share of these windows, the calmest, that is looked at
 MIN_RESTS = 3  # windows in which a joint rests that it takes to judge
 
 
@@ -106,12 +107,16 @@ def comparison(pieces: Pieces, noise: NoiseFloor, resting: np.ndarray) -> Compar
 
 
 def _shakes(rest: np.ndarray, resolution: float) -> bool:
-    """Whether a resting joint's log, shape (W, scored), moves by more than rounding and not as noise does."""
+    """Whether a resting joint's log, shape (W, scored), moves by more than rounding and not as noise does.
+
+    What happens in a few windows only is no shaking.
+    """
     if len(rest) < MIN_RESTS:
         return False
     x = rest - rest.mean(axis=1, keepdims=True)
     line = np.linspace(-1.0, 1.0, rest.shape[1])
     x = x - np.outer(x @ line / (line @ line), line)
+    x = x[np.argsort((x**2).mean(axis=1))[: max(1, round(USUAL * len(x)))]]
     power = float((x**2).mean())
     colour = max(abs(float((x[:, lag:] * x[:, :-lag]).mean())) for lag in range(1, LAGS + 1))
     return power > resolution**2 and colour > COLOURED * power

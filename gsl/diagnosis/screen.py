@@ -21,7 +21,7 @@ class Lead:
     Attributes:
         candidate: With its scope.
         parameters: Where the fit starts, shape (p,).
-        nuisances: That go with them, shape (5, n_joints).
+        nuisances: That go with them, shape (6, n_joints).
         cost: As the screening sees it.
     """
 
@@ -50,11 +50,11 @@ class Ground:
 
     Attributes:
         effects: That are switched on already.
-        nuisances: Fitted with them, shape (5, n_joints).
+        nuisances: Fitted with them, shape (6, n_joints).
         residual: There, shape (W, scored, n_joints).
         slopes: Sensitivities there.
         costs: Of each joint, nuisances free, shape (n_joints,).
-        best: These nuisances, shape (5, n_joints).
+        best: These nuisances, shape (6, n_joints).
     """
 
     effects: Effects
@@ -109,7 +109,7 @@ def _answer(bench: Bench, ground: Ground, candidate: Candidate) -> np.ndarray:
 def _costs(
     bench: Bench, ground: Ground, candidate: Candidate, grid: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return costs, shape (g, n_joints), nuisances, shape (g, 5, n_joints), of each point; and the strongest trace."""
+    """Return costs, shape (g, n_joints), nuisances, shape (g, 6, n_joints), of each point; and the strongest trace."""
     costs, nuisances = np.full((len(grid), bench.joints), np.inf), np.zeros((len(grid), *ground.nuisances.shape))
     trace = 0.0
     for row in range(len(grid) - 1, -1, -1):  # the strongest first: it tells whether there is a trace at all

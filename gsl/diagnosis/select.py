@@ -10,7 +10,9 @@ from gsl.diagnosis.attribute import BEAM, Arena, Gain, Hypothesis, gain
 from gsl.diagnosis.screen import Screening
 
 LEAST_SHARE = 0.2  # of what is left, that a further effect has to explain
+MINOR = 0.02  # of what is explained already: less is no cause but a flaw of the model
 MUCH = 1.1  # cost of a residual that leaves room for more than a small further effect
+NOTHING = 1.0  # cost of a residual that leaves room for none: that of noise is .96
 PAIRS = 5  # leads that are fitted beside an effect that stands already
 
 
@@ -51,7 +53,9 @@ class Selection:
         return gain(self.chosen, self.none)
 
 
-def selected(arena: Arena, thresholds: Thresholds, none: Hypothesis | None = None, *, most: int = 3) -> Selection:
+def selected(
+    arena: Arena, thresholds: Thresholds, none: Hypothesis | None = None, *, most: int = 3, width: int = BEAM
+) -> Selection:
     """Search for the effects.
 
     Args:
@@ -59,21 +63,22 @@ def selected(arena: Arena, thresholds: Thresholds, none: Hypothesis | None = Non
         thresholds: What counts.
         none: Calibration alone, if it is fitted already.
         most: Effects at once.
+        width: Single effects that are continued.
     """
     none = none or arena.calibration()
     singles, screening = arena.successors(none)
     tried, chosen = [none, *singles], none
     if singles and _stands(singles[0], none, max(thresholds.gain, thresholds.share * none.cost)):
         chosen = singles[0]
-        beam = _distinct(singles)[: BEAM if _lacking(chosen) else 1]
-        while len(chosen.candidates) < most:
+        beam = _distinct(singles, width)
+        while len(chosen.candidates) < most and _lacking(arena, chosen, NOTHING):
             found = [one for base in beam for one in arena.successors(base, PAIRS)[0]]
             tried += found
             best = min(found, key=lambda one: one.cost, default=chosen)
-            if not _stands(best, chosen, _least(thresholds, chosen)):
+            if not _stands(best, chosen, _least(thresholds, chosen, none)):
                 break
             chosen, beam = best, [best]
-            if not _lacking(chosen):
+            if not _lacking(arena, chosen, MUCH):
                 break
         chosen = _polished(arena, _pruned(arena, chosen, thresholds, tried), tried)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
@@ -84,22 +89,22 @@ def _stands(one: Hypothesis, other: Hypothesis, least: float) -> bool:
     return found.value > least and found.low > 0.0
 
 
-def _least(thresholds: Thresholds, standing: Hypothesis) -> float:
+def _least(thresholds: Thresholds, standing: Hypothesis, none: Hypothesis) -> float:
     """Return what a further effect has to gain over what stands."""
-    floor = max(thresholds.further, thresholds.share * standing.cost)
+    floor = max(thresholds.further, thresholds.share * standing.cost, MINOR * (none.cost - standing.cost))
     return max(floor, LEAST_SHARE * max(0.0, standing.cost - float(standing.counts.sum())))
 
 
-def _lacking(standing: Hypothesis) -> bool:
-    """Whether much more is left than noise."""
-    return standing.level > MUCH
+def _lacking(arena: Arena, standing: Hypothesis, level: float) -> bool:
+    """Whether more is left than noise, of which the cost of joints that shake does not tell."""
+    return standing.level > level or bool(arena.train.comparison.shaking.any())
 
 
-def _distinct(singles: list[Hypothesis]) -> list[Hypothesis]:
-    """Return the best hypotheses of different effects, BEAM of them."""
+def _distinct(singles: list[Hypothesis], width: int) -> list[Hypothesis]:
+    """Return the best hypotheses of different effects, not more than `width`."""
     found: list[Hypothesis] = []
     for one in singles:
-        if len(found) < BEAM and one.names not in [other.names for other in found]:
+        if len(found) < width and one.names not in [other.names for other in found]:
             found.append(one)
     return found
 
@@ -110,7 +115,7 @@ def _pruned(arena: Arena, chosen: Hypothesis, thresholds: Thresholds, tried: lis
         fewer = [_without(arena, chosen, k) for k in range(len(chosen.candidates))]
         tried += fewer
         best = min(fewer, key=lambda one: one.cost)
-        if _stands(chosen, best, _least(thresholds, best)):
+        if _stands(chosen, best, _least(thresholds, best, tried[0])):
             break
         chosen = best
     return chosen
@@ -124,7 +129,7 @@ def _without(arena: Arena, chosen: Hypothesis, k: int) -> Hypothesis:
 
 def _polished(arena: Arena, chosen: Hypothesis, tried: list[Hypothesis]) -> Hypothesis:
     """Fit what stands once more from where it is, with all derivatives taken anew at every step."""
-    again = arena.fitted(chosen.candidates, np.concatenate(chosen.parameters), chosen.fit.nuisances)
+    again = arena.fitted(chosen.candidates, np.concatenate(chosen.parameters), chosen.fit.nuisances, every=1)
     best = again if again.fit.cost < chosen.fit.cost else chosen
     tried.append(best)
     return best

@@ -10,9 +10,10 @@ import numpy as np
 from gsl.diagnosis.experiment import Experiment
 
 LEAST = 3  # records that have to show it at the same time
-HIGH = 4.0  # times the usual power
+HIGH = 9.0  # times the usual power of a joint
+TYPICAL = 0.45  # median of the square of a residual that is noise
 LONGEST = 0.8  # [s]: a push and what rings after it
-RINGING = 0.04  # for which a stiff servo is still off afterwards [s]
+RINGING = 0.02  # for which a stiff servo is still off afterwards [s]
 
 
 class Transient(NamedTuple):
@@ -29,13 +30,14 @@ def transient(found: Experiment, z: np.ndarray) -> Transient | None:
         found: The log.
         z: Residuals of all windows with everything else fitted, in units of the floor, shape (W, scored, n_joints).
     """
-    power = np.mean(np.minimum(z**2, 100.0), axis=2)
-    ticks = found.pieces.tick[:, None] + found.pieces.warm_up + 1 + np.arange(z.shape[1])
-    own = [np.median(power[found.pieces.record == record]) for record in found.pieces.record]
-    by_tick: dict[int, list[float]] = {}
-    for tick, value in zip(ticks.ravel(), (power / np.maximum(own, 1e-9)[:, None]).ravel(), strict=True):
-        by_tick.setdefault(int(tick), []).append(float(value))
-    high = [tick for tick, values in sorted(by_tick.items()) if len(values) >= LEAST and np.median(values) > HIGH]
+    power = np.minimum(z**2, 100.0)
+    own = {record: np.median(power[found.pieces.record == record], axis=(0, 1)) for record in set(found.pieces.record)}
+    by_tick: dict[int, list[np.ndarray]] = {}
+    for window, record, first in zip(power, found.pieces.record, found.pieces.tick, strict=True):
+        for k, values in enumerate(window / np.maximum(own[record], TYPICAL)):
+            by_tick.setdefault(int(first) + found.pieces.warm_up + 1 + k, []).append(values)
+    seen = {tick: np.median(values, axis=0).max() for tick, values in by_tick.items() if len(values) >= LEAST}
+    high = sorted(tick for tick, power_then in seen.items() if power_then > HIGH)
     run = _longest(high)
     length = len(run) * found.period
     if len(run) < 2 or length > LONGEST or len(run) < 0.5 * len(high):

@@ -15,6 +15,7 @@ SEPARATED = 0.75  # probability below which two causes are not told apart
 BLUNT = 12.0  # least spread of a difference of costs, where no self-test has measured it
 COARSE = 0.12  # share of a difference of costs that an imperfect model makes
 FOREIGN, EXPLAINED = 1.2, 0.85  # remaining cost, and share explained, beyond which nothing of the library is the cause
+LOCAL = 1.5  # and remaining cost of one joint
 KNOWN_SOFT = 0.15
 
 
@@ -71,11 +72,12 @@ def judged(found: Selection, expected: float, margins: Sequence[tuple[str, float
     excess = max(none.cost - least, 1e-9)
     explained = float(np.clip((none.cost - chosen.cost) / excess, 0.0, 1.0))
     remaining = chosen.level / expected
+    strange = max(np.log(remaining) / np.log(FOREIGN), np.log(chosen.levels.max() / expected) / np.log(LOCAL))
     if not chosen.candidates:
-        return Verdict("unknown" if remaining > FOREIGN else "no_gap", (), (), 0.0, remaining, 1.0)
+        return Verdict("unknown" if strange > 1.0 else "no_gap", (), (), 0.0, remaining, 1.0)
     spreads = dict(margins)
     causes = tuple(_cause(found, k, excess, spreads) for k in range(len(chosen.candidates)))
-    known = _known(explained, remaining)
+    known = _known(explained, float(strange))
     groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in ALIKE if twins & set(chosen.names)]
     for cause in causes:
         if cause.rival is not None and cause.probability < SEPARATED:
@@ -86,9 +88,9 @@ def judged(found: Selection, expected: float, margins: Sequence[tuple[str, float
     return Verdict(word, scaled, unique, explained, remaining, known)
 
 
-def _known(explained: float, remaining: float) -> float:
+def _known(explained: float, strange: float) -> float:
     """Return the probability that the library holds what is at work: much is left only where something is missing."""
-    missing = np.log(max(remaining, 1e-9)) / np.log(FOREIGN) - 1.0
+    missing = strange - 1.0
     unexplained = (EXPLAINED - explained) / (1.0 - EXPLAINED)
     return float(1.0 / (1.0 + np.exp(min(missing, unexplained) / KNOWN_SOFT)))
 

@@ -30,7 +30,7 @@ def diagnosed_effects(found: Findings) -> dict[str, Any]:
 
 
 def calibration(joints: Sequence[str], nuisances: np.ndarray, unit: np.ndarray) -> Effects:
-    """Return nuisances, shape (5, n_joints), as effects of single joints; `unit` see `nuisance.inertia_unit`."""
+    """Return nuisances, shape (6, n_joints), as effects of single joints; `unit` see `nuisance.inertia_unit`."""
     rows = {joint: nuisances[:, k] for k, joint in enumerate(joints)}
     return {
         "servo_gain": [
@@ -46,6 +46,7 @@ def calibration(joints: Sequence[str], nuisances: np.ndarray, unit: np.ndarray) 
             {"inertia": row[nuisance.INERTIA] * unit[k], "joints": joint} for k, (joint, row) in enumerate(rows.items())
         ],
         "sensor_bias": [{"bias": row[nuisance.ZERO], "joints": joint} for joint, row in rows.items()],
+        "zero_offset": [{"offset": row[nuisance.OFFSET], "joints": joint} for joint, row in rows.items()],
     }
 
 
