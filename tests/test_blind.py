@@ -357,7 +357,7 @@ def test_inseparable_is_the_second_best_and_twins_are_one() -> None:
     offset = label(effects={"sensor_bias": {"bias": 0.02, "joints": "all"}}, neutral={"sensor_bias": {"bias": 0.0}})
     twin = cause("zero_offset") | {"parameters": {"offset": {"value": 0.021, "low": 0.019, "high": 0.023}}}
     mark = marked(offset, answer(twin, verdict="inseparable", inseparable=[["sensor_bias", "zero_offset"]]))
-    assert (mark.first, mark.covered, mark.extra) == (True, (True,), 0)
+    assert (mark.first, mark.twin, mark.covered, mark.extra) == (False, True, (True,), 0)
     assert mark.errors == {"zero_offset": pytest.approx(0.05)}
 
 

@@ -82,6 +82,7 @@ def _errors(*, loose: bool) -> Callable[[Mark], Iterable[float]]:
 _SHARES = {
     "top-1, medium and strong": _Share(_single(MEDIUM, STRONG), lambda m: m.first, (0.90, 0.75)),
     "top-2, medium and strong": _Share(_single(MEDIUM, STRONG), lambda m: m.second, (0.97, 0.90)),
+    "top-1, twins taken as one": _Share(_single(MEDIUM, STRONG), lambda m: m.twin),
     "top-1, weak": _Share(_single(WEAK), lambda m: m.first),
     "top-2, weak": _Share(_single(WEAK), lambda m: m.second),
     "top-1, medium": _Share(_single(MEDIUM), lambda m: m.first),

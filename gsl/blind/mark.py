@@ -10,7 +10,7 @@ import numpy as np
 
 from gsl.blind.label import JOINT, KNOWN, TWO, Label
 
-TWINS = {"sensor_bias": "zero_offset"}  # alike by nature in the air: either name is right
+TWINS = {"sensor_bias": "zero_offset"}  # alike by nature in the air
 NO_GAP, UNKNOWN = "no_gap", "unknown"
 LOOSE = ("joint_compliance", "supply_sag", "backlash")  # whose parameters logs at 50 Hz hardly show
 
@@ -23,7 +23,8 @@ class Mark:
         label: The truth.
         told: The first cause that is named, or the verdict's word.
         named: All causes and members of inseparable groups.
-        first: The only cause of the truth comes first, and nothing is said to be as likely.
+        first: A cause of the truth comes first, and it is not said to be inseparable from another.
+        twin: The same, with effects that are alike by nature taken as one.
         second: It is among the first two causes or effects of the ranking, or in an inseparable group.
         both, one: Of several causes, all are named; at least one is.
         joint: Of a fault of one joint, the first cause is put there; None elsewhere.
@@ -41,6 +42,7 @@ class Mark:
     told: str
     named: tuple[str, ...]
     first: bool
+    twin: bool
     second: bool
     both: bool
     one: bool
@@ -80,7 +82,8 @@ def marked(label: Label, answer: Mapping[str, Any]) -> Mark:
         label=label,
         told=names[0] if names else str(answer["verdict"]) if answer["verdict"] in (NO_GAP, UNKNOWN) else UNKNOWN,
         named=tuple(dict.fromkeys([*names, *sorted(alike)])),
-        first=first and not truth & alike,
+        first=first and not truth & {_plain(name) for group in answer.get("inseparable") or [] for name in group},
+        twin=first and not truth & alike,
         second=bool(truth & {*names[:2], *alike, *(_ranked(answer)[:2] if names else ())}),
         both=bool(truth) and truth <= set(names),
         one=bool(found),
@@ -102,7 +105,7 @@ def right(mark: Mark) -> bool:
     if kind == TWO:
         return mark.both
     if kind in KNOWN:
-        return mark.first and mark.joint is not False
+        return mark.twin and mark.joint is not False
     return not mark.alarmed if kind == "null" else mark.abstained
 
 

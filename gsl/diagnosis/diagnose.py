@@ -49,7 +49,7 @@ class Options:
     """
 
     without: tuple[str, ...] = ()
-    most: int = 3
+    most: int = 4
     duels: int = 2
     nulls: int = 3
     threads: int = 2

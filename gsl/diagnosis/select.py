@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import BEAM, Arena, Gain, Hypothesis, gain
 from gsl.diagnosis.screen import Screening
 
 LEAST_SHARE = 0.2  # of what is left, that a further effect has to explain
-MINOR = 0.02  # of what is explained already: less is no cause but a flaw of the model
+MINOR = 0.005  # of what is explained already: less is no cause but a flaw of the model
 MUCH = 1.1  # cost of a residual that leaves room for more than a small further effect
 NOTHING = 1.0  # cost of a residual that leaves room for none: that of noise is .96
+HIDDEN = 1.5  # cost of a nuisance, on average, beyond which a calibration hides a cause
 PAIRS = 5  # leads that are fitted beside an effect that stands already
 
 
@@ -96,8 +98,9 @@ def _least(thresholds: Thresholds, standing: Hypothesis, none: Hypothesis) -> fl
 
 
 def _lacking(arena: Arena, standing: Hypothesis, level: float) -> bool:
-    """Whether more is left than noise, of which the cost of joints that shake does not tell."""
-    return standing.level > level or bool(arena.train.comparison.shaking.any())
+    """Whether more is left than noise, or hidden in nuisances; the cost of joints that shake does not tell."""
+    hides = nuisance.cost(standing.fit.nuisances) > HIDDEN * standing.fit.nuisances.size
+    return standing.level > level or hides or bool(arena.train.comparison.shaking.any())
 
 
 def _distinct(singles: list[Hypothesis], width: int) -> list[Hypothesis]:

@@ -60,7 +60,7 @@ class BlindAnswer:
 
     data: Annotated[str, setting("folder of the cases, of gsl blind make or of one's own", min_length=1)]
     baselines: Annotated[bool, setting("answer with four simpler methods as well")] = False
-    most: Annotated[int, setting("effects at once, at most", ge=1, le=4)] = 3
+    most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
     workers: Workers = -1

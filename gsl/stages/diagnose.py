@@ -49,7 +49,7 @@ class Diagnose:
         Literal["synchronised", "unsynchronised"],
         setting("whether commands and measurements share a clock; if not, latency is not claimed"),
     ] = "synchronised"
-    most: Annotated[int, setting("effects at once, at most", ge=1, le=4)] = 3
+    most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
     workers: Annotated[int, setting("threads that replay; -1 takes all cores")] = -1

@@ -29,7 +29,7 @@ class DiagnosisPlan:
     """Excitation and thoroughness; an excitation knows no policy, so that one serves all iterations."""
 
     excitation: Annotated[Excitation, setting("what is played in the air")]
-    most: Annotated[int, setting("effects at once, at most", ge=1, le=4)] = 3
+    most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
 
