@@ -39,6 +39,8 @@ def play_same(
         period: Control period [s].
     """
     held = Held.of(applied(plant, built(effects)), STEP, period)
+    if extra is None:
+        return held.play(targets, starts, SETTLE)
     rows, state = extra_rows(plant, extra), np.zeros((2, len(held.bias)))
     rest, told = targets[0][0].copy(), []
     for path, start in zip(targets, starts, strict=True):

@@ -18,8 +18,7 @@ from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.records import Pieces, Record, pieces, slope
 from gsl.diagnosis.replay import Bench
 from gsl.effects.effect import applied, built
-from gsl.worlds.held import Held, Windows
-from gsl.worlds.servo import COMMANDS
+from gsl.worlds.held import Held
 
 SETTLE = 25  # ticks for which the first command is held before a record begins
 START = 0.02  # spread of the joints before that [rad]
@@ -51,17 +50,14 @@ def simulated(found: Experiment, plant: Plant, step: float, rng: np.random.Gener
         step: Physics period [s].
         rng: Of starts and noise.
     """
-    held, n = Held.of(plant, step, found.period), len(found.joints)
-    made = []
-    for one in found.records:
-        targets = np.vstack([np.repeat(one.targets[:1], COMMANDS - 1 + SETTLE, axis=0), one.targets])
-        start = one.targets[0] + START * rng.standard_normal(one.targets.shape[1])
-        motion = np.array([[start, np.zeros_like(start)]])
-        windows = Windows(np.ascontiguousarray(targets[::-1])[None], motion, np.array([-SETTLE * found.period]))
-        position = held.replay(windows)[0, SETTLE - 1 :, :n]
-        position = position + found.comparison.floor * rng.standard_normal(position.shape)
-        made.append(replace(one, position=position, velocity=slope(position, found.period)))
-    return tuple(made)
+    paths, n = [one.targets for one in found.records], len(found.joints)
+    starts = [path[0] + START * rng.standard_normal(path.shape[1]) for path in paths]
+    played = Held.of(plant, step, found.period).play(paths, starts, SETTLE)
+    noisy = [told[:, :n] + found.comparison.floor * rng.standard_normal((len(told), n)) for told in played]
+    return tuple(
+        replace(one, position=position, velocity=slope(position, found.period))
+        for one, position in zip(found.records, noisy, strict=True)
+    )
 
 
 def relogged(found: Experiment, arena: Arena, effects: Hypothesis, rng: np.random.Generator) -> Arena:

@@ -5,6 +5,7 @@ The windows of a log do not know of each other: eight are replayed side by side 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -86,6 +87,26 @@ class Held:
         told = np.full((len(windows.clock), windows.length, len(self.bias)), np.nan)
         _replay(self.servo, self.tree, self.pushes, windows, self.step, round(self.period / self.step), told)
         return told + self.bias
+
+    def play(self, paths: Sequence[np.ndarray], starts: Sequence[np.ndarray], settle: int) -> list[np.ndarray]:
+        """Return what the encoders tell before each command and after the last one [rad], (T + 1, n_motors) each.
+
+        Args:
+            paths: Motor targets of episodes that are played side by side [rad], shape (T, n_motors) each.
+            starts: Positions at rest before them [rad], shape (n_motors,) each.
+            settle: Control periods for which the first target is held before an episode begins.
+        """
+        longest = max(len(path) for path in paths)
+        commands = np.array([_around(path, COMMANDS - 1 + settle, longest - len(path))[::-1] for path in paths])
+        motion = np.stack([starts, np.zeros_like(starts)], axis=1)
+        clock = np.full(len(paths), -settle * self.period)
+        told = self.replay(Windows(np.ascontiguousarray(commands), motion, clock))
+        return [one[settle - 1 : settle + len(path)] for one, path in zip(told, paths, strict=True)]
+
+
+def _around(path: np.ndarray, before: int, after: int) -> np.ndarray:
+    """Return a path with its first row repeated before it and its last one after it."""
+    return np.concatenate([np.repeat(path[:1], before, axis=0), path, np.repeat(path[-1:], after, axis=0)])
 
 
 def _aimed(push: Push, robot: Robot) -> list[tuple[float, ...]]:
