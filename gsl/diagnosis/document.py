@@ -182,11 +182,13 @@ def _summary(found: Findings, causes: Sequence[Mapping[str, Any]]) -> str:
     verdict = found.verdict
     if verdict.word in WORDS and not causes:
         return WORDS[verdict.word]
-    named = " and ".join(f"{one['effect']} ({one['scope'] or 'everywhere'})" for one in causes)
+    *most, last = [f"{one['effect']} ({one['scope'] or 'everywhere'})" for one in causes]
+    named = f"{', '.join(most)} and {last}" if most else last
     if verdict.word == "inseparable":
         groups = "; ".join(" or ".join(group) for group in verdict.inseparable)
         return f"The gap looks like {named}, but this log cannot tell apart: {groups}."
-    return f"The gap is caused by {named}, which explains {verdict.explained:.0%} of it on held-out data."
+    explain = "which together explain" if most else "which explains"
+    return f"The gap is caused by {named}, {explain} {verdict.explained:.0%} of it on held-out data."
 
 
 def _replays(found: Findings, before: np.ndarray, after: np.ndarray) -> list[dict[str, Any]]:

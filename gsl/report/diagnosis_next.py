@@ -9,6 +9,8 @@ from typing import NamedTuple
 from gsl.report.diagnosis_verdict import verdict
 from gsl.report.diagnosis_words import Document, entries, listed, name, part
 
+NOTHING = "no effect"  # as a document has it, beside an effect that the log cannot show
+
 
 class Step(NamedTuple):
     """Something to do.
@@ -76,8 +78,16 @@ def _experiment(document: Document) -> list[Step]:
     wanted = part(document, "next_experiment")
     if not wanted:
         return []
-    pairs = [listed([name(effect) for effect in pair], "from") for pair in wanted.get("separates") or []]
-    aim = f" to tell {listed(pairs)}" if pairs else ""
+    groups = wanted.get("separates") or []
+    pairs = [listed([name(effect) for effect in group], "from") for group in groups if NOTHING not in group]
+    unseen = [name(effect) for group in groups if NOTHING in group for effect in group if effect != NOTHING]
+    aim = (
+        f" to tell {listed(pairs)}"
+        if pairs
+        else f" to see {listed(unseen)}, which this log cannot show"
+        if unseen
+        else ""
+    )
     play = f"Play {wanted.get('excitation') or 'the next experiment'} on the robot{aim}"
     file, more = wanted.get("file"), str(wanted.get("why") or "")
     if not file:
