@@ -13,10 +13,11 @@ from gsl.core.plant import Plant, nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.candidates import library
-from gsl.diagnosis.diagnose import Findings, Options, diagnosed
+from gsl.diagnosis.diagnose import Findings, diagnosed
 from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.noise_floor import noise_floor
+from gsl.diagnosis.options import Options
 from gsl.diagnosis.records import records
 from gsl.diagnosis.world_file import diagnosed_effects
 from gsl.effects.effect import applied, built

@@ -13,10 +13,13 @@ from gsl.blind.baselines import BASELINES
 from gsl.core.body import Robot, lumped
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.diagnose import Options, arena_of, calibrated_on, diagnosed
+from gsl.diagnosis.arena import arena_of
+from gsl.diagnosis.diagnose import diagnosed
 from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.nuisance import calibrated
+from gsl.diagnosis.options import Options
+from gsl.diagnosis.reference import calibrated_on
 from gsl.effects.effect import applied, built
 
 BULKY = ("replays", "horizon", "sides", "next_experiment", "policies")  # parts of a document that no mark asks for

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,63 +11,24 @@ from gsl.core.body import Robot
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis import nuisance
-from gsl.diagnosis.attribute import Arena, Hypothesis, scopes_of
-from gsl.diagnosis.candidates import library
+from gsl.diagnosis.arena import LATENCY, arena_of, looked_at
+from gsl.diagnosis.attribute import Arena, Hypothesis
 from gsl.diagnosis.experiment import Experiment, experiment, fitting_step
 from gsl.diagnosis.on_ground import Walking, restart_error
+from gsl.diagnosis.options import Options
+from gsl.diagnosis.reference import Baseline, calibrated_on, clock_shift
 from gsl.diagnosis.refuted import refuted
-from gsl.diagnosis.replay import Effects, Simulator
+from gsl.diagnosis.replay import Simulator
 from gsl.diagnosis.select import Selection, Thresholds, selected
 from gsl.diagnosis.self_test import Trial, duels, null_gains
-from gsl.diagnosis.staircase import staircase
-from gsl.diagnosis.transient import transient
 from gsl.diagnosis.verdict import Verdict, judged
-from gsl.effects.effect import applied, built, effect_class, names
+from gsl.effects.effect import applied, built
 
 NOISE_COST = 0.96  # robust cost of a residual that is noise and nothing else
 GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best gain of chance it has to be
 RIVALS = 3  # hypotheses that duel, at most
 ON_FOOT = 0.1  # share of the cost that chance gains on the ground, where no log can be simulated: measured on walks
 RESTARTS = 40  # windows that measure what a log does not show of a walk
-LATENCY, SHIFTS = "command_latency", (0.002, 0.02, 0.05)  # and where a fit of two clocks' shift starts [s]
-PUSH, STEPS = "external_push", "quantisation"
-ON_GROUND = ("contact",)  # kinds of effects that a robot in the air cannot show
-
-
-@dataclass(frozen=True)
-class Options:
-    """How a diagnosis works.
-
-    Attributes:
-        without: Effects that are not candidates.
-        most: Effects at once.
-        duels: Simulated logs for each surviving cause; 0 tests nothing.
-        nulls: Simulated logs without an effect.
-        threads: That replay side by side.
-        clocks: Whether commands and measurements have one clock; else latency is not claimed.
-    """
-
-    without: tuple[str, ...] = ()
-    most: int = 4
-    duels: int = 2
-    nulls: int = 3
-    threads: int = 2
-    clocks: bool = True
-
-
-@dataclass(frozen=True)
-class Baseline:
-    """The nominal as a reference log has it.
-
-    Attributes:
-        effects: Which the reference shows already.
-        nuisances: Shape (6, n_joints).
-        error: What is left of the model's error [rad], shape (n_joints,).
-    """
-
-    effects: Effects
-    nuisances: np.ndarray
-    error: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -176,68 +136,6 @@ def _upheld(
             return selection, wrong
         wrong |= reasons
         arena = replace(arena, library=tuple(one for one in arena.library if one.effect not in wrong))
-
-
-class Looks(NamedTuple):
-    """What a look at the log finds of effects that no search over their range would.
-
-    Attributes:
-        known: Parameters by effect that are fixed from now on.
-        starts: Values by effect from which a fit begins as well.
-    """
-
-    known: Mapping[str, Mapping[str, float]]
-    starts: Mapping[str, float]
-
-
-def looked_at(found: Experiment, left: np.ndarray) -> Looks:
-    """Look for pushes and staircases in the residuals of all windows, shape (W, scored, n_channels)."""
-    moment = transient(found, left)
-    return Looks({PUSH: moment._asdict()} if moment else {}, {} if found.walking else {STEPS: staircase(found, left)})
-
-
-def arena_of(
-    found: Experiment,
-    plant: Plant,
-    step: float,
-    options: Options,
-    tick: Callable[[str], None],
-    looks: Looks | None = None,
-) -> Arena:
-    """Return where hypotheses on a log compete, a push among them only if a look found one."""
-    simulator = found.simulator(plant, step, options.threads)
-    contact = () if found.walking else ON_GROUND
-    hidden = [name for name in names() if getattr(effect_class(name), "kind", "") in contact]
-    hidden += [] if options.clocks else [LATENCY]
-    shaking = bool(found.comparison.shaking.any())
-    looks = looks or Looks({}, {})
-    hidden += [] if PUSH in looks.known else [PUSH]
-    candidates = library(
-        plant.robot, (*options.without, *hidden), looks.known, looks.starts, dense=shaking, floating=found.walking
-    )
-    scopes = scopes_of({} if found.walking else found.robot.groups, found.channels, apart=not found.walking)
-    return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick)
-
-
-def clock_shift(found: Experiment, plant: Plant, step: float, options: Options, tick: Callable[[str], None]) -> float:
-    """Return by how much measurements lag behind commands [s], as far as a pure shift explains it."""
-    arena = arena_of(found, plant, step, replace(options, clocks=True, without=()), tick)
-    candidate = next(one for one in arena.library if one.effect == LATENCY)
-    still = nuisance.none(arena.train.joints)
-    fits = [arena.fitted((candidate,), np.array([start]), still) for start in SHIFTS]
-    return float(min(fits, key=lambda one: one.cost).parameters[0][0])
-
-
-def calibrated_on(
-    reference: Batch, robot: Robot, plant: Plant, step: float, options: Options, tick: Callable[[str], None]
-) -> Baseline:
-    """Fit the nominal to a log without the effect: whatever is found there belongs to the nominal from now on."""
-    found = experiment(reference, robot)
-    arena = arena_of(found, plant, step, replace(options, without=()), tick)
-    chosen = selected(arena, Thresholds(), most=options.most, width=1).chosen
-    z = arena.held_out.residual(chosen.effects, chosen.fit.nuisances)
-    left = np.sqrt(np.maximum(0.0, np.mean(np.minimum(z**2, 25.0), axis=(0, 1)) - 1.0))
-    return Baseline(chosen.effects, chosen.fit.nuisances, left * found.comparison.floor)
 
 
 def _survivors(found: Selection) -> list[Hypothesis]:

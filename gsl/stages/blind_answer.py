@@ -15,7 +15,7 @@ from gsl.blind.answer import Question, answered, answered_by_baselines
 from gsl.blind.seals import VERSION, files_below, total
 from gsl.core.setting import component, setting
 from gsl.core.validation import make
-from gsl.diagnosis.diagnose import Options
+from gsl.diagnosis.options import Options
 from gsl.stages.blind_files import (
     ANSWERS,
     BASELINES,

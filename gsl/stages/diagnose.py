@@ -15,8 +15,9 @@ from gsl.core.described import described
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.diagnose import Findings, Options, diagnosed
+from gsl.diagnosis.diagnose import Findings, diagnosed
 from gsl.diagnosis.document import document
+from gsl.diagnosis.options import Options
 from gsl.diagnosis.verify import in_bullet
 from gsl.diagnosis.world_file import diagnosed_effects, joined
 from gsl.report.diagnosis import report_html

@@ -1,0 +1,26 @@
+"""How a diagnosis works."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a diagnosis works.
+
+    Attributes:
+        without: Effects that are not candidates.
+        most: Effects at once.
+        duels: Simulated logs for each surviving cause; 0 tests nothing.
+        nulls: Simulated logs without an effect.
+        threads: That replay side by side.
+        clocks: Whether commands and measurements have one clock; else latency is not claimed.
+    """
+
+    without: tuple[str, ...] = ()
+    most: int = 4
+    duels: int = 2
+    nulls: int = 3
+    threads: int = 2
+    clocks: bool = True
