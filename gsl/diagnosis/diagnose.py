@@ -28,6 +28,7 @@ NOISE_COST = 0.96  # robust cost of a residual that is noise and nothing else
 GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best gain of chance it has to be
 RIVALS = 3  # hypotheses that duel, at most
 ON_FOOT = 0.1  # share of the cost that chance gains on the ground, where no log can be simulated: measured on walks
+SHAKING = 0.1  # the same of joints that shake: their phase is chance
 RESTARTS = 40  # windows that measure what a log does not show of a walk
 
 
@@ -113,15 +114,22 @@ def diagnosed(
     if options.nulls and not nulls and not walking:
         tick("self-test: what chance gains on these commands")
         nulls = tuple(null_gains(found, arena, none, options.nulls, tick))
-    chance = ON_FOOT if walking else 0.0
+    chance = ON_FOOT if walking else SHAKING * _shaking(found)
     thresholds = Thresholds(gain=max(GAIN, CHANCE * max(nulls, default=0.0)), share=chance)
     tick("trying the library on the log")
     selection, wrong = _upheld(found, arena, none, thresholds, options)
     survivors = _survivors(selection)
     tick("self-test: can the causes that are left be told apart")
     trials = tuple(duels(found, arena, survivors, options.duels, tick)) if options.duels and not walking else ()
-    verdict = judged(selection, _expected(selection, trials) * (1.0 + found.noise.slack), _margins(trials, survivors))
+    expected = _expected(selection, trials) * (1.0 + found.noise.slack)
+    verdict = judged(selection, expected, _margins(trials, survivors), chance)
     return Findings(found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong)
+
+
+def _shaking(found: Experiment) -> float:
+    """Return the share of the residuals that are of joints that shake."""
+    used = found.comparison.used(found.pieces.real.shape[1] - found.pieces.warm_up)
+    return float(used[found.comparison.shaking].sum() / used.sum())
 
 
 def _upheld(

@@ -73,10 +73,11 @@ class Experiment:
         return (*self.joints, *BASE) if self.walking else self.joints
 
     def simulator(self, plant: Plant, step: float, threads: int) -> Simulator:
-        """Return what replays the log's commands in a plant."""
+        """Return what replays the log's commands in a plant, in steps of half the size where joints shake."""
         if self.walking:
             return Walking(plant, fitting_step(step, self.period), self.period, workers=threads)
-        return InTheAir(plant, fitting_step(step, self.period), self.period, threads)
+        fine = 0.5 if self.comparison.shaking.any() else 1.0
+        return InTheAir(plant, fitting_step(fine * step, self.period), self.period, threads)
 
     def bench(self, simulator: Simulator, part: str) -> Bench:
         """Return the windows of a part, `train` (thinned), `held_out` or `all`, with a simulator."""

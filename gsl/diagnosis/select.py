@@ -14,6 +14,7 @@ LEAST_SHARE = 0.2  # of what is left, that a further effect has to explain
 MINOR = 0.005  # of what is explained already: less is no cause but a flaw of the model
 MUCH = 1.1  # cost of a residual that leaves room for more than a small further effect
 NOTHING = 1.0  # cost of a residual that leaves room for none: that of noise is .96
+FLAW = 0.005  # of the cost of calibration, that a simulator's own flaws (its time step, say) let any effect gain
 HIDDEN = 1.5  # cost of a nuisance, on average, beyond which a calibration hides a cause
 PAIRS = 5  # leads that are fitted beside an effect that stands already
 
@@ -70,7 +71,7 @@ def selected(
     none = none or arena.calibration()
     singles, screening = arena.successors(none)
     tried, chosen = [none, *singles], none
-    if singles and _stands(singles[0], none, max(thresholds.gain, thresholds.share * none.cost)):
+    if singles and _begins(singles[0], none, max(thresholds.gain, thresholds.share * none.cost)):
         chosen = singles[0]
         beam = _distinct(singles, width)
         while len(chosen.candidates) < most and _lacking(arena, chosen, NOTHING):
@@ -84,6 +85,14 @@ def selected(
                 break
         chosen = _polished(arena, _pruned(arena, chosen, thresholds, tried), tried)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
+
+
+def _begins(one: Hypothesis, none: Hypothesis, least: float) -> bool:
+    """Whether a first effect gains enough, be it on the residuals, flaws apart, or by freeing the nuisances."""
+    freed = nuisance.cost(none.fit.nuisances) - nuisance.cost(one.fit.nuisances)
+    on_residuals = float(none.costs.sum() - one.costs.sum())
+    beyond = freed + (max(0.0, on_residuals - FLAW * none.cost) if on_residuals > 0.0 else on_residuals)
+    return _stands(one, none, least) and beyond > least
 
 
 def _stands(one: Hypothesis, other: Hypothesis, least: float) -> bool:

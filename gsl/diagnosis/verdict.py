@@ -59,13 +59,16 @@ class Verdict:
     known: float
 
 
-def judged(found: Selection, expected: float, margins: Sequence[tuple[str, float]] = ()) -> Verdict:
+def judged(
+    found: Selection, expected: float, margins: Sequence[tuple[str, float]] = (), chance: float = 0.0
+) -> Verdict:
     """Judge a selection.
 
     Args:
         found: What attribution came to.
         expected: Cost of a residual where only noise is left.
         margins: Spread of the difference of costs to a rival, by the rival's effect, as a self-test measured it.
+        chance: Share of a cost by which it may differ without a cause.
     """
     chosen, none = found.chosen, found.none
     least = expected * float(none.counts.sum())
@@ -76,7 +79,7 @@ def judged(found: Selection, expected: float, margins: Sequence[tuple[str, float
     if not chosen.candidates:
         return Verdict("unknown" if strange > 1.0 else "no_gap", (), (), 0.0, remaining, 1.0)
     spreads = dict(margins)
-    causes = tuple(_cause(found, k, excess, spreads) for k in range(len(chosen.candidates)))
+    causes = tuple(_cause(found, k, excess, spreads, chance) for k in range(len(chosen.candidates)))
     known = _known(explained, float(strange))
     groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in ALIKE if twins & set(chosen.names)]
     for cause in causes:
@@ -95,7 +98,7 @@ def _known(explained: float, strange: float) -> float:
     return float(1.0 / (1.0 + np.exp(min(missing, unexplained) / KNOWN_SOFT)))
 
 
-def _cause(found: Selection, k: int, excess: float, spreads: dict[str, float]) -> Cause:
+def _cause(found: Selection, k: int, excess: float, spreads: dict[str, float], chance: float) -> Cause:
     chosen, effect = found.chosen, found.chosen.names[k]
     rivals = [one for one in found.tried if len(one.candidates) <= len(chosen.candidates) and effect not in one.names]
     fewer = min((one for one in rivals if len(one.candidates) < len(chosen.candidates)), key=_cost, default=found.none)
@@ -105,14 +108,16 @@ def _cause(found: Selection, k: int, excess: float, spreads: dict[str, float]) -
     if best is None:
         return Cause(k, 0.99, None, value, low, high)
     other = next((name for name in best.names if name not in chosen.names), best.names[-1])
-    return Cause(k, _ahead(best, chosen, spreads.get(other)), other, value, low, high)
+    return Cause(
+        k, _ahead(best, chosen, max(spreads.get(other, 0.0), 0.5 * chance * chosen.cost)), other, value, low, high
+    )
 
 
-def _ahead(rival: Hypothesis, chosen: Hypothesis, spread: float | None) -> float:
+def _ahead(rival: Hypothesis, chosen: Hypothesis, spread: float) -> float:
     """Return the probability that the chosen one is the truth and not its rival, from how much less it costs."""
     margin = rival.cost - chosen.cost
     over_records = gain(chosen, rival)
-    noise = max(BLUNT, spread or 0.0, COARSE * abs(found_cost(rival) - found_cost(chosen)))
+    noise = max(BLUNT, spread, COARSE * abs(found_cost(rival) - found_cost(chosen)))
     wide = max(noise, (over_records.high - over_records.low) / 4.0 * 0.5)
     return float(np.clip(1.0 / (1.0 + np.exp(-2.0 * margin / wide)), 0.01, 0.99))
 
