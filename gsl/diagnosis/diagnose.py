@@ -159,7 +159,8 @@ def diagnosed(
     survivors = _survivors(selection)
     tick("self-test: can the causes that are left be told apart")
     trials = tuple(duels(found, arena, survivors, options.duels, tick)) if options.duels and not walking else ()
-    verdict = judged(selection, _expected(selection, trials) * (1.0 + found.noise.slack), _margins(trials, survivors))
+    expected, margins = _expected(selection, trials) * (1.0 + found.noise.slack), _margins(trials, survivors)
+    verdict = judged(selection, expected, margins, walking=walking)
     return Findings(found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong)
 
 

@@ -58,13 +58,16 @@ class Verdict:
     known: float
 
 
-def judged(found: Selection, expected: float, margins: Sequence[tuple[str, float]] = ()) -> Verdict:
+def judged(
+    found: Selection, expected: float, margins: Sequence[tuple[str, float]] = (), *, walking: bool = False
+) -> Verdict:
     """Judge a selection.
 
     Args:
         found: What attribution came to.
         expected: Cost of a residual where only noise is left.
         margins: Spread of the difference of costs to a rival, by the rival's effect, as a self-test measured it.
+        walking: Whether the robot is on the ground, where the base tells what is alike in the air.
     """
     chosen, none = found.chosen, found.none
     least = expected * float(none.counts.sum())
@@ -76,7 +79,8 @@ def judged(found: Selection, expected: float, margins: Sequence[tuple[str, float
     spreads = dict(margins)
     causes = tuple(_cause(found, k, excess, spreads) for k in range(len(chosen.candidates)))
     known = _known(explained, remaining)
-    groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in ALIKE if twins & set(chosen.names)]
+    alike = () if walking else ALIKE
+    groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in alike if twins & set(chosen.names)]
     for cause in causes:
         if cause.rival is not None and cause.probability < SEPARATED:
             groups.append((chosen.names[cause.index], cause.rival))
