@@ -62,11 +62,11 @@ def _all_replayed(plant: Plant, physics: Physics, windows: OnGround) -> np.ndarr
 def _replayed(engine: Engine, window: OnGround, joints: int) -> np.ndarray:
     """Return what one window leads to, shape (T, n_channels); the fields of `window` are without their first axis."""
     length = len(window.commands) - COMMANDS + 1
-    base, robot = window.base, lumped(engine.plant.robot)
+    base, robot, motion = window.base, lumped(engine.plant.robot), _moving(engine.plant, window.motion)
     place, turn = base[:3].copy(), Rotation.from_quat(base[6:10])
-    place[2] = -_sunk(engine.plant) - lowest_point(robot, window.motion[0], turn.as_matrix())
+    place[2] = -_sunk(engine.plant) - lowest_point(robot, motion[0], turn.as_matrix())
     lifted = base[2] - place[2]  # where the log's ground is
-    start = Reading(window.motion, place, tuple(base[6:10].tolist()), base[10:13], base[13:16], 1.0, ())
+    start = Reading(motion, place, tuple(base[6:10].tolist()), base[10:13], base[13:16], 1.0, ())
     engine.load(start, window.commands[length:], float(window.clock))
     told, yaw = [], float(base[5])
     for t in range(length):
@@ -77,6 +77,15 @@ def _replayed(engine: Engine, window: OnGround, joints: int) -> np.ndarray:
         sensed = engine.encoders(reading)[0, :joints] + engine.plant.sensors.bias[:joints]
         told.append(np.r_[sensed, reading.place + [0.0, 0.0, lifted], angles[:2], yaw])
     return np.array(told)
+
+
+def _moving(plant: Plant, measured: np.ndarray) -> np.ndarray:
+    """Return how the joints move at the beginning of a window, shape (2, n_motors), where encoders tell `measured`.
+
+    In the air a warm-up forgets a wrong start; on the ground the robot stands on it.
+    """
+    late = plant.servo.sensor_delay * measured[1]
+    return np.array([measured[0] - plant.sensors.bias + late, measured[1]])
 
 
 def _sunk(plant: Plant) -> float:
