@@ -14,7 +14,7 @@ from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Arena, Hypothesis, scopes_of
 from gsl.diagnosis.candidates import library
 from gsl.diagnosis.experiment import Experiment, experiment, fitting_step
-from gsl.diagnosis.on_ground import Walking, restart_error
+from gsl.diagnosis.on_ground import Walking, jitter_error, restart_error
 from gsl.diagnosis.refuted import refuted
 from gsl.diagnosis.replay import Effects, Simulator
 from gsl.diagnosis.select import Selection, Thresholds, selected
@@ -132,7 +132,8 @@ def diagnosed(
     if walking:
         simulator = Walking(plant, fitting_step(step, found.period), found.period, workers=options.threads)
         spread = found.pieces.chosen(np.arange(0, len(found.pieces), max(1, len(found.pieces) // RESTARTS)))
-        found = found.with_model_error(restart_error(simulator, spread))
+        unknown = np.hypot(restart_error(simulator, spread), jitter_error(simulator, spread, np.random.default_rng(0)))
+        found = found.with_model_error(unknown)
     baseline, shift = None, 0.0
     if reference is not None:
         tick("calibrating the simulator on the reference")
