@@ -15,6 +15,7 @@ from gsl.blind.mix import STRONG, Slot
 from gsl.blind.strength import WORST, turned_up
 from gsl.blind.walks import Individual, Walks
 from gsl.core.body import lumped
+from gsl.core.trajectory import Batch
 from gsl.diagnosis.experiment import experiment, fitting_step
 from gsl.diagnosis.on_ground import Walking, restart_error
 from gsl.diagnosis.records import BASE, Pieces
@@ -22,6 +23,7 @@ from gsl.errors import GslError
 from gsl.worlds.bullet import BulletWorld
 
 BANDS = {STRONG: (4.0, 20.0)}  # [floors]; lower than in the air, for windows are a third as long
+SHOWN = 0.5  # least share of its own gap that an effect takes away
 WALKED, WINDOWS = 4, 40  # nominal walks that gaps are measured on, and windows of them
 
 
@@ -52,8 +54,7 @@ class Yardstick:
         log = replace(walks, episodes=WALKED).logged(sim, None, {}, noise, rng)
         found = experiment(log, lumped(sim.plant.robot), walking=True)
         simulator = Walking(sim.plant, fitting_step(sim.step, sim.period), sim.period)
-        spread = np.linspace(0, len(found.pieces) - 1, min(WINDOWS, len(found.pieces))).round().astype(int)
-        pieces = found.pieces.chosen(np.unique(spread))
+        pieces = _some(found.pieces)
         floor = found.with_model_error(restart_error(simulator, pieces)).comparison.floor
         return cls(simulator, pieces, floor, simulator.told({}, np.zeros(0), pieces))
 
@@ -62,16 +63,36 @@ class Yardstick:
 
         An effect with a scope acts on the joints, any other on the base.
         """
-        channels = np.arange(len(self.floor)) < len(self.floor) - len(BASE)
-        chosen = channels if "joints" in dial.fixed else ~channels
 
         def gap(share: float) -> float:
             told = self.simulator.told({dial.effect: dial.entry(share)}, np.zeros(0), self.pieces)
-            moved = (told - self.without)[:, self.pieces.warm_up :] / self.floor
-            z = np.clip(np.nan_to_num(moved, nan=WORST), -WORST, WORST)
-            return float(np.sqrt(1.0 + np.median(np.mean(z[..., chosen] ** 2, axis=(1, 2)))))
+            return float(np.sqrt(1.0 + self._square(told - self.without, dial)))
 
         return gap
+
+    def shown(self, dial: Dial, share: float, log: Batch) -> float:
+        """Return the share of the gap that replays with the effect take away from a log of the nominal robot with it.
+
+        A window begins with what a log tells of a state, and not with what springs, gears and delays hold: an effect
+        can move a robot from there and yet not be what a replay of it shows.
+        """
+        pieces = _some(experiment(log, lumped(self.simulator.plant.robot), walking=True).pieces)
+        left = [
+            self._square(self.simulator.told(effects, np.zeros(0), pieces) - pieces.real, dial)
+            for effects in ({dial.effect: dial.entry(share)}, {})
+        ]
+        return 1.0 - left[0] / left[1]
+
+    def _square(self, error: np.ndarray, dial: Dial) -> float:
+        """Return the median over windows of the mean square in floors, over what an effect acts on."""
+        joints = np.arange(len(self.floor)) < len(self.floor) - len(BASE)
+        z = np.clip(np.nan_to_num(error[:, self.pieces.warm_up :] / self.floor, nan=WORST), -WORST, WORST)
+        return float(np.median(np.mean(z[..., joints if "joints" in dial.fixed else ~joints] ** 2, axis=(1, 2))))
+
+
+def _some(pieces: Pieces) -> Pieces:
+    spread = np.linspace(0, len(pieces) - 1, min(WINDOWS, len(pieces))).round().astype(int)
+    return pieces.chosen(np.unique(spread))
 
 
 @dataclass(frozen=True)
@@ -89,8 +110,8 @@ class Track:
     def case(self, name: str, slot: Slot, rng: np.random.Generator) -> Case:
         """Make one case.
 
-        The effect whose turn it is comes first; then all others in random order, until one reaches the strength and
-        leaves the robot on its feet.
+        The effect whose turn it is comes first; then all others in random order, until one reaches the strength,
+        leaves the robot on its feet, and is to be seen.
 
         Args:
             name: Of the case.
@@ -110,6 +131,9 @@ class Track:
                 if found is None:
                     continue
                 effects = {effect: dial.entry(found[0])}
+                nominal = replace(self.walks, episodes=WALKED).logged(self.sim, None, effects, noise, rng)
+                if yardstick.shown(dial, found[0], nominal) < SHOWN:
+                    continue
                 log = self.walks.logged(self.sim, individual, effects, noise, rng)
                 if self.walks.on_foot(log) >= self.walks.still:
                     neutral = {effect: dial.neutral}

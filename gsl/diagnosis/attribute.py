@@ -7,7 +7,7 @@ against smaller ones on windows that no fit has seen, nuisances refitted for eac
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -73,6 +73,7 @@ class Arena:
         library: The candidates.
         scopes: Names of scopes and their joints, each of shape (n_joints,).
         tick: Called with a phase when it begins, and with an empty word whenever some work is done.
+        scouts: Training windows that a screening looks at, spread over all of them; None for all.
     """
 
     train: Bench
@@ -80,6 +81,16 @@ class Arena:
     library: tuple[Candidate, ...]
     scopes: Mapping[str, np.ndarray]
     tick: Callable[[str], None]
+    scouts: int | None = None
+
+    @property
+    def scout(self) -> Bench:
+        """The windows of a screening."""
+        count = len(self.train.pieces)
+        if self.scouts is None or self.scouts >= count:
+            return self.train
+        spread = np.linspace(0, count - 1, self.scouts).round().astype(int)
+        return replace(self.train, pieces=self.train.pieces.chosen(spread))
 
     def calibration(self) -> Hypothesis:
         """Return the hypothesis without an effect."""
@@ -118,9 +129,9 @@ class Arena:
 
     def ground(self, base: Hypothesis) -> Ground:
         """Return where a screening on top of a hypothesis starts: without its nuisances, which hide what is missing."""
-        at, effects = nuisance.none(self.train.joints), base.effects
-        z = self.train.residual(effects, at)
-        slopes = sensitivities(self.train, effects, at, z)
+        at, effects, bench = nuisance.none(self.train.joints), base.effects, self.scout
+        z = bench.residual(effects, at)
+        slopes = sensitivities(bench, effects, at, z)
         best, costs = projected(z, slopes, at)
         return Ground(effects, at, z, slopes, costs, best)
 
@@ -129,13 +140,12 @@ class Arena:
         ground = self.ground(base)
         used = {(candidate.effect, candidate.scope) for candidate in base.candidates}
         local = [one.on(joint) for joint in self._dominant(ground) for one in self.library if one.on_joints]
-        screening = screened(self.train, ground, (*self.library, *local), self.scopes, self.tick)
+        screening = screened(self.scout, ground, (*self.library, *local), self.scopes, self.tick)
+        slopes = ground.slopes if self.scouts is None else None
         leads = [lead for lead in screening.leads if (lead.candidate.effect, lead.candidate.scope) not in used]
         start = np.concatenate([np.zeros(0), *base.parameters])
         found = [
-            self.fitted(
-                (*base.candidates, lead.candidate), np.r_[start, lead.parameters], lead.nuisances, ground.slopes
-            )
+            self.fitted((*base.candidates, lead.candidate), np.r_[start, lead.parameters], lead.nuisances, slopes)
             for lead in best_of(leads, width)
         ]
         return sorted(found, key=lambda one: one.cost), screening

@@ -27,6 +27,7 @@ NOISE_COST = 0.96  # robust cost of a residual that is noise and nothing else
 GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best gain of chance it has to be
 RIVALS = 3  # hypotheses that duel, at most
 ON_FOOT = 0.1  # share of the cost that chance gains on the ground, where no log can be simulated: measured on walks
+SCOUTS = 8  # windows of a walk that a screening looks at: a replay in Bullet takes milliseconds
 RESTARTS = 40  # windows that measure what a log does not show of a walk
 LATENCY, SHIFTS = "command_latency", (0.002, 0.02, 0.05)  # and where a fit of two clocks' shift starts [s]
 PUSH = "external_push"
@@ -197,7 +198,8 @@ def arena_of(
     known = {PUSH: moment._asdict()} if moment else {}
     candidates = library(found.robot, (*options.without, *hidden), known, dense=shaking, floating=found.walking)
     scopes = scopes_of({} if found.walking else found.robot.groups, found.channels, apart=not found.walking)
-    return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick)
+    scouts = SCOUTS if found.walking else None
+    return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick, scouts)
 
 
 def clock_shift(found: Experiment, plant: Plant, step: float, options: Options, tick: Callable[[str], None]) -> float:

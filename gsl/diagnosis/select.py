@@ -21,7 +21,7 @@ class Thresholds:
     Attributes:
         gain: Of a first effect over calibration alone.
         further: Of a further effect.
-        share: Of the cost of what stands, that any effect has to explain.
+        share: Of the cost of what stands, that any effect has to explain; noise holds no such share, and is let be.
     """
 
     gain: float = 20.0
@@ -64,9 +64,9 @@ def selected(arena: Arena, thresholds: Thresholds, none: Hypothesis | None = Non
     singles, screening = arena.successors(none)
     tried, chosen = [none, *singles], none
     if singles and _stands(singles[0], none, max(thresholds.gain, thresholds.share * none.cost)):
-        chosen = singles[0]
+        chosen = _polished(arena, singles[0], tried) if thresholds.share else singles[0]
         beam = _distinct(singles)[: BEAM if _lacking(chosen) else 1]
-        while len(chosen.candidates) < most:
+        while len(chosen.candidates) < most and (_lacking(chosen) or not thresholds.share):
             found = [one for base in beam for one in arena.successors(base, PAIRS)[0]]
             tried += found
             best = min(found, key=lambda one: one.cost, default=chosen)
