@@ -72,7 +72,12 @@ def answered(
 def answered_by_baselines(
     question: Question, options: Options, tick: Callable[[str], None]
 ) -> dict[str, dict[str, Any]]:
-    """Return what each baseline says, by name; with a reference they get the same calibrated simulator as we do."""
+    """Return what each baseline says, by name; with a reference they get the same calibrated simulator as we do.
+
+    They work in the air: of a robot on the ground they say nothing.
+    """
+    if question.walking:
+        return {}
     plant, step = question.plant, question.step
     found = experiment(question.log, question.robot)
     if question.reference is not None:

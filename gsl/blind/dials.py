@@ -15,6 +15,8 @@ from gsl.core.setting import REQUIRED, Setting, settings_of
 from gsl.effects.effect import effect_class, names
 
 UNSEEN = ("encoder_noise", "action_noise", "external_push")  # besides effects of contact: not for a log in the air
+RANDOM = ("uneven_ground",)  # new in every episode: no replay repeats it
+FRICTION, COMPLIANCE = "ground_friction", "ground_compliance"
 CALIBRATED = ("servo_gain", "coulomb_friction", "zero_offset", "sensor_bias")  # a calibration hides them: no abstention
 GROUPED = 0.3  # share of effects that act on a group only
 
@@ -27,15 +29,19 @@ class Dial:
         effect: Name in the library, or of an extra.
         fixed: What was drawn: scope, link, side, shapes.
         neutral, end: Values of each dialled parameter that do nothing, and the end of its documented range.
+        inverse: Whether a parameter does nothing where it is infinite: its inverse is dialled, its errors are relative.
     """
 
     effect: str
     fixed: Mapping[str, Any]
     neutral: Mapping[str, float]
     end: Mapping[str, float]
+    inverse: bool = False
 
     def entry(self, share: float) -> dict[str, Any]:
         """Return the effect's parameters at a share of its range between 0 and 1."""
+        if self.inverse:
+            return {**self.fixed, **{key: end / share for key, end in self.end.items()}}
         dialled = {key: start + share * (self.end[key] - start) for key, start in self.neutral.items()}
         return {**self.fixed, **dialled}
 
@@ -59,7 +65,12 @@ def visible() -> tuple[str, ...]:
     )
 
 
-def drawn(effect: str, robot: Robot, rng: np.random.Generator, *, alone: bool = False) -> Dial:
+def shown_by_walks() -> tuple[str, ...]:
+    """Return the effects of the library that a walk can show and a replay can repeat."""
+    return tuple(name for name in names() if name not in (*UNSEEN, *RANDOM))
+
+
+def drawn(effect: str, robot: Robot, rng: np.random.Generator, *, alone: bool = False, floating: bool = False) -> Dial:
     """Draw all of an effect of the library but its strength.
 
     Args:
@@ -67,14 +78,15 @@ def drawn(effect: str, robot: Robot, rng: np.random.Generator, *, alone: bool = 
         robot: Where it acts.
         rng: Of everything.
         alone: On a single joint.
+        floating: On the ground, where it acts on all joints, or on the base.
     """
     target: Any = effect_class(effect)
     known, hints = settings_of(target), get_type_hints(target)
     fixed: dict[str, Any] = {}
     if "joints" in known:
-        fixed["joints"] = _scope(robot, rng, alone=alone)
+        fixed["joints"] = "all" if floating else _scope(robot, rng, alone=alone)
     if "link" in known:
-        fixed["link"] = str(rng.choice([joint.child for joint in lumped(robot).joints]))
+        fixed["link"] = robot.base if floating else str(rng.choice([joint.child for joint in lumped(robot).joints]))
     for key, hint in hints.items():
         if get_origin(hint) is Literal:
             fixed[key] = str(rng.choice(get_args(hint)))
@@ -84,6 +96,21 @@ def drawn(effect: str, robot: Robot, rng: np.random.Generator, *, alone: bool = 
     chosen = str(rng.choice(list(dials)))
     ends = _ends(ranges[chosen], dials[chosen])
     return Dial(effect, {**fixed, **shapes}, {chosen: dials[chosen]}, {chosen: float(rng.choice(ends))})
+
+
+def drawn_on_foot(effect: str, plant: Plant, rng: np.random.Generator) -> Dial:
+    """Draw all of an effect but its strength where the robot walks; of the ground, what it is now does nothing."""
+    known = settings_of(effect_class(effect))
+    if effect == FRICTION:
+        now = plant.contact.foot_friction * plant.contact.ground_friction
+        ends = _ends(known["friction"], now)
+        return Dial(effect, {}, {"friction": now}, {"friction": float(rng.choice(ends))})
+    if effect == COMPLIANCE:
+        softest = known["stiffness"].lower
+        assert softest is not None
+        damping = {"damping": _shape(known["damping"], rng)}
+        return Dial(effect, damping, {"stiffness": 0.0}, {"stiffness": softest}, inverse=True)
+    return drawn(effect, plant.robot, rng, floating=True)
 
 
 def drawn_extra(name: str, robot: Robot, rng: np.random.Generator) -> Dial:

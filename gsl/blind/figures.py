@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsl.blind.label import ABSENT, FOREIGN, JOINT, KNOWN, NULL, SAME, SINGLE, TWO, WITHHELD
+from gsl.blind.label import ABSENT, FOREIGN, JOINT, KNOWN, NULL, SAME, SINGLE, TWO, WALK, WITHHELD
 from gsl.blind.mark import LOOSE, Mark
 from gsl.blind.mix import MEDIUM, STRONG, WEAK
 from gsl.core.statistics import quantile_interval, wilson
@@ -106,13 +106,23 @@ _MEDIANS = {
     "shrinkage over the ceiling": _Median(lambda m: () if m.shrinkage is None else (m.shrinkage,), (0.90, 0.75)),
     "wall time [s]": _Median(lambda m: (m.seconds,), None, False),
 }
+_WALK_SHARES = {
+    "walk, strong: top-1": _Share(_kind(WALK), lambda m: m.first, (0.75, 0.75)),
+    "walk, strong: top-2": _Share(_kind(WALK), lambda m: m.second),
+    "walk, strong: abstains wrongly": _Share(_kind(WALK), lambda m: m.abstained, None, False),
+    "walk, strong: misses the gap": _Share(_kind(WALK), lambda m: not m.alarmed, None, False),
+}
+_WALK_MEDIANS = {
+    "walk, strong: error of parameters": _Median(lambda m: m.errors.values(), None, False),
+    "walk: wall time [s]": _Median(lambda m: (m.seconds,), None, False),
+}
 
 
 def figures(marks: Sequence[Mark]) -> list[Figure]:
-    """Return every figure of both generators."""
+    """Return every figure of both generators, those of the cases in the air first: robots that walk count apart."""
     found = []
     for place, generator in enumerate((SAME, FOREIGN)):
-        own = [mark for mark in marks if mark.label.generator == generator]
+        own = [mark for mark in marks if mark.label.generator == generator and mark.label.kind != WALK]
         found += [_share(name, generator, own, rule, place) for name, rule in _SHARES.items()]
         covers = [held for mark in own for held in mark.covered]
         found.append(_of_hits("intervals that hold the parameters", generator, covers))
@@ -120,12 +130,16 @@ def figures(marks: Sequence[Mark]) -> list[Figure]:
         error, count = calibration_error(own)
         threshold = (0.08, 0.12)[place]
         found.append(Figure("calibration error (ECE)", generator, error, None, None, count, threshold, least=False))
+        on_foot = [mark for mark in marks if mark.label.generator == generator and mark.label.kind == WALK]
+        found += [_share(name, generator, on_foot, rule, place) for name, rule in _WALK_SHARES.items()]
+        found += [_median(name, generator, on_foot, rule, place) for name, rule in _WALK_MEDIANS.items()]
     return found
 
 
 def reliability(marks: Sequence[Mark]) -> list[tuple[float, float, int]]:
-    """Return mean probability, share of right first causes and count of equally full bins of what was named."""
-    said = sorted((mark.probability, mark.right) for mark in marks if mark.probability is not None)
+    """Return mean probability, share of right first causes and count of equally full bins, of cases in the air."""
+    counted = [mark for mark in marks if mark.probability is not None and mark.label.kind != WALK]
+    said = sorted((mark.probability, mark.right) for mark in counted)
     parts = [part for part in np.array_split(np.array(said, dtype=float).reshape(-1, 2), BINS) if len(part)]
     return [(float(part[:, 0].mean()), float(part[:, 1].mean()), len(part)) for part in parts]
 
@@ -151,7 +165,8 @@ def truth_of(mark: Mark) -> str:
     """Return what is at work in a case, in words."""
     label = mark.label
     extra = [f"({label.extra['effect']})"] if label.extra else []
-    return " + ".join([*(f"({name})" if label.kind == WITHHELD else name for name in label.effects), *extra]) or NULL
+    named = [f"({name})" if label.kind == WITHHELD else name for name in label.effects]
+    return ("walk: " if label.kind == WALK else "") + (" + ".join([*named, *extra]) or NULL)
 
 
 def _share(name: str, generator: str, marks: Sequence[Mark], rule: _Share, place: int) -> Figure:

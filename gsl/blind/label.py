@@ -8,8 +8,9 @@ from typing import Any
 
 SAME, FOREIGN = "same", "foreign"
 NULL, SINGLE, JOINT, TWO, WITHHELD, ABSENT = "null", "single", "joint", "two", "withheld", "absent"
-KINDS = (NULL, SINGLE, JOINT, TWO, WITHHELD, ABSENT)
-KNOWN = (SINGLE, JOINT, TWO)  # kinds whose causes are in the library
+WALK = "walk"  # one effect, on the ground; all others are in the air
+KINDS = (NULL, SINGLE, JOINT, TWO, WITHHELD, ABSENT, WALK)
+KNOWN = (SINGLE, JOINT, TWO)  # kinds in the air whose causes are in the library
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class Label:
     Attributes:
         case: Its name.
         kind: One of KINDS.
-        generator: `same` (gsl's chain model) or `foreign`.
+        generator: `same` (gsl's chain model, or Bullet on the ground) or `foreign`.
         strength: `none`, `weak`, `medium` or `strong`.
         gap: What the causes alone do, in floors: rms of what they change in the nominal simulator's replay, and noise.
         effects: As a world's `effects:`, one entry each.
@@ -45,7 +46,7 @@ class Label:
     @property
     def truth(self) -> tuple[str, ...]:
         """Names of the effects that are to be found; none if they are not in the library that answers."""
-        return tuple(self.effects) if self.kind in KNOWN else ()
+        return tuple(self.effects) if self.kind in (*KNOWN, WALK) else ()
 
     @property
     def document(self) -> dict[str, Any]:

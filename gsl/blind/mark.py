@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.blind.label import JOINT, KNOWN, TWO, Label
+from gsl.blind.label import JOINT, KNOWN, TWO, WALK, Label
 
 TWINS = {"sensor_bias": "zero_offset"}  # alike by nature in the air
 NO_GAP, UNKNOWN = "no_gap", "unknown"
@@ -70,21 +70,23 @@ class Mark:
 def marked(label: Label, answer: Mapping[str, Any]) -> Mark:
     """Mark an answer: the document of a diagnosis, of which only `verdict` and `causes` have to be there."""
     causes = list(answer["causes"]) if answer["verdict"] not in (NO_GAP, UNKNOWN) else []
-    names = [_plain(one["effect"]) for one in causes]
-    truth = {_plain(name) for name in label.truth}
-    groups = [{_plain(name) for name in group} for group in answer.get("inseparable") or []]
+    twins = {} if label.kind == WALK else TWINS
+    names = [twins.get(one["effect"], one["effect"]) for one in causes]
+    truth = {twins.get(name, name) for name in label.truth}
+    groups = [{twins.get(name, name) for name in group} for group in answer.get("inseparable") or []]
     alike = set().union(*(group for group in groups if len(group) > 1)) if causes else set()
     found = truth & {*names, *alike}
     first = bool(names) and names[0] in truth
-    fits = [_fit(label, cause) for cause in causes if _plain(cause["effect"]) in truth]
+    fits = [_fit(label, cause, twins) for cause in causes if twins.get(cause["effect"], cause["effect"]) in truth]
     measured = [fit for fit in fits if fit is not None]
     return Mark(
         label=label,
         told=names[0] if names else str(answer["verdict"]) if answer["verdict"] in (NO_GAP, UNKNOWN) else UNKNOWN,
         named=tuple(dict.fromkeys([*names, *sorted(alike)])),
-        first=first and not truth & {_plain(name) for group in answer.get("inseparable") or [] for name in group},
+        first=first
+        and not truth & {twins.get(name, name) for group in answer.get("inseparable") or [] for name in group},
         twin=first and not truth & alike,
-        second=bool(truth & {*names[:2], *alike, *(_ranked(answer)[:2] if names else ())}),
+        second=bool(truth & {*names[:2], *alike, *(_ranked(answer, twins)[:2] if names else ())}),
         both=bool(truth) and truth <= set(names),
         one=bool(found),
         joint=_on_joint(label, causes[:1]) if label.kind == JOINT else None,
@@ -94,7 +96,7 @@ def marked(label: Label, answer: Mapping[str, Any]) -> Mark:
         extra=len(set(names) - truth),
         errors={name: error for name, error, _ in measured},
         covered=tuple(covers for _, _, covers in measured if covers is not None),
-        shrinkage=_shrunk(answer.get("shrinkage") or {}) if label.kind in KNOWN else None,
+        shrinkage=_shrunk(answer.get("shrinkage") or {}) if truth else None,
         seconds=float(answer.get("seconds") or 0.0),
     )
 
@@ -104,18 +106,14 @@ def right(mark: Mark) -> bool:
     kind = mark.label.kind
     if kind == TWO:
         return mark.both
-    if kind in KNOWN:
+    if kind in (*KNOWN, WALK):
         return mark.twin and mark.joint is not False
     return not mark.alarmed if kind == "null" else mark.abstained
 
 
-def _plain(name: str) -> str:
-    return TWINS.get(name, name)
-
-
-def _ranked(answer: Mapping[str, Any]) -> list[str]:
+def _ranked(answer: Mapping[str, Any], twins: Mapping[str, str]) -> list[str]:
     """Return the effects of the ranking, each once, the best hypothesis' first."""
-    return list(dict.fromkeys(_plain(name) for one in answer.get("ranking") or [] for name in one["effects"]))
+    return list(dict.fromkeys(twins.get(name, name) for one in answer.get("ranking") or [] for name in one["effects"]))
 
 
 def _joint_of(label: Label) -> str:
@@ -136,12 +134,13 @@ def _shrunk(shrinkage: Mapping[str, Any]) -> float | None:
     return None if share is None or not ceiling or ceiling <= 0.0 else float(share / ceiling)
 
 
-def _fit(label: Label, cause: Mapping[str, Any]) -> tuple[str, float, bool | None] | None:
+def _fit(label: Label, cause: Mapping[str, Any], twins: Mapping[str, str]) -> tuple[str, float, bool | None] | None:
     """Return effect, relative error and whether the intervals hold; None where another link or side was named.
 
     The error is that of the way from doing nothing: of a gain of 0.7 that is told as 0.75 it is 17 %.
     """
-    name = next(one for one in label.effects if _plain(one) == _plain(cause["effect"]))
+    called = twins.get(cause["effect"], cause["effect"])
+    name = next(one for one in label.effects if twins.get(one, one) == called)
     entry, neutral = label.effects[name], label.neutral.get(name, {})
     fixed = cause.get("fixed") or {}
     if any(entry.get(key) != value for key, value in fixed.items() if key in ("link", "side")):
@@ -153,7 +152,7 @@ def _fit(label: Label, cause: Mapping[str, Any]) -> tuple[str, float, bool | Non
     off = np.array([told.get(key, fixed.get(key, start)) - entry[key] for key, start in neutral.items()])
     if not way.any():
         return None
-    return _plain(name), float(np.linalg.norm(off) / np.linalg.norm(way)), _covers(cause, list(neutral), entry)
+    return called, float(np.linalg.norm(off) / np.linalg.norm(way)), _covers(cause, list(neutral), entry)
 
 
 def _covers(cause: Mapping[str, Any], keys: Sequence[str], entry: Mapping[str, Any]) -> bool | None:

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from gsl.blind.label import ABSENT, FOREIGN, JOINT, NULL, SAME, SINGLE, TWO, WITHHELD
+from gsl.blind.label import ABSENT, FOREIGN, JOINT, NULL, SAME, SINGLE, TWO, WALK, WITHHELD
 from gsl.core.setting import component, setting
 
 WEAK, MEDIUM, STRONG = "weak", "medium", "strong"
@@ -29,12 +29,12 @@ class Mix:
     two: Annotated[int, setting("two effects", ge=0)] = 24
     withheld: Annotated[int, setting("an effect that is taken out of the answering library", ge=0)] = 20
     absent: Annotated[int, setting("an effect that the library never had", ge=0)] = 20
-    walking: Annotated[int, setting("robots that walk; not made yet", ge=0, le=0)] = 0
     foreign: Annotated[int, setting("of all these, those of the foreign generator, with a reference log", ge=0)] = 60
+    walk: Annotated[int, setting("robots that walk, beside all these whatever `cases` is", ge=0)] = 0
 
     @property
     def kinds(self) -> dict[str, int]:
-        """Shares by kind."""
+        """Shares by kind, of the cases in the air."""
         shares = {kind: getattr(self, kind) for kind in (SINGLE, JOINT, TWO, WITHHELD, ABSENT)}
         return {NULL: self.no_cause, **shares}
 
@@ -61,7 +61,7 @@ class Slot(NamedTuple):
 
 
 def slots(mix: Mix, cases: int, programmes: int, rng: np.random.Generator) -> list[Slot]:
-    """Return the slots of a benchmark in random order, the foreign ones spread evenly over kinds and strengths."""
+    """Return the slots in the air in random order, the foreign ones spread evenly over kinds and strengths."""
     wanted = [(kind, turn) for kind, count in apportioned(mix.kinds, cases).items() for turn in range(count)]
     share = mix.foreign / sum(mix.kinds.values())
     found: list[Slot] = []
@@ -74,6 +74,12 @@ def slots(mix: Mix, cases: int, programmes: int, rng: np.random.Generator) -> li
         found.append(Slot(kind, generator, strength, first + turn // len(strengths), 0))
     order = rng.permutation(len(found))
     return [found[k]._replace(programme=place % programmes) for place, k in enumerate(order)]
+
+
+def walk_slots(mix: Mix, rng: np.random.Generator) -> list[Slot]:
+    """Return the slots of the robots that walk; they come after all others, which they do not change."""
+    first = int(rng.integers(1000))
+    return [Slot(WALK, SAME, STRONG, first + turn, 0) for turn in range(mix.walk)]
 
 
 def apportioned(shares: dict[str, int], total: int) -> dict[str, int]:

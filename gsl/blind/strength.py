@@ -104,15 +104,21 @@ class Yardstick:
         return Held.of(self.plant, self.step, self.period).replay(cut.windows)
 
 
-def turned_up(gap: Callable[[float], float], strength: str, rng: np.random.Generator) -> tuple[float, float] | None:
+def turned_up(
+    gap: Callable[[float], float],
+    strength: str,
+    rng: np.random.Generator,
+    bands: Mapping[str, tuple[float, float]] = BANDS,
+) -> tuple[float, float] | None:
     """Return the share of an effect's range at which its gap lies in a band, and the gap; None if it cannot.
 
     Args:
         gap: From the share to the gap.
         strength: Name of the band.
         rng: Of the target in it, log-uniform.
+        bands: Ends of each band [floors].
     """
-    low, high = BANDS[strength][0] * INSIDE, BANDS[strength][1] / INSIDE
+    low, high = bands[strength][0] * INSIDE, bands[strength][1] / INSIDE
     most = gap(1.0)
     if most < low:
         return None

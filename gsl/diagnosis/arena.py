@@ -17,6 +17,7 @@ from gsl.diagnosis.transient import transient
 from gsl.effects.effect import effect_class, names
 
 LATENCY, PUSH, STEPS = "command_latency", "external_push", "quantisation"
+SCOUTS = 8  # windows of a walk that a screening looks at: a replay in Bullet takes milliseconds
 ON_GROUND = ("contact",)  # kinds of effects that a robot in the air cannot show
 
 
@@ -58,4 +59,5 @@ def arena_of(
         plant.robot, (*options.without, *hidden), looks.known, looks.starts, dense=shaking, floating=found.walking
     )
     scopes = scopes_of({} if found.walking else found.robot.groups, found.channels, apart=not found.walking)
-    return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick)
+    scouts = SCOUTS if found.walking else None
+    return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick, scouts)

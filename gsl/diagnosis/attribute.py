@@ -76,6 +76,7 @@ class Arena:
         library: The candidates.
         scopes: Names of scopes and their joints, each of shape (n_joints,).
         tick: Called with a phase when it begins, and with an empty word whenever some work is done.
+        scouts: Training windows that a screening looks at, spread over all of them; None for half of them.
     """
 
     train: Bench
@@ -83,12 +84,15 @@ class Arena:
     library: tuple[Candidate, ...]
     scopes: Mapping[str, np.ndarray]
     tick: Callable[[str], None]
+    scouts: int | None = None
 
     @property
     def glance(self) -> Bench:
-        """Every second training window: enough to see which candidates are worth a fit."""
-        few = self.train.pieces.chosen(np.arange(0, len(self.train.pieces), 2 if len(self.train.pieces) > FEW else 1))
-        return replace(self.train, pieces=few)
+        """The windows of a screening: every second one is enough to see which candidates are worth a fit."""
+        count = len(self.train.pieces)
+        looked_at = self.scouts or (count // 2 if count > FEW else count)
+        spread = np.unique(np.linspace(0, count - 1, min(count, looked_at)).round().astype(int))
+        return replace(self.train, pieces=self.train.pieces.chosen(spread))
 
     def calibration(self) -> Hypothesis:
         """Return the hypothesis without an effect."""

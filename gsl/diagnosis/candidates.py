@@ -23,6 +23,7 @@ DENSE = (0.02, 0.05, 0.1, 0.15, 0.22, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0)  # where jo
 TWO_SIDED = (0.05, 0.15, 0.35, 0.65, 1.0)
 PAIRED = (0.2, 0.6)  # where two strengths are searched together
 SHAPES = (0.0, 0.3, 1.0)
+WIDE = 10.0  # ends of a range of shapes that are further apart, as a factor, are stepped in logarithms
 PROBE = 0.1  # share of the range at which an effect that acts in proportion is probed
 BEYOND = 1.5  # how far past its documented range a strength is fitted; there it loses its claim to the name
 
@@ -56,8 +57,9 @@ class Candidate:
 
     @property
     def ratios(self) -> np.ndarray:
-        """Which parameters are factors, one of which does nothing, shape (p,)."""
-        return (self.neutral == 1.0) & (self.bounds[0] > 0.0)
+        """Which parameters are factors, one of which does nothing, or range over several sizes, shape (p,)."""
+        lower, upper = self.bounds
+        return (lower > 0.0) & ((self.neutral == 1.0) | (upper > WIDE * lower))
 
     @property
     def on_joints(self) -> bool:
@@ -206,7 +208,7 @@ def _axis(setting: Setting, shares: tuple[Sequence[float], Sequence[float]], *, 
     lower, upper = setting.lower, setting.upper
     assert lower is not None and upper is not None
     if not strength:
-        wide = lower > 0.0 and upper > 10.0 * lower
+        wide = lower > 0.0 and upper > WIDE * lower
         return [lower * (upper / lower) ** share if wide else lower + share * (upper - lower) for share in SHAPES]
     start = _start(setting)
     ends = [end for end in (lower, upper) if abs(end - start) > 1e-12]

@@ -14,7 +14,7 @@ from gsl.diagnosis import nuisance
 from gsl.diagnosis.arena import LATENCY, arena_of, looked_at
 from gsl.diagnosis.attribute import Arena, Hypothesis
 from gsl.diagnosis.experiment import Experiment, experiment, fitting_step
-from gsl.diagnosis.on_ground import Walking, restart_error
+from gsl.diagnosis.on_ground import Walking, jitter_error, restart_error
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.reference import Baseline, calibrated_on, clock_shift
 from gsl.diagnosis.refuted import refuted
@@ -95,7 +95,8 @@ def diagnosed(
     if walking:
         simulator = Walking(plant, fitting_step(step, found.period), found.period, workers=options.threads)
         spread = found.pieces.chosen(np.arange(0, len(found.pieces), max(1, len(found.pieces) // RESTARTS)))
-        found = found.with_model_error(restart_error(simulator, spread))
+        unknown = np.hypot(restart_error(simulator, spread), jitter_error(simulator, spread, np.random.default_rng(0)))
+        found = found.with_model_error(unknown)
     baseline, shift = None, 0.0
     if reference is not None:
         tick("calibrating the simulator on the reference")
@@ -122,7 +123,7 @@ def diagnosed(
     tick("self-test: can the causes that are left be told apart")
     trials = tuple(duels(found, arena, survivors, options.duels, tick)) if options.duels and not walking else ()
     expected = _expected(selection, trials) * (1.0 + found.noise.slack)
-    verdict = judged(selection, expected, _margins(trials, survivors), chance)
+    verdict = judged(selection, expected, _margins(trials, survivors), chance, walking=walking)
     return Findings(found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong)
 
 

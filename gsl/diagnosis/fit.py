@@ -37,7 +37,9 @@ def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarr
         base: Residuals there.
     """
     if not bench.simulator.calibrates:
-        return np.zeros((len(nuisance.PROBES), *base.shape))
+        slopes, joints = np.zeros((len(nuisance.PROBES), *base.shape)), len(bench.simulator.plant.robot.controlled)
+        slopes[nuisance.ZERO, ..., :joints] = 1.0 / bench.comparison.floor[:joints]
+        return slopes
     columns = []
     for row, probe in enumerate(nuisance.PROBES):
         moved = at.copy()
@@ -228,6 +230,7 @@ def _own_slopes(
     columns = []
     for k in range(len(theta)):
         probe = 0.02 * (bounds[1, k] - bounds[0, k])
+        probe = min(probe, 0.2 * theta[k]) if bounds[0, k] > 0.0 else probe
         probe = -probe if theta[k] + probe > bounds[1, k] else probe
         moved = theta.copy()
         moved[k] += probe

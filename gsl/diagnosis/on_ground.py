@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from gsl.core.body import lumped
 from gsl.core.plant import GRAVITY, Plant
+from gsl.diagnosis import nuisance
 from gsl.diagnosis.records import OnGround, Pieces
 from gsl.diagnosis.replay import Effects
 from gsl.effects.effect import applied, built
@@ -18,12 +19,14 @@ from gsl.worlds.engine import Engine, Physics, Reading
 from gsl.worlds.servo import COMMANDS
 from gsl.worlds.start import lowest_point
 
+HEIGHT = 1e-3  # error of a logged height [m]: estimate
+ROBOTS = 6  # of one make that are drawn to see how they differ
 SUNK = 4e-4  # of the lowest sole at the beginning of a window [m]: in contact, as a stance foot is
 
 
 @dataclass(frozen=True)
 class Walking:
-    """Replays of a robot on the ground; joints are as the simulator has them, nothing is calibrated on the fly.
+    """Replays of a robot on the ground; of the joints only the zeros are calibrated on the fly, in the log.
 
     Attributes:
         plant: The simulator.
@@ -41,32 +44,48 @@ class Walking:
     calibrates = False
 
     def told(self, effects: Effects, nuisances: np.ndarray, pieces: Pieces) -> np.ndarray:
-        """Return replayed joints [rad] and base, shape (W, T, n_channels); `nuisances` play no part."""
+        """Return replayed joints [rad] and base, shape (W, T, n_channels); of `nuisances` only zeros play a part."""
         plant = applied(self.plant, built(effects))
+        told = self._replayed(plant, pieces.windows)
+        if nuisances.size:
+            joints = len(plant.robot.controlled)
+            told[..., :joints] += nuisances[nuisance.ZERO, :joints]
+        return told
+
+    def _replayed(self, plant: Plant, windows: Any) -> np.ndarray:
         physics = Physics(self.step, self.iterations, self.period, floating=True)
-        shares = np.array_split(np.arange(len(pieces)), min(self.workers, len(pieces)))
-        parts = [OnGround(*(part[share] for part in pieces.windows)) for share in shares]
+        windows = windows._replace(motion=_moving(plant, windows.motion))
+        heights = _heights(plant, windows)
+        shares = np.array_split(np.arange(len(heights)), min(self.workers, len(heights)))
+        parts = [(OnGround(*(part[share] for part in windows)), heights[share]) for share in shares]
         if len(parts) == 1:
-            return _all_replayed(plant, physics, parts[0])
+            return _all_replayed(plant, physics, *parts[0])
         parallel = Parallel(n_jobs=len(parts), max_nbytes=None)  # else joblib leaves a file for every call
-        return np.concatenate(parallel(delayed(_all_replayed)(plant, physics, one) for one in parts))
+        return np.concatenate(parallel(delayed(_all_replayed)(plant, physics, *one) for one in parts))
 
 
-def _all_replayed(plant: Plant, physics: Physics, windows: OnGround) -> np.ndarray:
+def _all_replayed(plant: Plant, physics: Physics, windows: OnGround, heights: np.ndarray) -> np.ndarray:
     engine, joints = Engine(plant, physics), len(plant.robot.controlled)
-    told = [_replayed(engine, OnGround(*row), joints) for row in zip(*windows, strict=True)]
+    rows = zip(zip(*windows, strict=True), heights, strict=True)
+    told = [_one_replayed(engine, OnGround(*row), float(height), joints) for row, height in rows]
     engine.close()
     return np.array(told)
 
 
-def _replayed(engine: Engine, window: OnGround, joints: int) -> np.ndarray:
-    """Return what one window leads to, shape (T, n_channels); the fields of `window` are without their first axis."""
+def _one_replayed(engine: Engine, window: OnGround, height: float, joints: int) -> np.ndarray:
+    """Return what one window leads to, shape (T, n_channels).
+
+    Args:
+        engine: With the plant.
+        window: Its fields are without their first axis.
+        height: Of the base above the ground at the beginning [m].
+        joints: Number of joints that a log shows.
+    """
     length = len(window.commands) - COMMANDS + 1
-    base, robot = window.base, lumped(engine.plant.robot)
-    place, turn = base[:3].copy(), Rotation.from_quat(base[6:10])
-    place[2] = -_sunk(engine.plant) - lowest_point(robot, window.motion[0], turn.as_matrix())
-    lifted = base[2] - place[2]  # where the log's ground is
-    start = Reading(window.motion, place, tuple(base[6:10].tolist()), base[10:13], base[13:16], 1.0, ())
+    base, motion = window.base, window.motion
+    place = np.array([base[0], base[1], height])
+    lifted = base[2] - height  # where the log's ground is
+    start = Reading(motion, place, tuple(base[6:10].tolist()), base[10:13], base[13:16], 1.0, ())
     engine.load(start, window.commands[length:], float(window.clock))
     told, yaw = [], float(base[5])
     for t in range(length):
@@ -79,10 +98,31 @@ def _replayed(engine: Engine, window: OnGround, joints: int) -> np.ndarray:
     return np.array(told)
 
 
-def _sunk(plant: Plant) -> float:
-    """Return how deep the lowest sole is in the ground [m]: a soft one carries it at eight corners."""
-    stiffness = plant.contact.stiffness
-    return SUNK + (0.0 if stiffness is None else plant.robot.mass * GRAVITY / (8.0 * stiffness))
+def _moving(plant: Plant, measured: np.ndarray) -> np.ndarray:
+    """Return how joints move at the beginning of windows where encoders tell `measured`, shape (W, 2, n_motors).
+
+    In the air a warm-up forgets a wrong start; on the ground the robot stands on it.
+    """
+    place = measured[:, 0] - plant.sensors.bias + plant.servo.sensor_delay * measured[:, 1]
+    return np.stack([place, measured[:, 1]], axis=1)
+
+
+def _heights(plant: Plant, windows: OnGround) -> np.ndarray:
+    """Return the height of the base over the ground at the beginning of windows [m], shape (W,).
+
+    A log tells it with an error that would lift a sole off hard ground, or press it in; so the lowest sole is where a
+    stance foot is. In soft ground it is deeper where the log has it deeper, as far as that is more than noise; where
+    the log's own ground is it does not matter.
+    """
+    robot = lumped(plant.robot)
+    turns = Rotation.from_quat(windows.base[:, 6:10]).as_matrix()
+    low = np.array([lowest_point(robot, *one) for one in zip(windows.motion[:, 0], turns, strict=True)])
+    soles, stiffness = windows.base[:, 2] + low, plant.contact.stiffness
+    if stiffness is None:
+        return -SUNK - low
+    sunk = plant.robot.mass * GRAVITY / (8.0 * stiffness)  # at eight corners
+    seen = sunk**2 / (sunk**2 + HEIGHT**2)
+    return -SUNK - sunk + seen * (soles - np.median(soles)) - low
 
 
 def restart_error(simulator: Walking, pieces: Pieces) -> np.ndarray:
@@ -111,6 +151,30 @@ def restart_error(simulator: Walking, pieces: Pieces) -> np.ndarray:
     skipped = min(pieces.warm_up, left // 2)
     error = retold[:, skipped:] - told[:, first + 1 + skipped :]
     result: np.ndarray = np.sqrt(np.nanmedian(error**2, axis=(0, 1)) / 0.455)  # of a normal distribution
+    return result
+
+
+def jitter_error(simulator: Walking, pieces: Pieces, rng: np.random.Generator) -> np.ndarray:
+    """Return how far robots of one make are off their simulator with the zeros calibrated, rms, shape (n_channels,).
+
+    On the ground nothing else is calibrated: what servos of one make differ by has to be part of the floor.
+
+    Args:
+        simulator: Nominal.
+        pieces: Windows that such robots replay.
+        rng: Of the robots.
+    """
+    plant, joints = simulator.plant, len(simulator.plant.robot.controlled)
+    nominal, moved = simulator.told({}, np.zeros(0), pieces), []
+    for _ in range(ROBOTS):
+        drawn = nuisance.drawn(rng, joints)
+        zeros, drawn[nuisance.ZERO] = drawn[nuisance.ZERO, plant.robot.drive], 0.0
+        other = nuisance.calibrated(plant, drawn)
+        other = other.with_servo(offset=other.servo.offset + zeros)
+        error = (replace(simulator, plant=other).told({}, np.zeros(0), pieces) - nominal)[:, pieces.warm_up :]
+        error[..., :joints] -= np.nanmedian(error[..., :joints], axis=(0, 1))
+        moved.append(error)
+    result: np.ndarray = np.sqrt(np.nanmedian(np.array(moved) ** 2, axis=(0, 1, 2)) / 0.455)
     return result
 
 

@@ -59,7 +59,7 @@ class Simulator(Protocol):
     """Something that replays windows.
 
     Attributes:
-        calibrates: Whether nuisances are fitted in its replays.
+        calibrates: Whether all nuisances are fitted in its replays; else zeros alone.
     """
 
     calibrates: bool

@@ -26,7 +26,7 @@ class Thresholds:
     Attributes:
         gain: Of a first effect over calibration alone.
         further: Of a further effect.
-        share: Of the cost of what stands, that any effect has to explain.
+        share: Of the cost of what stands, that any effect has to explain; noise holds no such share, and is let be.
     """
 
     gain: float = 20.0
@@ -72,7 +72,7 @@ def selected(
     singles, screening = arena.successors(none)
     tried, chosen = [none, *singles], none
     if singles and _begins(singles[0], none, max(thresholds.gain, thresholds.share * none.cost)):
-        chosen = singles[0]
+        chosen = _polished(arena, singles[0], tried) if thresholds.share else singles[0]
         beam = _distinct(singles, width)
         while len(chosen.candidates) < most and _lacking(arena, chosen, NOTHING):
             found = [one for base in beam for one in arena.successors(base, PAIRS)[0]]

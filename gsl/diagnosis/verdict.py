@@ -60,7 +60,12 @@ class Verdict:
 
 
 def judged(
-    found: Selection, expected: float, margins: Sequence[tuple[str, float]] = (), chance: float = 0.0
+    found: Selection,
+    expected: float,
+    margins: Sequence[tuple[str, float]] = (),
+    chance: float = 0.0,
+    *,
+    walking: bool = False,
 ) -> Verdict:
     """Judge a selection.
 
@@ -69,6 +74,7 @@ def judged(
         expected: Cost of a residual where only noise is left.
         margins: Spread of the difference of costs to a rival, by the rival's effect, as a self-test measured it.
         chance: Share of a cost by which it may differ without a cause.
+        walking: Whether the robot is on the ground, where the base tells what is alike in the air.
     """
     chosen, none = found.chosen, found.none
     least = expected * float(none.counts.sum())
@@ -81,7 +87,8 @@ def judged(
     spreads = dict(margins)
     causes = tuple(_cause(found, k, excess, spreads, chance) for k in range(len(chosen.candidates)))
     known = _known(explained, float(strange))
-    groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in ALIKE if twins & set(chosen.names)]
+    alike = () if walking else ALIKE
+    groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in alike if twins & set(chosen.names)]
     for cause in causes:
         if cause.rival is not None and cause.probability < SEPARATED:
             groups.append((chosen.names[cause.index], cause.rival))

@@ -8,10 +8,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
+from gsl.blind.label import WALK
 from gsl.blind.make import Workshop, rng_of
-from gsl.blind.mix import Mix, Slot, slots
+from gsl.blind.mix import Mix, Slot, slots, walk_slots
+from gsl.blind.on_foot import Track
 from gsl.blind.programmes import drawn_programmes
 from gsl.blind.seals import VERSION, files_below, nonce_of, sealed
+from gsl.blind.walks import Walks
 from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.errors import GslError
@@ -45,10 +48,16 @@ class BlindMake:
     excitation: Annotated[Excitation, setting("what the robots play; programmes are variations of it")]
     labels: Annotated[str, setting("folder of the labels and of the secret, not below out", min_length=1)]
     mix: Annotated[Mix, setting("kinds of cases, in proportion")]
-    cases: Annotated[int, setting("how many there are", ge=1, le=9999)] = 240
+    walks: Annotated[Walks, setting("what robots log on the ground")]
+    cases: Annotated[int, setting("how many there are in the air", ge=0, le=9999)] = 240
     programmes: Annotated[int, setting("sets of commands that they share", ge=1)] = 4
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness, together with the secret", ge=0)] = 1
+
+    def __post_init__(self) -> None:
+        """Refuse a benchmark without a case."""
+        if not self.cases + self.mix.walk:
+            raise ValueError("needs at least one case, in the air or on the ground")
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
@@ -62,7 +71,11 @@ class BlindMake:
             self.excitation, self.programmes, world.period, rng_of(secret, self.seed, "programmes")
         )
         workshop = Workshop(world.plant, world.step, world.period, tuple(drawn))
-        shared = workshop, {key: value for key, value in described(world).items() if key != "_target_"}
+        shared = (
+            workshop,
+            Track(world, self.walks),
+            {key: value for key, value in described(world).items() if key != "_target_"},
+        )
         with console.progress(len(orders), "making cases") as progress:
             made = in_parallel(_made, shared, orders, self.workers, progress)
         labels = {order.name: label for order, label in zip(orders, made, strict=True)}
@@ -80,6 +93,7 @@ class BlindMake:
 
     def _orders(self, folder: Path, secret: str) -> list[_Order]:
         wanted = slots(self.mix, self.cases, self.programmes, rng_of(secret, self.seed, "slots"))
+        wanted += walk_slots(self.mix, rng_of(secret, self.seed, "walks"))
         names = [f"case_{index + 1:04d}" for index in range(len(wanted))]
         return [
             _Order(name, slot, secret, self.seed, folder / CASES / name)
@@ -112,8 +126,9 @@ class BlindMake:
 
 def _made(frozen: bytes, order: _Order) -> dict[str, Any]:
     """Make and write one case; return its label."""
-    workshop, world = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
-    case = workshop.case(order.name, order.slot, rng_of(order.secret, order.seed, order.name))
+    workshop, track, world = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
+    place = track if order.slot.kind == WALK else workshop
+    case = place.case(order.name, order.slot, rng_of(order.secret, order.seed, order.name))
     handed_out = {"sim": world, "without": list(case.label.without)}
     write_case(order.folder, case.log, case.reference, handed_out)
     return dict(documents.plain(case.label.document))

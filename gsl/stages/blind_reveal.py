@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from gsl.blind.figures import figures
-from gsl.blind.label import Label
+from gsl.blind.label import WALK, Label
 from gsl.blind.mark import Mark, marked
 from gsl.blind.results import OURS, markdown, results
 from gsl.blind.seals import check_label, files_below
@@ -45,7 +45,8 @@ class BlindReveal:
         _check_answers(files["data"], files["answers"])
         place = files["answers"].parent
         marks = {OURS: _marks(labels, place / ANSWERS)}
-        marks |= {one.name: _marks(labels, one) for one in sorted((place / BASELINES).glob("*"))}
+        in_the_air = {name: label for name, label in labels.items() if label.kind != WALK}
+        marks |= {one.name: _marks(in_the_air, one) for one in sorted((place / BASELINES).glob("*"))}
         documents.write_json(folder / DATA, results(marks))
         seals = f"data {file_hash(files['data'])[:16]}, answers {document(files['answers'])['total'][:16]}"
         about = f"{len(labels)} cases; every seal holds ({seals})."

@@ -1,0 +1,85 @@
+"""Replays on the ground: where windows begin, what is calibrated, and how far robots of one make are apart."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gsl.blind.walks import Walks
+from gsl.core.body import lumped
+from gsl.core.plant import GRAVITY, Plant, nominal
+from gsl.diagnosis import nuisance
+from gsl.diagnosis.candidates import library
+from gsl.diagnosis.experiment import Experiment, experiment
+from gsl.diagnosis.on_ground import Walking, _heights, _moving, jitter_error
+from gsl.effects.effect import applied, built
+from gsl.robots.nao import nao
+from gsl.worlds.bullet import BulletWorld
+
+NONE = np.zeros(0)
+
+
+@pytest.fixture(scope="module")
+def walk() -> Experiment:
+    sim = BulletWorld(robot="nao", effects={}, start_noise=0.02)
+    log = Walks(episodes=2, duration=1.0).logged(sim, None, {}, 0.0, np.random.default_rng(0))
+    return experiment(log, lumped(nao()), walking=True)
+
+
+def plant(**effects: dict[str, float]) -> Plant:
+    return applied(nominal(nao()), built(effects))
+
+
+def test_a_bias_of_the_encoders_moves_the_log_and_not_the_robot(walk: Experiment) -> None:
+    simulator = Walking(plant(), 0.002, 0.02)
+    biased = replace(walk.pieces, windows=walk.pieces.windows._replace(motion=walk.pieces.windows.motion.copy()))
+    biased.windows.motion[:, 0] += 0.03
+    told = simulator.told({"sensor_bias": {"bias": 0.03}}, NONE, biased)
+    joints = len(walk.joints)
+    expected = simulator.told({}, NONE, walk.pieces)
+    assert np.allclose(told[..., :joints] - 0.03, expected[..., :joints], atol=1e-9)
+    assert np.allclose(told[..., joints:], expected[..., joints:], atol=1e-9)
+
+
+def test_late_encoders_tell_of_where_joints_were() -> None:
+    late = plant(sensor_delay={"delay": 0.01})
+    n = len(late.robot.motors)
+    measured = np.stack([np.zeros((3, n)), np.full((3, n), 2.0)], axis=1)
+    assert np.allclose(_moving(late, measured)[:, 0], 0.02)
+
+
+def test_zeros_are_calibrated_in_the_log(walk: Experiment) -> None:
+    simulator, joints = Walking(plant(), 0.002, 0.02), len(walk.joints)
+    shifted = nuisance.none(len(walk.channels))
+    shifted[nuisance.ZERO] = 0.01
+    moved = simulator.told({}, shifted, walk.pieces) - simulator.told({}, NONE, walk.pieces)
+    assert np.allclose(moved[..., :joints], 0.01) and not moved[..., joints:].any()
+
+
+def test_soft_ground_is_entered_as_deep_as_the_log_has_it(walk: Experiment) -> None:
+    windows = walk.pieces.windows
+    windows = windows._replace(base=windows.base.copy())
+    before = {k: _heights(plant(ground_compliance={"stiffness": k}), windows) for k in (2e3, 1e8)}
+    hard = _heights(plant(), windows)
+    assert np.allclose(before[1e8], hard, atol=1e-5)
+    mass = nao().mass
+    assert np.median(hard - before[2e3]) == pytest.approx(mass * GRAVITY / (8.0 * 2e3), rel=0.3)
+    windows.base[0, 2] -= 2e-3
+    assert np.allclose(_heights(plant(), windows), hard)
+    deeper = before[2e3] - _heights(plant(ground_compliance={"stiffness": 2e3}), windows)
+    assert 1e-3 < deeper[0] < 2e-3 and np.abs(deeper[1:]).max() < 5e-4  # the median moves a little
+
+
+def test_robots_of_one_make_are_apart_by_more_in_the_joints_that_carry(walk: Experiment) -> None:
+    simulator = Walking(plant(), 0.002, 0.02)
+    error = jitter_error(simulator, walk.pieces, np.random.default_rng(0))
+    names = dict(zip(walk.channels, error, strict=True))
+    assert names["LKneePitch"] > 2.0 * names["LShoulderRoll"] and (error < 0.03).all()
+    again = jitter_error(simulator, walk.pieces, np.random.default_rng(0))
+    assert np.array_equal(error, again)
+
+
+def test_a_stiffness_that_ranges_over_several_sizes_is_stepped_in_logarithms() -> None:
+    found = {one.effect: one for one in library(nao(), floating=True)}
+    assert found["ground_compliance"].ratios.all()
+    assert not found["command_latency"].ratios.any() and not found["stribeck_friction"].ratios.any()
