@@ -12,7 +12,7 @@ from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.arena import LATENCY, arena_of, looked_at
-from gsl.diagnosis.attribute import Arena, Hypothesis
+from gsl.diagnosis.attribute import BEAM, Arena, Hypothesis
 from gsl.diagnosis.experiment import Experiment, experiment, fitting_step
 from gsl.diagnosis.on_ground import Walking, jitter_error, restart_error
 from gsl.diagnosis.options import Options
@@ -138,8 +138,9 @@ def _upheld(
 ) -> tuple[Selection, dict[str, str]]:
     """Search again without the effects that lose their claim to the name; return them with the reasons."""
     wrong: dict[str, str] = {}
+    width = 1 if found.walking else BEAM  # a replay in Bullet takes milliseconds
     while True:
-        selection = selected(arena, thresholds, none, most=options.most)
+        selection = selected(arena, thresholds, none, most=options.most, width=width)
         reasons = refuted(selection.chosen, found, arena.train.simulator.plant)
         if not reasons:
             return selection, wrong

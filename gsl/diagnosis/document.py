@@ -57,7 +57,6 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "invisible": list(found.selection.screening.invisible),
         "caveats": _caveats(found),
         "next_experiment": None,
-        "policies": None,
         "policy_gap": None,
         "replays": _replays(found, told, after),
         "self_test": _self_test(found),
