@@ -69,6 +69,14 @@ def test_a_bad_log_is_one_clear_line(bad: Batch, words: str) -> None:
     assert told.startswith("my_log.parquet: ") and words in told and "\n" not in told
 
 
+def test_a_hole_in_time_is_refused() -> None:
+    batch = log()
+    time = batch.episodes[0].time.copy()
+    time[40:] += 0.3
+    with pytest.raises(GslError, match=r"step 39: 0\.32 s to the next row"):
+        check_log(replace(batch, episodes=(replace(batch.episodes[0], time=time),)), lumped(NAO), "log")
+
+
 def test_a_folder_of_files_is_one_log(tmp_path: Path) -> None:
     for name in ("a", "b"):
         write(tmp_path / f"{name}.parquet", log())

@@ -23,6 +23,7 @@ from gsl.diagnosis.select import Selection, Thresholds, selected
 from gsl.diagnosis.self_test import Trial, duels, null_gains
 from gsl.diagnosis.verdict import Verdict, judged
 from gsl.effects.effect import applied, built
+from gsl.errors import GslError
 
 NOISE_COST = 0.96  # robust cost of a residual that is noise and nothing else
 GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best gain of chance it has to be
@@ -92,6 +93,8 @@ def diagnosed(
         known_nulls: What chance gained on these commands in this world, if it is known already.
     """
     found = experiment(log, robot, walking=walking)
+    if not len(found.train) or not len(found.held_out):
+        raise GslError("too little to fit and to check: two motions, or one trajectory, of some seconds are the least")
     if walking:
         simulator = Walking(plant, fitting_step(step, found.period), found.period, workers=options.threads)
         spread = found.pieces.chosen(np.arange(0, len(found.pieces), max(1, len(found.pieces) // RESTARTS)))

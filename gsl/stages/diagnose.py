@@ -20,6 +20,7 @@ from gsl.diagnosis.document import document
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.verify import in_bullet
 from gsl.diagnosis.world_file import diagnosed_effects, joined
+from gsl.errors import GslError
 from gsl.report.diagnosis import report_html
 from gsl.stages.diagnosis_files import PAGE, REPORT, WORLD, report_of
 from gsl.stages.experiment_file import write_next_experiment
@@ -72,6 +73,10 @@ class Diagnose:
         robot = lumped(self.sim.plant.robot)
         measured = real_returns(self.policies, self.sim, trust=self.trust) if self.policies else None
         logs = {role: self._read(role) for role in ("real", "reference") if getattr(self, role)}
+        if "reference" in logs and any(on_ground(log) for log in logs.values()):
+            raise GslError(
+                "a reference calibrates logs in the air only; leave reference= out, or log the robot in the air"
+            )
         found = diagnosed(
             logs["real"],
             robot,

@@ -15,6 +15,7 @@ from gsl.stages.training import data_file
 from gsl.storage.trajectories import read
 
 MOVES = 1e-4  # a command that changes less is constant [rad]
+LATE = 0.5  # of a control period, by which a row may come early or late
 BEYOND = 0.35  # measured past a joint's limits by more than this is another unit or another robot [rad]
 
 
@@ -60,8 +61,10 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
         other = [joint for joint in batch.joints if joint not in robot.controlled]
         told = f"lacks {missing[0]}" if missing else f"has {other[0]}, which the {robot.name} has not"
         raise GslError(f"{name}: a log of another robot? It {told}; choose the simulator with sim=")
-    if on_ground(batch) and not all("base.orientation.w" in episode.sensors for episode in batch.episodes):
+    needed = ("base.position.x", "base.orientation.w")
+    if on_ground(batch) and not all(column in one.sensors for one in batch.episodes for column in needed):
         raise GslError(f"{name}: a walk needs base.position and base.orientation columns; or log the robot in the air")
+    _check_time(batch, name)
     longest = max(len(episode) for episode in batch.episodes) * batch.control_period
     if longest < WARM_UP + SCORED:
         raise GslError(
@@ -72,6 +75,19 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
             f"{name}: no command ever changes, so nothing shows; play a motion, see `gsl collect task=excite`"
         )
     _check_units(batch, robot, name)
+
+
+def _check_time(batch: Batch, name: str) -> None:
+    """Refuse a log whose rows are not a control period apart: replays would take a hole for a lag."""
+    for number, episode in enumerate(batch.episodes):
+        steps = np.diff(episode.time)
+        far = np.abs(steps - batch.control_period)
+        if len(far) and far.max() > LATE * batch.control_period:
+            row = int(np.argmax(far))
+            raise GslError(
+                f"{name}: episode {number}, step {row}: {steps[row]:.4g} s to the next row, but a control period is "
+                f"{batch.control_period:g} s; cut the log at its holes, or resample it"
+            )
 
 
 def on_ground(batch: Batch) -> bool:
