@@ -22,7 +22,7 @@ from gsl.diagnosis.options import Options
 from gsl.diagnosis.reference import calibrated_on
 from gsl.effects.effect import applied, built
 
-BULKY = ("replays", "horizon", "sides", "next_experiment", "policies")  # parts of a document that no mark asks for
+BULKY = ("replays", "horizon", "sides", "next_experiment")  # parts of a document that no mark asks for
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ class Looks(NamedTuple):
 
 
 def looked_at(found: Experiment, left: np.ndarray) -> Looks:
-    """Look for pushes and staircases in the residuals of all windows, shape (W, scored, n_channels)."""
+    """Look for pushes and staircases in the residuals of the windows of `found`, shape (W, scored, n_channels)."""
     moment = transient(found, left)
     return Looks({PUSH: moment._asdict()} if moment else {}, {} if found.walking else {STEPS: staircase(found, left)})
 

@@ -153,7 +153,9 @@ class Arena:
         used = self.glance.comparison.used(ground.residual.shape[1]) * len(ground.residual)
         excess = np.maximum(0.0, ground.costs - used)
         order = np.argsort(excess)[::-1][:LOCAL]
-        joints = [name for name, mask in self.scopes.items() if mask.sum() == 1]
+        joints = {
+            int(np.argmax(mask)): name for name, mask in self.scopes.items() if mask.sum() == 1
+        }  # joints are last
         if len(joints) < len(excess):
             return []
         return [joints[k] for k in order if excess[k] > DOMINANT * excess.sum()]

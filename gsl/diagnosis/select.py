@@ -83,7 +83,7 @@ def selected(
             chosen, beam = best, [best]
             if not _lacking(arena, chosen, MUCH):
                 break
-        chosen = _polished(arena, _pruned(arena, chosen, thresholds, tried), tried)
+        chosen = _polished(arena, _pruned(arena, chosen, none, thresholds, tried), tried)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
 
 
@@ -121,13 +121,15 @@ def _distinct(singles: list[Hypothesis], width: int) -> list[Hypothesis]:
     return found
 
 
-def _pruned(arena: Arena, chosen: Hypothesis, thresholds: Thresholds, tried: list[Hypothesis]) -> Hypothesis:
+def _pruned(
+    arena: Arena, chosen: Hypothesis, none: Hypothesis, thresholds: Thresholds, tried: list[Hypothesis]
+) -> Hypothesis:
     """Drop effects that the others can do without."""
     while len(chosen.candidates) > 1:
         fewer = [_without(arena, chosen, k) for k in range(len(chosen.candidates))]
         tried += fewer
         best = min(fewer, key=lambda one: one.cost)
-        if _stands(chosen, best, _least(thresholds, best, tried[0])):
+        if _stands(chosen, best, _least(thresholds, best, none)):
             break
         chosen = best
     return chosen
@@ -142,6 +144,5 @@ def _without(arena: Arena, chosen: Hypothesis, k: int) -> Hypothesis:
 def _polished(arena: Arena, chosen: Hypothesis, tried: list[Hypothesis]) -> Hypothesis:
     """Fit what stands once more from where it is, with all derivatives taken anew at every step."""
     again = arena.fitted(chosen.candidates, np.concatenate(chosen.parameters), chosen.fit.nuisances, every=1)
-    best = again if again.fit.cost < chosen.fit.cost else chosen
-    tried.append(best)
-    return best
+    tried.append(again)
+    return again if again.fit.cost < chosen.fit.cost else chosen

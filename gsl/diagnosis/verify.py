@@ -24,7 +24,7 @@ def in_bullet(found: Findings, *, iterations: int = 50) -> dict[str, Any]:
     part = exp.pieces.chosen(index)
     plant = calibrated(applied(sim.plant, built(chosen.effects)), chosen.fit.nuisances)
     engine = Engine(plant, Physics(sim.step, iterations, sim.period, floating=False))
-    told = np.array([_replayed(engine, part.windows.commands[w], part.windows.motion[w]) for w in range(len(part))])
+    told = np.array([_replayed(engine, *window) for window in zip(*part.windows, strict=True)])
     engine.close()
     told = told[..., : len(exp.joints)] + plant.sensors.bias[: len(exp.joints)]
     chain = sim.told(chosen.effects, chosen.fit.nuisances, part)
@@ -33,11 +33,11 @@ def in_bullet(found: Findings, *, iterations: int = 50) -> dict[str, Any]:
     return {"windows": len(part), "chain_rms_mrad": 1e3 * difference, "rms": float(np.sqrt(np.mean(z**2)))}
 
 
-def _replayed(engine: Engine, commands: np.ndarray, motion: np.ndarray) -> np.ndarray:
+def _replayed(engine: Engine, commands: np.ndarray, motion: np.ndarray, clock: float) -> np.ndarray:
     """Return what the encoders tell in Bullet after each control period [rad], shape (T, n_motors)."""
     length = len(commands) - COMMANDS + 1
     start = resting(lumped(engine.plant.robot), motion[0], commands[length], floating=False).reading
-    engine.load(start._replace(motion=motion), commands[length:])
+    engine.load(start._replace(motion=motion), commands[length:], float(clock))
     told = []
     for t in range(length):
         engine.run(commands[length - 1 - t])

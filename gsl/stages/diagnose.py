@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -129,7 +130,7 @@ class Diagnose:
             report=PAGE,
             data=self._data(found, batch),
             seconds=seconds,
-            command=f"gsl diagnose real={self.real}",
+            command=self._command(),
         )
         documents.write_json(folder / REPORT, told)
         (folder / PAGE).write_text(report_html(told), encoding="utf-8")
@@ -142,6 +143,14 @@ class Diagnose:
             "after": told["shrinkage"]["after"],
             "fraction": told["shrinkage"]["fraction"],
         }
+
+    def _command(self) -> str:
+        """Return the settings to type again, of those that say what is diagnosed; the simulator is told in the data."""
+        said = [f"real={self.real}"]
+        said += [f"reference={self.reference}"] if self.reference else []
+        said += [f"without=[{','.join(self.without)}]"] if self.without else []
+        said += [f"clocks={self.clocks}"] if self.clocks != "synchronised" else []
+        return shlex.join(["gsl", "diagnose", *said])
 
     def _data(self, found: Findings, batch: Batch) -> dict[str, Any]:
         exp = found.experiment
