@@ -21,12 +21,12 @@ from gsl.core.body import lumped
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.records import slope
+from gsl.effects.effect import TWINS
 from gsl.errors import GslError
 
 PLAYERS: Mapping[str, Player] = {SAME: play_same, FOREIGN: play_foreign}
 START = 0.02  # spread of the joints before the first command is held [rad]
 TRIES = 3  # draws of an effect before the next one has its turn
-ALIKE = {"sensor_bias": "zero_offset"}  # never two of these at once
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Workshop:
         dial, share, gap = _dialled(choices, yardstick, label, slot.turn, rng)
         effects, neutral = {dial.effect: dial.entry(share)}, {dial.effect: dial.neutral}
         if slot.kind == TWO:
-            others = [one for one in choices if ALIKE.get(one, one) != ALIKE.get(dial.effect, dial.effect)]
+            others = [one for one in choices if TWINS.get(one, one) != TWINS.get(dial.effect, dial.effect)]
             dial, share, second = _dialled(others, yardstick, label, int(rng.integers(len(others))), rng)
             effects[dial.effect], neutral[dial.effect] = dial.entry(share), dial.neutral
             gap = float(np.sqrt(gap**2 + second**2 - 1.0))

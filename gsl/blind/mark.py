@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from gsl.blind.label import JOINT, KNOWN, TWO, WALK, Label
+from gsl.effects.effect import TWINS
 
-TWINS = {"sensor_bias": "zero_offset"}  # alike by nature in the air
 NO_GAP, UNKNOWN = "no_gap", "unknown"
 LOOSE = ("joint_compliance", "supply_sag", "backlash")  # whose parameters logs at 50 Hz hardly show
 
@@ -25,7 +25,7 @@ class Mark:
         named: All causes and members of inseparable groups.
         first: A cause of the truth comes first, and it is not said to be inseparable from another.
         twin: The same, with effects that are alike by nature taken as one.
-        second: It is among the first two causes or effects of the ranking, or in an inseparable group.
+        second: It is among the first two of the causes and, after them, the ranking, or in an inseparable group.
         both, one: Of several causes, all are named; at least one is.
         joint: Of a fault of one joint, the first cause is put there; None elsewhere.
         mapped: Of such a fault, that joint has most of the gap on the map.
@@ -86,7 +86,7 @@ def marked(label: Label, answer: Mapping[str, Any]) -> Mark:
         first=first
         and not truth & {twins.get(name, name) for group in answer.get("inseparable") or [] for name in group},
         twin=first and not truth & alike,
-        second=bool(truth & {*names[:2], *alike, *(_ranked(answer, twins)[:2] if names else ())}),
+        second=bool(names) and bool(truth & {*list(dict.fromkeys([*names, *_ranked(answer, twins)]))[:2], *alike}),
         both=bool(truth) and truth <= set(names),
         one=bool(found),
         joint=_on_joint(label, causes[:1]) if label.kind == JOINT else None,

@@ -33,8 +33,8 @@ class Hypothesis:
         candidates: Its effects; empty for calibration alone.
         parameters: Of each effect.
         fit: On the training windows.
-        costs: Robust cost of the held-out residuals, shape (n_held_out_records,).
-        counts: Residuals in each of these records, shape (n_held_out_records,).
+        costs: Robust cost of the held-out residuals of each sample of `Pieces.samples`, shape (n_samples,).
+        counts: Residuals in each of these, shape (n_samples,).
         levels: Held-out cost of one residual of each joint, shape (n_joints,).
     """
 
@@ -119,10 +119,10 @@ class Arena:
         self, candidates: tuple[Candidate, ...], parameters: tuple[np.ndarray, ...], fit: Fit, build: Build
     ) -> Hypothesis:
         z = self.held_out.residual(build(fit.parameters), fit.nuisances)
-        used, record = self.held_out.comparison.used(z.shape[1]), self.held_out.pieces.record
-        names, cost = np.unique(record), loss(z).sum(axis=1)
-        costs = np.array([cost[record == name].sum() for name in names])
-        counts = np.array([used.sum() * (record == name).sum() for name in names])
+        used, sample = self.held_out.comparison.used(z.shape[1]), self.held_out.pieces.samples
+        names, cost = np.unique(sample), loss(z).sum(axis=1)
+        costs = np.array([cost[sample == name].sum() for name in names])
+        counts = np.array([used.sum() * (sample == name).sum() for name in names])
         self.tick("")
         return Hypothesis(candidates, parameters, fit, costs, counts, cost.mean(axis=0) / used)
 
@@ -163,11 +163,11 @@ class Arena:
 
 @dataclass(frozen=True)
 class Gain:
-    """How much less one hypothesis costs than another, over held-out records.
+    """How much less one hypothesis costs than another, over held-out samples.
 
     Attributes:
         value: In units of cost.
-        low: Lower 95 % bound by bootstrap over records.
+        low: Lower 95 % bound by bootstrap over samples.
         high: Upper bound.
         wins: Share of the bootstrap samples in which it is positive.
     """
@@ -179,7 +179,7 @@ class Gain:
 
 
 def gain(better: Hypothesis, worse: Hypothesis, *, samples: int = 1000, seed: int = 0) -> Gain:
-    """Compare two hypotheses record by record; the difference of their nuisances' costs is in every sample."""
+    """Compare two hypotheses sample by sample; the difference of their nuisances' costs is in every sample."""
     difference = worse.costs - better.costs
     extra = nuisance.cost(worse.fit.nuisances) - nuisance.cost(better.fit.nuisances)
     index = np.random.default_rng(seed).integers(0, len(difference), (samples, len(difference)))

@@ -48,6 +48,7 @@ class Findings:
         baseline: From the reference, if there is one.
         shift: Between the clocks of commands and measurements, taken out first [s], if they are apart.
         refuted: Effects that fitted but lost their claim to the name, with the reason.
+        seed: Of what was drawn.
     """
 
     experiment: Experiment
@@ -60,6 +61,7 @@ class Findings:
     baseline: Baseline | None
     shift: float = 0.0
     refuted: Mapping[str, str] = field(default_factory=dict)
+    seed: int = 0
 
     @property
     def answer(self) -> Hypothesis:
@@ -118,17 +120,19 @@ def diagnosed(
     nulls = tuple(known_nulls or ())
     if options.nulls and not nulls and not walking:
         tick("self-test: what chance gains on these commands")
-        nulls = tuple(null_gains(found, arena, none, options.nulls, tick))
+        nulls = tuple(null_gains(found, arena, none, options, tick))
     chance = ON_FOOT if walking else SHAKING * _shaking(found)
     thresholds = Thresholds(gain=max(GAIN, CHANCE * max(nulls, default=0.0)), share=chance)
     tick("trying the library on the log")
     selection, wrong = _upheld(found, arena, none, thresholds, options)
     survivors = _survivors(selection)
     tick("self-test: can the causes that are left be told apart")
-    trials = tuple(duels(found, arena, survivors, options.duels, tick)) if options.duels and not walking else ()
+    trials = tuple(duels(found, arena, survivors, options, tick)) if options.duels and not walking else ()
     expected = _expected(selection, trials) * (1.0 + found.noise.slack)
     verdict = judged(selection, expected, _margins(trials, survivors), chance, walking=walking)
-    return Findings(found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong)
+    return Findings(
+        found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong, options.seed
+    )
 
 
 def _shaking(found: Experiment) -> float:

@@ -13,13 +13,15 @@ from gsl.core.setting import settings_of
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Hypothesis, gain
 from gsl.diagnosis.candidates import Candidate
-from gsl.diagnosis.diagnose import Findings
+from gsl.diagnosis.diagnose import NOISE_COST, Findings
 from gsl.diagnosis.localise import cells, horizon, regimes, sides
+from gsl.diagnosis.records import FEW
 from gsl.diagnosis.shrinkage import shrinkage
 from gsl.diagnosis.verdict import Cause
 from gsl.effects.effect import effect_class
 
 RANKED = 12  # hypotheses that are listed
+WIDER = 2.0  # than white noise makes them: what is left of a joint hangs together in time and over nuisances. Estimate
 REPLAYS, SHOWN = 6, 400  # pictures of replays, and their ticks at most
 WORDS = {
     "no_gap": "The simulator and the robot agree as far as noise and a per-joint calibration can tell.",
@@ -83,7 +85,7 @@ def _cause(found: Findings, one: Cause) -> dict[str, Any]:
 
 def _widening(found: Findings) -> float:
     """Return how much wider an interval is than noise alone makes it: what is left unexplained widens it."""
-    return float(2.0 * np.sqrt(max(1.0, found.verdict.remaining)))
+    return float(WIDER * np.sqrt(max(1.0, found.verdict.remaining)))
 
 
 def _joints(robot: Robot, candidate: Candidate) -> list[str]:
@@ -109,7 +111,7 @@ def _parameters(candidate: Candidate, values: np.ndarray, sd: np.ndarray) -> dic
 
 def _ranking(found: Findings) -> list[dict[str, Any]]:
     none, expected = found.selection.none, float(found.selection.none.counts.sum())
-    excess = max(none.cost - 0.96 * expected, 1e-9)
+    excess = max(none.cost - NOISE_COST * expected, 1e-9)
     rows = []
     for one in found.selection.tried[:RANKED]:
         share = gain(one, none)
@@ -121,7 +123,6 @@ def _ranking(found: Findings) -> list[dict[str, Any]]:
                 "parameters": _written(one),
                 "gain": {"value": value, "low": low, "high": high},
                 "level": one.level,
-                "probability": None,
             }
         )
     return rows
@@ -154,6 +155,9 @@ def _caveats(found: Findings) -> list[str]:
         said.append(
             f"The clocks are apart: {1e3 * found.shift:.1f} ms were taken out first, so that no latency can show."
         )
+    if found.baseline is not None and found.baseline.effects:
+        names = ", ".join(found.baseline.effects)
+        said.append(f"The reference shows it already, so it is no cause but a part of the simulator now: {names}.")
     if exp.noise.source != "repeats":
         said.append("No command was played twice: the noise floor is estimated from the roughness of the log.")
     if exp.noise.unsteady.any():
@@ -162,7 +166,9 @@ def _caveats(found: Findings) -> list[str]:
             f"Repeats of the same commands differ here by far more than elsewhere, which counts as gap: {names}."
         )
     if not exp.by_record:
-        said.append("There is one trajectory only: every second part of it was held out, which is weak evidence.")
+        said.append("There is one motion only: every second part of it was held out, which is weak evidence.")
+    elif len(np.unique(exp.pieces.record[exp.held_out])) < FEW:
+        said.append("Few trajectories are held out: intervals are over parts of them and may be too narrow.")
     if exp.comparison.shaking.any():
         names = ", ".join(name for name, shakes in zip(exp.channels, exp.comparison.shaking, strict=True) if shakes)
         said.append(f"These joints shake while their commands rest and are judged by the spectrum: {names}.")

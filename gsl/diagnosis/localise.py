@@ -14,7 +14,9 @@ from gsl.diagnosis.replay import Simulator
 REST, FAST = 0.01, 0.12  # shares of the no-load speed: slower is rest, faster is fast
 REVERSAL = 0.06  # before and after a change of direction [s]
 LOADED, SATURATED = 0.4, 1.0  # shares of the torque limit that the nominal servo would want
-SAMPLES = 400  # of the bootstrap over records
+SAMPLES = 400  # of the bootstrap
+ABOVE = 1.1  # floors: a lower bound has to be above it to be named, for of many cells some are high by chance
+LEAST = 3  # samples that have to show a cell
 OF_ALL = ("all", "early", "late", "after_contact")  # regimes to which the base belongs
 CONTACT = 0.08  # after a foot has touched the ground [s]
 
@@ -26,9 +28,9 @@ class Cell:
     Attributes:
         joint, regime: Which.
         share: Of the whole excess.
-        low, high: 95 % interval, by bootstrap over records.
+        low, high: 95 % interval, by bootstrap over `Pieces.samples`.
         rms: Of the residuals in units of the floor.
-        named: Whether the lower bound of rms is above the floor.
+        named: Whether the lower bound of rms is surely above the floor.
     """
 
     joint: str
@@ -48,9 +50,10 @@ def cells(found: Experiment, z: np.ndarray, regimes: Mapping[str, np.ndarray]) -
         z: Residuals of all windows in units of the floor, shape (W, scored, n_joints).
         regimes: Which residuals belong to each, shape (W, scored, n_joints).
     """
-    record, names = found.pieces.record, np.unique(found.pieces.record)
-    sums = {key: _by_record(np.where(mask, z**2, 0.0), record) for key, mask in regimes.items()}
-    counts = {key: _by_record(mask.astype(float), record) for key, mask in regimes.items()}
+    sample, names = found.pieces.samples, np.unique(found.pieces.samples)
+    alike = z.shape[1] / found.comparison.used(z.shape[1])  # a joint that shakes has fewer residuals in a window
+    sums = {key: alike * _by_sample(np.where(mask, z**2, 0.0), sample) for key, mask in regimes.items()}
+    counts = {key: alike * _by_sample(mask.astype(float), sample) for key, mask in regimes.items()}
     index = np.random.default_rng(0).integers(0, len(names), (SAMPLES, len(names)))
     index = np.vstack([np.arange(len(names)), index])
     square = {key: sums[key][index].sum(axis=1) for key in regimes}
@@ -63,7 +66,7 @@ def cells(found: Experiment, z: np.ndarray, regimes: Mapping[str, np.ndarray]) -
         rms = np.sqrt(square[key] / np.maximum(count[key], 1.0))
         low, high = np.quantile(share[1:], [0.025, 0.975], axis=0)
         least = np.quantile(rms[1:], 0.025, axis=0)
-        enough = (counts[key] > 0).sum(axis=0) >= min(2, len(names))
+        enough = (counts[key] > 0).sum(axis=0) >= LEAST
         result += [
             Cell(
                 joint,
@@ -72,7 +75,7 @@ def cells(found: Experiment, z: np.ndarray, regimes: Mapping[str, np.ndarray]) -
                 float(low[j]),
                 float(high[j]),
                 float(rms[0, j]),
-                bool(least[j] > 1.0 and enough[j]),
+                bool(least[j] > ABOVE and enough[j]),
             )
             for j, joint in enumerate(found.channels)
         ]
@@ -103,7 +106,14 @@ def regimes(found: Experiment, simulator: Simulator) -> dict[str, np.ndarray]:
     if found.walking:
         masks |= _phases(found)
     wide = {key: _widened(mask, len(found.channels), key) for key, mask in masks.items()}
-    return {key: mask[:, cut.warm_up :] for key, mask in wide.items()}
+    return {key: _counted(found, mask[:, cut.warm_up :], key) for key, mask in wide.items()}
+
+
+def _counted(found: Experiment, mask: np.ndarray, key: str) -> np.ndarray:
+    """Leave joints that shake in no regime but `all`, and there as many residuals as they have: they are no ticks."""
+    rows = np.arange(mask.shape[1])[:, None] < found.comparison.used(mask.shape[1])
+    calm = ~found.comparison.shaking
+    return mask & (rows if key == "all" else calm)
 
 
 def _widened(mask: np.ndarray, channels: int, key: str) -> np.ndarray:
@@ -147,12 +157,14 @@ def sides(found: Experiment, z: np.ndarray) -> list[dict[str, object]]:
     """Return mirrored joints with the rms of each side and the chance that sides that are alike differ as much."""
     names, result = found.joints, []
     for left, right in mirrored(found.robot):
-        pair = [_by_record(z[..., [names.index(one)]] ** 2, found.pieces.record)[:, 0] for one in (left, right)]
-        per = found.pieces.record.size / max(1, len(pair[0])) * z.shape[1]
+        own = [names.index(one) for one in (left, right)]
+        pair = _by_sample(z[..., own] ** 2, found.pieces.samples).T
+        counts = found.comparison.used(z.shape[1])[own] * len(z)
         difference = pair[0] - pair[1]
         flips = np.random.default_rng(0).choice([-1.0, 1.0], (SAMPLES, len(difference)))
-        p = float((np.abs(flips @ difference) >= abs(difference.sum()) - 1e-9).mean())
-        values = [float(np.sqrt(side.sum() / (per * len(side)))) for side in pair]
+        as_far = int((np.abs(flips @ difference) >= abs(difference.sum()) - 1e-9).sum())
+        p = (as_far + 1) / (SAMPLES + 1)
+        values = [float(np.sqrt(side.sum() / count)) for side, count in zip(pair, counts, strict=True)]
         result.append({"pair": left[1:], "left": values[0], "right": values[1], "p": p})
     return result
 
@@ -163,9 +175,9 @@ def mirrored(robot: Robot) -> list[tuple[str, str]]:
     return [(name, "R" + name[1:]) for name in names if name.startswith("L") and "R" + name[1:] in names]
 
 
-def _by_record(values: np.ndarray, record: np.ndarray) -> np.ndarray:
-    """Sum over each record's windows, shape (n_records, n_joints)."""
-    return np.array([values[record == k].sum(axis=(0, 1)) for k in np.unique(record)])
+def _by_sample(values: np.ndarray, sample: np.ndarray) -> np.ndarray:
+    """Sum over each sample's windows, shape (n_samples, n_joints)."""
+    return np.array([values[sample == k].sum(axis=(0, 1)) for k in np.unique(sample)])
 
 
 def _smooth(speed: np.ndarray) -> np.ndarray:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gsl.effects.effect import effect_class
+
 
 @dataclass(frozen=True)
 class Options:
@@ -16,6 +18,7 @@ class Options:
         nulls: Simulated logs without an effect.
         threads: That replay side by side.
         clocks: Whether commands and measurements have one clock; else latency is not claimed.
+        seed: Of the simulated logs and of the learned residual.
     """
 
     without: tuple[str, ...] = ()
@@ -24,3 +27,9 @@ class Options:
     nulls: int = 3
     threads: int = 2
     clocks: bool = True
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse names that no effect has."""
+        for name in self.without:
+            effect_class(name)

@@ -13,11 +13,13 @@ from scipy.spatial.transform import Rotation
 from gsl.core.body import Robot
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
+from gsl.errors import GslError
 from gsl.worlds.held import Windows
 from gsl.worlds.servo import COMMANDS
 
 BASE = ("base.x", "base.y", "base.z", "base.roll", "base.pitch", "base.yaw")
 LOADED = 3.0  # on a foot that stands [N]
+FEW = 5  # records over which no bootstrap is drawn: its intervals would be far too narrow
 SMOOTHER = 7  # ticks of the cubic that tells a window's first velocity
 
 
@@ -155,6 +157,12 @@ class Pieces:
         """Number of windows."""
         return len(self.tick)
 
+    @property
+    def samples(self) -> np.ndarray:
+        """Index of what a bootstrap draws, shape (W,): records if there are enough of them, else single windows."""
+        few = len(np.unique(self.record)) < FEW
+        return np.arange(len(self)) if few else self.record
+
     def chosen(self, index: np.ndarray) -> Pieces:
         """Return some of the windows."""
         windows = type(self.windows)(*(part[index] for part in self.windows))
@@ -170,6 +178,9 @@ def pieces(found: Sequence[Record], robot: Robot, period: float, *, warm_up: int
         period: Control period [s].
         warm_up: Control periods at the beginning of a window that are not scored.
         scored: Control periods that are.
+
+    Raises:
+        GslError: if no record is long enough for a window.
     """
     drive, length = robot.drive, warm_up + scored
     commands, motion, real, record, tick, base = [], [], [], [], [], []
@@ -182,6 +193,11 @@ def pieces(found: Sequence[Record], robot: Robot, period: float, *, warm_up: int
             base.append(None if one.base is None else one.base[start])
             record.append(index)
             tick.append(start)
+    if not tick:
+        raise GslError(
+            f"no trajectory lasts {length * period:g} s before its robot falls or its log ends, as a replay needs; "
+            "log longer ones"
+        )
     parts = np.array(commands), np.array(motion), period * np.array(tick, dtype=float)
     windows = Windows(*parts) if base[0] is None else OnGround(*parts, np.array(base))
     return Pieces(windows, np.array(real), np.array(record), np.array(tick), warm_up)

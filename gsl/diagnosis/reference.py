@@ -40,7 +40,7 @@ def calibrated_on(
 ) -> Baseline:
     """Fit the nominal to a log without the effect: whatever is found there belongs to the nominal from now on."""
     found = experiment(reference, robot)
-    arena = arena_of(found, plant, step, replace(options, without=()), tick)
+    arena = arena_of(found, plant, step, options, tick)
     chosen = selected(arena, Thresholds(), most=options.most, width=1).chosen
     z = arena.held_out.residual(chosen.effects, chosen.fit.nuisances)
     left = np.sqrt(np.maximum(0.0, np.mean(np.minimum(z**2, 25.0), axis=(0, 1)) - 1.0))

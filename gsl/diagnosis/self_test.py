@@ -15,6 +15,7 @@ from gsl.core.plant import Plant
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Arena, Hypothesis
 from gsl.diagnosis.experiment import Experiment
+from gsl.diagnosis.options import Options
 from gsl.diagnosis.records import Pieces, Record, pieces, slope
 from gsl.diagnosis.replay import Bench
 from gsl.effects.effect import applied, built
@@ -79,12 +80,13 @@ def relogged(found: Experiment, arena: Arena, effects: Hypothesis, rng: np.rando
 
 
 def null_gains(
-    found: Experiment, arena: Arena, none: Hypothesis, count: int, tick: Callable[[str], None]
+    found: Experiment, arena: Arena, none: Hypothesis, options: Options, tick: Callable[[str], None]
 ) -> list[float]:
     """Return the best gains over calibration in logs without an effect."""
     gains = []
-    for trial in range(count):
-        fake = relogged(found, arena, replace(none, candidates=(), parameters=()), np.random.default_rng((trial, 1)))
+    for trial in range(options.nulls):
+        rng = np.random.default_rng((options.seed, trial, 1))
+        fake = relogged(found, arena, replace(none, candidates=(), parameters=()), rng)
         base = fake.calibration()
         singles, _ = fake.successors(base, 4)
         gains.append(base.cost - singles[0].cost if singles else 0.0)
@@ -93,13 +95,13 @@ def null_gains(
 
 
 def duels(
-    found: Experiment, arena: Arena, rivals: Sequence[Hypothesis], count: int, tick: Callable[[str], None]
+    found: Experiment, arena: Arena, rivals: Sequence[Hypothesis], options: Options, tick: Callable[[str], None]
 ) -> list[Trial]:
-    """Return what comes of logs whose truth is one of the rivals, each `count` times, when the rivals are fitted."""
+    """Return what comes of logs whose truth is one of the rivals, each some times, when the rivals are fitted."""
     trials = []
     for k, truth in enumerate(rivals):
-        for trial in range(count):
-            fake = relogged(found, arena, truth, np.random.default_rng((trial, 2, k)))
+        for trial in range(options.duels):
+            fake = relogged(found, arena, truth, np.random.default_rng((options.seed, trial, 2, k)))
             fits = [_refitted(fake, one) for one in rivals]
             winner = min(fits, key=lambda one: one.cost)
             costs = tuple(one.cost for one in fits)

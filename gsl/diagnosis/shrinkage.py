@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.diagnosis.ceiling import learned_residual
+from gsl.diagnosis.ceiling import CLIP, learned_residual
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.localise import regimes
 
@@ -28,7 +28,7 @@ def shrinkage(found: Findings, before: np.ndarray, after: np.ndarray) -> dict[st
     z = {key: exp.comparison.residual(values, exp.pieces) for key, values in told.items()}
     used = exp.comparison.used(z["before"].shape[1])
     mean = {key: _mean_square(values[held], used) for key, values in z.items()}
-    fraction, low, high = _fraction(z["before"][held], z["after"][held], exp.pieces.record[held], used)
+    fraction, low, high = _fraction(z["before"][held], z["after"][held], exp.pieces.chosen(held).samples, used)
     return {
         "floor": 1.0,
         **{key: float(np.sqrt(value.mean())) for key, value in mean.items()},
@@ -53,14 +53,14 @@ def _excess(z: np.ndarray, used: np.ndarray) -> float:
 
 
 def _fraction(
-    before: np.ndarray, after: np.ndarray, record: np.ndarray, used: np.ndarray
+    before: np.ndarray, after: np.ndarray, sample: np.ndarray, used: np.ndarray
 ) -> tuple[float | None, float | None, float | None]:
-    """Return the share of the excess that is gone, with its 95 % interval by bootstrap over records."""
+    """Return the share of the excess that is gone, with its 95 % interval by bootstrap over samples."""
     if _excess(before, used) < NOTHING:
         return None, None, None
-    names = np.unique(record)
-    sums = np.array([[(z[record == k] ** 2).sum() for k in names] for z in (before, after)])
-    counts = np.array([(record == k).sum() * used.sum() for k in names])
+    names = np.unique(sample)
+    sums = np.array([[(z[sample == k] ** 2).sum() for k in names] for z in (before, after)])
+    counts = np.array([(sample == k).sum() * used.sum() for k in names])
     index = np.random.default_rng(0).integers(0, len(names), (SAMPLES, len(names)))
     index = np.vstack([np.arange(len(names)), index])
     excess = sums[:, index].sum(axis=2) - counts[index].sum(axis=1)
@@ -73,8 +73,8 @@ def _ceiling(found: Findings, before: np.ndarray, z: np.ndarray, used: np.ndarra
     """Return the share of the excess that a learned residual takes away; None if there is none or joints shake."""
     if _excess(z, used) < NOTHING or found.experiment.comparison.shaking.any() or not np.isfinite(before).all():
         return None
-    learned = learned_residual(found.experiment, before)
-    return 1.0 - max(0.0, _excess(learned, used)) / _excess(z, used)
+    learned = learned_residual(found.experiment, before, seed=found.seed)
+    return 1.0 - max(0.0, _excess(learned, used)) / _excess(np.clip(z, -CLIP, CLIP), used)
 
 
 def _by_regime(found: Findings, z: dict[str, np.ndarray]) -> list[dict[str, Any]]:

@@ -23,7 +23,7 @@ def staircase(found: Experiment, z: np.ndarray) -> float:
     most = settings_of(Quantisation)["step"].upper or 0.0
     n, length = len(found.joints), found.pieces.real.shape[1]
     targets = found.pieces.windows.commands[:, :length, :n][:, ::-1]
-    left = -np.clip(z, -5.0, 5.0)
+    left = np.where(found.comparison.shaking, 0.0, -np.clip(z, -5.0, 5.0))  # whose rows are no ticks if it shakes
     best, width = most * np.sqrt(LEAST), np.sqrt(1.0 / LEAST)
     for _ in range(2):
         steps = best * np.geomspace(1.0 / width, width, STEPS)

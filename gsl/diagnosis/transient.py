@@ -30,7 +30,9 @@ def transient(found: Experiment, z: np.ndarray) -> Transient | None:
         found: The log.
         z: Residuals of all windows with everything else fitted, in units of the floor, shape (W, scored, n_joints).
     """
-    power = np.minimum(z**2, 100.0)
+    power = np.minimum(z[..., ~found.comparison.shaking] ** 2, 100.0)  # the rows of a joint that shakes are no ticks
+    if not power.shape[2]:
+        return None
     own = {record: np.median(power[found.pieces.record == record], axis=(0, 1)) for record in set(found.pieces.record)}
     by_tick: dict[int, list[np.ndarray]] = {}
     for window, record, first in zip(power, found.pieces.record, found.pieces.tick, strict=True):

@@ -9,8 +9,9 @@ import numpy as np
 
 from gsl.diagnosis.attribute import Hypothesis, gain
 from gsl.diagnosis.select import Selection
+from gsl.effects.effect import TWINS
 
-ALIKE = (frozenset({"zero_offset", "sensor_bias"}),)  # in the air, by nature (the design's section 4)
+ALIKE = tuple(frozenset(pair) for pair in TWINS.items())  # in the air
 SEPARATED = 0.75  # probability below which two causes are not told apart
 BLUNT = 12.0  # least spread of a difference of costs, where no self-test has measured it
 COARSE = 0.12  # share of a difference of costs that an imperfect model makes

@@ -22,6 +22,8 @@ from gsl.errors import ConfigError
 
 KINDS = ("command", "servo", "body", "contact", "environment", "sensor")
 
+TWINS = {"sensor_bias": "zero_offset"}  # alike by nature in the air (the design's section 4)
+
 Scope = str | tuple[str, ...]
 SCOPE = "where it acts: all, a group such as legs or arms, a joint, or a list of these"
 

@@ -27,6 +27,7 @@ from gsl.stages.diagnosis_files import PAGE, REPORT, WORLD, report_of
 from gsl.stages.experiment_file import write_next_experiment
 from gsl.stages.logs import check_log, log_files, on_ground, read_logs
 from gsl.stages.policy_gap import Effort, policy_gap
+from gsl.stages.population import Workers
 from gsl.stages.real_returns import RealReturns, measured_parents, real_returns
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
@@ -55,7 +56,7 @@ class Diagnose:
     most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
-    workers: Annotated[int, setting("threads that replay; -1 takes all cores")] = -1
+    workers: Workers = -1
     trust: Annotated[bool, setting("let the policies' files name classes that are not gsl's")] = False
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
@@ -102,7 +103,8 @@ class Diagnose:
         return batch
 
     def _options(self) -> Options:
-        return Options(self.without, self.most, self.duels, self.nulls, self._threads, self.clocks == "synchronised")
+        clocks = self.clocks == "synchronised"
+        return Options(self.without, self.most, self.duels, self.nulls, self._threads, clocks, self.seed)
 
     @property
     def _threads(self) -> int:
