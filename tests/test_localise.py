@@ -22,7 +22,7 @@ def part(count: int) -> Experiment:
 
 
 def mapped(one: Experiment, z: np.ndarray) -> list[Cell]:
-    return cells(one, z, regimes(one, one.simulator(nominal(arm()), 0.002, 1)))
+    return cells(one, z, regimes(one, one.simulator(nominal(arm()), 0.002, 1, 1.0)))
 
 
 @pytest.mark.parametrize("count", [1, 2, 9])

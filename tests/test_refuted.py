@@ -34,7 +34,7 @@ def with_channels(batch: Batch, channels: Mapping[str, Any]) -> Batch:
 def claim(effect: str, values: list[float], free: tuple[str, ...]) -> Hypothesis:
     """A hypothesis with fitted values, its fit left out."""
     candidate = next(one for one in library(arm()) if one.effect == effect and one.free == free)
-    fit = Fit(np.array(values), none(2), 0.0, np.eye(len(values)))
+    fit = Fit(np.array(values), none(2), 0.0, 0.0, np.eye(len(values)))
     return Hypothesis((candidate,), (np.array(values),), fit, np.zeros(1), np.ones(1), np.ones(2))
 
 

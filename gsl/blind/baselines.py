@@ -52,7 +52,7 @@ def _least(bench: Bench, arena: Arena) -> Answer:
     at = nuisance.none(bench.joints)
     z = bench.residual({}, at)
     slopes = sensitivities(bench, {}, at, z)
-    best, costs = projected(z, slopes, at)
+    best, costs = projected(z, slopes, at, bench.simulator.spread)
     ground = Ground({}, at, z, slopes, costs, best)
     leads = screened(bench, ground, arena.library, arena.scopes, arena.tick).leads
     if not leads or leads[0].cost > float(costs.sum()) - GAIN:

@@ -48,7 +48,7 @@ def arena_of(
     looks: Looks | None = None,
 ) -> Arena:
     """Return where hypotheses on a log compete, a push among them only if a look found one."""
-    simulator = found.simulator(plant, step, options.threads)
+    simulator = found.simulator(plant, step, options.threads, options.spread)
     contact = () if found.walking else ON_GROUND
     hidden = [name for name in names() if getattr(effect_class(name), "kind", "") in contact]
     hidden += [] if options.clocks else [LATENCY]

@@ -35,7 +35,7 @@ class Hypothesis:
         fit: On the training windows.
         costs: Robust cost of the held-out residuals of each sample of `Pieces.samples`, shape (n_samples,).
         counts: Residuals in each of these, shape (n_samples,).
-        levels: Held-out cost of one residual of each joint, shape (n_joints,).
+        levels: Held-out cost of one residual of each joint, see `Comparison.levels`, shape (n_joints,).
     """
 
     candidates: tuple[Candidate, ...]
@@ -58,7 +58,7 @@ class Hypothesis:
     @property
     def cost(self) -> float:
         """Held-out cost, that of the nuisances included."""
-        return float(self.costs.sum()) + nuisance.cost(self.fit.nuisances)
+        return float(self.costs.sum()) + self.fit.toll
 
     @property
     def level(self) -> float:
@@ -124,14 +124,14 @@ class Arena:
         costs = np.array([cost[sample == name].sum() for name in names])
         counts = np.array([used.sum() * (sample == name).sum() for name in names])
         self.tick("")
-        return Hypothesis(candidates, parameters, fit, costs, counts, cost.mean(axis=0) / used)
+        return Hypothesis(candidates, parameters, fit, costs, counts, self.held_out.comparison.levels(loss(z)))
 
     def ground(self, base: Hypothesis) -> Ground:
         """Return where a screening on top of a hypothesis starts: without its nuisances, which hide what is missing."""
         at, effects, bench = nuisance.none(self.train.joints), base.effects, self.glance
         z = bench.residual(effects, at)
         slopes = sensitivities(bench, effects, at, z)
-        best, costs = projected(z, slopes, at)
+        best, costs = projected(z, slopes, at, bench.simulator.spread)
         return Ground(effects, at, z, slopes, costs, best)
 
     def successors(self, base: Hypothesis, width: int = WIDTH) -> tuple[list[Hypothesis], Screening]:
@@ -181,7 +181,7 @@ class Gain:
 def gain(better: Hypothesis, worse: Hypothesis, *, samples: int = 1000, seed: int = 0) -> Gain:
     """Compare two hypotheses sample by sample; the difference of their nuisances' costs is in every sample."""
     difference = worse.costs - better.costs
-    extra = nuisance.cost(worse.fit.nuisances) - nuisance.cost(better.fit.nuisances)
+    extra = worse.fit.toll - better.fit.toll
     index = np.random.default_rng(seed).integers(0, len(difference), (samples, len(difference)))
     totals = difference[index].sum(axis=1) + extra
     low, high = np.quantile(totals, [0.025, 0.975])

@@ -25,6 +25,7 @@ PAIRED = (0.2, 0.6)  # where two strengths are searched together
 SHAPES = (0.0, 0.3, 1.0)
 WIDE = 10.0  # ends of a range of shapes that are further apart, as a factor, are stepped in logarithms
 PROBE = 0.1  # share of the range at which an effect that acts in proportion is probed
+SLACK = 0.1  # share of a documented range by which a fit of a value near its end may miss it
 BEYOND = 1.5  # how far past its documented range a strength is fitted; there it loses its claim to the name
 
 
@@ -84,8 +85,8 @@ class Candidate:
         return {**self.fixed, **dict(zip(self.free, parameters.tolist(), strict=True))}
 
     def claims_its_name(self, parameters: np.ndarray) -> bool:
-        """Whether the parameters are inside their documented range."""
-        slack = 0.02 * (self.documented[1] - self.documented[0])
+        """Whether the parameters are inside their documented range, as far as a fit can tell."""
+        slack = SLACK * (self.documented[1] - self.documented[0])
         return bool(((parameters >= self.documented[0] - slack) & (parameters <= self.documented[1] + slack)).all())
 
 

@@ -30,6 +30,11 @@ GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best 
 RIVALS = 3  # hypotheses that duel, at most
 ON_FOOT = 0.1  # share of the cost that chance gains on the ground, where no log can be simulated: measured on walks
 SHAKING = 0.1  # the same of joints that shake: their phase is chance
+DOUBT_ON_FOOT, DOUBT = (
+    0.05,
+    0.08,
+)  # share of the cost by which two causes differ by chance, there and of joints that shake
+SAME = 0.3  # of the usual spread: by how much the calibration of one robot may change from a reference to its log
 RESTARTS = 40  # windows that measure what a log does not show of a walk
 
 
@@ -107,7 +112,7 @@ def diagnosed(
         tick("calibrating the simulator on the reference")
         baseline = calibrated_on(reference, robot, plant, step, options, tick)
         plant = nuisance.calibrated(applied(plant, built(baseline.effects)), baseline.nuisances)
-        found = found.with_model_error(baseline.error)
+        found, options = found.with_model_error(baseline.error), replace(options, spread=SAME)
     if not options.clocks:
         tick("setting the clocks")
         shift = clock_shift(found, plant, step, options, tick)
@@ -121,7 +126,9 @@ def diagnosed(
     if options.nulls and not nulls and not walking:
         tick("self-test: what chance gains on these commands")
         nulls = tuple(null_gains(found, arena, none, options, tick))
-    chance = ON_FOOT if walking else SHAKING * _shaking(found)
+    shaking = _shaking(found)
+    chance = ON_FOOT if walking else SHAKING * shaking
+    doubt = DOUBT_ON_FOOT if walking else DOUBT * shaking
     thresholds = Thresholds(gain=max(GAIN, CHANCE * max(nulls, default=0.0)), share=chance)
     tick("trying the library on the log")
     selection, wrong = _upheld(found, arena, none, thresholds, options)
@@ -129,7 +136,7 @@ def diagnosed(
     tick("self-test: can the causes that are left be told apart")
     trials = tuple(duels(found, arena, survivors, options, tick)) if options.duels and not walking else ()
     expected = _expected(selection, trials) * (1.0 + found.noise.slack)
-    verdict = judged(selection, expected, _margins(trials, survivors), chance, walking=walking)
+    verdict = judged(selection, expected, _margins(trials, survivors), doubt, walking=walking)
     return Findings(
         found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong, options.seed
     )

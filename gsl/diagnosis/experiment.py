@@ -72,12 +72,12 @@ class Experiment:
         """Names of what is compared: the joints, and the base if it moves."""
         return (*self.joints, *BASE) if self.walking else self.joints
 
-    def simulator(self, plant: Plant, step: float, threads: int) -> Simulator:
+    def simulator(self, plant: Plant, step: float, threads: int, spread: float) -> Simulator:
         """Return what replays the log's commands in a plant, in steps of half the size where joints shake."""
         if self.walking:
             return Walking(plant, fitting_step(step, self.period), self.period, workers=threads)
         fine = 0.5 if self.comparison.shaking.any() else 1.0
-        return InTheAir(plant, fitting_step(fine * step, self.period), self.period, threads)
+        return InTheAir(plant, fitting_step(fine * step, self.period), self.period, threads, spread)
 
     def bench(self, simulator: Simulator, part: str) -> Bench:
         """Return the windows of a part, `train` (thinned), `held_out` or `all`, with a simulator."""
@@ -120,7 +120,7 @@ def _on_ground(found: tuple[Record, ...], robot: Robot, period: float) -> Experi
     joints = np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
     noise = noise_floor(found, robot.encoder_step, np.r_[joints, list(LEAST.values())])
     held, by_record = _held_out(found, cut)
-    how = Comparison(noise.sd, np.zeros(len(noise.sd), dtype=bool))
+    how = Comparison(noise.sd, np.zeros(len(noise.sd), dtype=bool), np.zeros(len(noise.sd)))
     return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
 
 

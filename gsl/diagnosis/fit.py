@@ -48,27 +48,29 @@ def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarr
     return np.array(columns)
 
 
-def projected(z: np.ndarray, slopes: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def projected(z: np.ndarray, slopes: np.ndarray, at: np.ndarray, spread: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the best nuisances, shape (6, n_joints), and each joint's cost with them, shape (n_joints,).
 
     Args:
         z: Residuals with nuisances `at`, shape (W, scored, n_joints).
         slopes: From `sensitivities`.
         at: Nuisances, shape (6, n_joints).
+        spread: Of the nuisances, as a share of the usual one.
     """
     flat = z.reshape(-1, z.shape[2])
     columns = slopes.reshape(len(slopes), -1, z.shape[2])
-    precision, best, left = 1.0 / nuisance.SIZES**2, at, flat
+    sizes = spread * nuisance.SIZES
+    precision, best, left = 1.0 / sizes**2, at, flat
     for _ in range(REWEIGHTINGS):
         w = weight(left)
         matrix = np.einsum("amj,mj,bmj->jab", columns, w, columns, optimize=True) + np.diag(precision)
         right = -np.einsum("amj,mj->ja", columns, w * flat) - precision * at.T
         best = nuisance.bounded(at + np.linalg.solve(matrix, right[..., None])[..., 0].T)
         left = flat + np.einsum("amj,aj->mj", columns, best - at)
-    return best, loss(left).sum(axis=0) + ((best / nuisance.SIZES[:, None]) ** 2).sum(axis=0)
+    return best, loss(left).sum(axis=0) + ((best / sizes[:, None]) ** 2).sum(axis=0)
 
 
-def proportional(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, at: np.ndarray) -> np.ndarray:
+def proportional(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, at: np.ndarray, spread: float = 1.0) -> np.ndarray:
     """Return the best parameters of effects in proportion to them, nuisances free, shape (p,).
 
     Args:
@@ -76,12 +78,13 @@ def proportional(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, at: np.ndar
         own: Derivatives to the parameters, shape (p, W, scored, n_joints).
         slopes: From `sensitivities`.
         at: Nuisances, shape (6, n_joints).
+        spread: Of the nuisances, as a share of the usual one.
     """
     theta = np.zeros(len(own))
     for _ in range(REWEIGHTINGS):
-        best, _ = projected(z + np.einsum("a,awsj->wsj", theta, own), slopes, at)
+        best, _ = projected(z + np.einsum("a,awsj->wsj", theta, own), slopes, at, spread)
         left = z + np.einsum("a,awsj->wsj", theta, own) + np.einsum("awsj,aj->wsj", slopes, best - at)
-        matrix, right = _normal(left, own, slopes, best)
+        matrix, right = _normal(left, own, slopes, best, spread)
         theta = theta + np.linalg.solve(matrix, right)[: len(own)]
     return theta
 
@@ -94,12 +97,14 @@ class Fit:
         parameters: Of the effects, shape (p,).
         nuisances: Shape (6, n_joints).
         cost: Robust cost of the residuals and of the nuisances.
+        toll: Of the nuisances alone.
         covariance: Of the parameters, nuisances free, shape (p, p).
     """
 
     parameters: np.ndarray
     nuisances: np.ndarray
     cost: float
+    toll: float
     covariance: np.ndarray
 
 
@@ -130,14 +135,14 @@ def refined(
     problem = _Problem(bench, build, bounds, multiplies)
     first = np.clip(start, *bounds)
     z = bench.residual(build(first), at)
-    here = _Point(first, at, z, float(loss(z).sum()) + nuisance.cost(at))
+    here = _Point(first, at, z, float(loss(z).sum()) + nuisance.cost(at, bench.simulator.spread))
     here, matrix = _descended(problem, here, every, rounds)
     if len(first) and (here.cost > POOR * z.size or bench.comparison.shaking.any()):
         there, other = _descended(problem, _searched(bench, build, here, bounds), every, rounds)
         here, matrix = (there, other) if there.cost < here.cost else (here, matrix)
     scale = problem.scale(here.theta)
     covariance = np.linalg.inv(matrix)[: len(first), : len(first)] * np.outer(scale, scale)
-    return Fit(here.theta, here.nuisances, here.cost, covariance)
+    return Fit(here.theta, here.nuisances, here.cost, nuisance.cost(here.nuisances, bench.simulator.spread), covariance)
 
 
 class _Problem(NamedTuple):
@@ -175,7 +180,7 @@ def _descended(problem: _Problem, here: _Point, every: int, rounds: int) -> tupl
             slopes, age = sensitivities(bench, build(here.theta), here.nuisances, here.z), 0
         own = _own_slopes(bench, build, here.theta, problem.bounds, here.nuisances, here.z)
         own = own * problem.scale(here.theta)[:, None, None, None]
-        matrix, right = _normal(here.z, own, slopes, here.nuisances)
+        matrix, right = _normal(here.z, own, slopes, here.nuisances, bench.simulator.spread)
         before, here = here, _stepped(problem, here, matrix, right)
         if before.cost - here.cost < ENOUGH * before.cost:
             if age == 0:
@@ -193,7 +198,7 @@ def _stepped(problem: _Problem, here: _Point, matrix: np.ndarray, right: np.ndar
         theta = problem.moved(here.theta, step[:p])
         nuisances = nuisance.bounded(here.nuisances + step[p:].reshape(here.nuisances.shape))
         z = problem.bench.residual(problem.build(theta), nuisances)
-        cost = float(loss(z).sum()) + nuisance.cost(nuisances)
+        cost = float(loss(z).sum()) + nuisance.cost(nuisances, problem.bench.simulator.spread)
         if cost < here.cost:
             return _Point(theta, nuisances, z, cost)
     return here
@@ -238,7 +243,9 @@ def _own_slopes(
     return np.array(columns).reshape(len(theta), *z.shape)
 
 
-def _normal(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _normal(
+    z: np.ndarray, own: np.ndarray, slopes: np.ndarray, n: np.ndarray, spread: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the normal equations of (parameters, nuisances), of shapes (p + 6 n, p + 6 n) and (p + 6 n,)."""
     p, joints = len(own), z.shape[2]
     w, size = weight(z), p + n.size
@@ -253,7 +260,7 @@ def _normal(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, n: np.ndarray) -
         for b in range(len(slopes)):
             at_a, at_b = p + a * joints + np.arange(joints), p + b * joints + np.arange(joints)
             matrix[at_a, at_b] = blocks[a, b]
-    precision = np.repeat(1.0 / nuisance.SIZES**2, joints)
+    precision = np.repeat(1.0 / (spread * nuisance.SIZES) ** 2, joints)
     matrix[range(p, size), range(p, size)] += precision
     matrix[range(p), range(p)] += 1e-9 * np.abs(np.diag(matrix)[:p]) + 1e-12
     right[p:] = -np.einsum("awsj,wsj->aj", slopes, w * z).ravel() - precision * n.ravel()

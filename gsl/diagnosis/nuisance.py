@@ -37,19 +37,19 @@ def none(joints: int) -> np.ndarray:
     return np.zeros((len(NAMES), joints))
 
 
-def drawn(rng: np.random.Generator, joints: int) -> np.ndarray:
-    """Return nuisances as one make of servo has them, shape (6, n_joints).
+def drawn(rng: np.random.Generator, joints: int, spread: float = 1.0) -> np.ndarray:
+    """Return nuisances as one make of servo has them, or a share of that, shape (6, n_joints).
 
     A robot's inertia is never below the simulator's: its time has no step that damping could lag behind.
     """
-    result = SIZES[:, None] * rng.standard_normal((len(NAMES), joints))
+    result = spread * SIZES[:, None] * rng.standard_normal((len(NAMES), joints))
     result[INERTIA] = np.abs(result[INERTIA])
     return result
 
 
-def cost(nuisances: np.ndarray) -> float:
-    """Return what nuisances, shape (6, n_joints), cost."""
-    return float(((nuisances / SIZES[:, None]) ** 2).sum())
+def cost(nuisances: np.ndarray, spread: float = 1.0) -> float:
+    """Return what nuisances, shape (6, n_joints), cost where they spread by a share of SIZES."""
+    return float(((nuisances / (spread * SIZES[:, None])) ** 2).sum())
 
 
 def bounded(nuisances: np.ndarray) -> np.ndarray:

@@ -42,6 +42,7 @@ class Walking:
     iterations: int = 50
     workers: int = 1
     calibrates = False
+    spread = 1.0
 
     def told(self, effects: Effects, nuisances: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return replayed joints [rad] and base, shape (W, T, n_channels); of `nuisances` only zeros play a part."""

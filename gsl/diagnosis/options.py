@@ -18,6 +18,7 @@ class Options:
         nulls: Simulated logs without an effect.
         threads: That replay side by side.
         clocks: Whether commands and measurements have one clock; else latency is not claimed.
+        spread: Of the robot's calibration about the simulator's, as a share of the usual spread of one make.
         seed: Of the simulated logs and of the learned residual.
     """
 
@@ -27,6 +28,7 @@ class Options:
     nulls: int = 3
     threads: int = 2
     clocks: bool = True
+    spread: float = 1.0
     seed: int = 0
 
     def __post_init__(self) -> None:

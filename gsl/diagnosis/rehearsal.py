@@ -133,8 +133,9 @@ def _moved(one: Explanation, row: int, probe: float) -> Explanation:
 
 def _rehearsal(found: Findings, records: Sequence[Record], owner: np.ndarray) -> Rehearsal:
     exp, n = found.experiment, len(found.experiment.joints)
-    exact = Comparison(np.zeros(n), np.zeros(n, dtype=bool))
-    how = Comparison(exp.comparison.floor[:n], exp.comparison.shaking[:n])
+    exact = Comparison(np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n))
+    own = exp.comparison
+    how = Comparison(own.floor[:n], own.shaking[:n], own.sway[:n])
     return Rehearsal(replace(exp, records=tuple(records), comparison=exact), found.simulator, how, owner)
 
 

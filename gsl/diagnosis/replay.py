@@ -29,12 +29,14 @@ class InTheAir:
         step: Physics period [s].
         period: Control period [s].
         threads: That replay side by side.
+        spread: Of the robot's calibration about this one, as a share of the usual spread of one make.
     """
 
     plant: Plant
     step: float
     period: float
     threads: int = 1
+    spread: float = 1.0
     calibrates = True
     _pool: ThreadPoolExecutor = field(default_factory=ThreadPoolExecutor, repr=False, compare=False)
 
@@ -63,6 +65,10 @@ class Simulator(Protocol):
     """
 
     calibrates: bool
+
+    @property
+    def spread(self) -> float:
+        """Of the robot's calibration about this one, as a share of the usual spread of one make."""
 
     @property
     def plant(self) -> Plant:

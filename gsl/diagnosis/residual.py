@@ -11,14 +11,15 @@ from gsl.diagnosis.records import Pieces
 
 SCALE = 5.0  # beyond this many floors a residual counts less and less
 MEAN = 5  # ticks of the low pass
-BANDS = 4  # of the fast part's spectrum
+BANDS = 5  # of the spectrum
 POWER_SD = (
     0.6  # of the logarithm of a shaking joint's power in one window, measured on replays of shaking by its true cause
 )
+OF_BAND = 0.5  # share of the cost of the band that is furthest off: it is the worst of several
 COLOURED = 0.4  # correlation of a resting joint's log with itself some ticks later: noise has none
 LAGS = 4
 USUAL = 0.75  # share of these windows, the calmest, that is looked at
-MIN_RESTS = 3  # windows in which a joint rests that it takes to judge
+MIN_RESTS = 2  # of these, that it takes to judge
 
 
 def loss(z: np.ndarray) -> np.ndarray:
@@ -38,10 +39,12 @@ class Comparison:
     Attributes:
         floor: Standard deviation that noise and a known model error explain [rad], shape (n_joints,).
         shaking: Joints whose phase a log cannot carry, shape (n_joints,).
+        sway: How far these swing slowly while their commands rest [rad], shape (n_joints,).
     """
 
     floor: np.ndarray
     shaking: np.ndarray
+    sway: np.ndarray
 
     def residual(self, told: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return the residuals of the scored part, shape (W, scored, n_joints).
@@ -60,12 +63,23 @@ class Comparison:
         """Return how many residuals of a window count for each joint, shape (n_joints,)."""
         return np.where(self.shaking, scored // MEAN + BANDS, scored)
 
+    def levels(self, cost: np.ndarray) -> np.ndarray:
+        """Return the mean of costs, shape (W, scored, n_joints), over one joint's residuals, shape (n_joints,).
+
+        Of a joint that shakes the band that is furthest off tells as well: a few rows of many, they say that the
+        simulator does not shake.
+        """
+        mean = cost.mean(axis=0)
+        levels, first = mean.sum(axis=0) / self.used(len(mean)), len(mean) // MEAN
+        band = OF_BAND * mean[first : first + BANDS].max(axis=0)
+        return np.where(self.shaking, np.maximum(levels, band), levels)
+
     def _of_shaking(self, sim: np.ndarray, real: np.ndarray) -> np.ndarray:
-        """Slow parts as they are, fast parts by their power in each band; the rest of the rows is zero."""
-        floor, rows = self.floor[self.shaking], sim.shape[1] // MEAN
+        """Slow parts as far as sim and real need not swing alike, and the power in each band; other rows are zero."""
+        floor, sway, rows = self.floor[self.shaking], self.sway[self.shaking], sim.shape[1] // MEAN
         z = np.zeros_like(sim)
         slow, fast = zip(*(_parted(x, rows) for x in (sim, real)), strict=True)
-        z[:, :rows] = (slow[0] - slow[1]) / (floor * np.sqrt(1.0 + fast[1] / floor**2 / MEAN)[:, None])
+        z[:, :rows] = (slow[0] - slow[1]) / np.sqrt(floor**2 + fast[1] / MEAN + 2.0 * sway**2)[:, None]
         power = [_bands(x) for x in (sim, real)]
         noise = floor**2  # the replay has none of it
         z[:, rows : rows + BANDS] = np.log((power[0] + noise) / np.maximum(power[1], noise)) / POWER_SD
@@ -80,13 +94,12 @@ def _parted(x: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _bands(x: np.ndarray) -> np.ndarray:
-    """Return the mean power of the fast part by band, shape (W, BANDS, n): white noise has its variance in each."""
+    """Return the mean power but for the mean by band, shape (W, BANDS, n): white noise has its variance in each."""
     length = x.shape[1]
     taper = np.hanning(length + 2)[1:-1, None]
     taper = taper / np.sqrt((taper**2).mean())
     spectrum = np.abs(np.fft.rfft((x - x.mean(axis=1, keepdims=True)) * taper, axis=1)) ** 2 / length
-    first = 2 * length // (2 * MEAN) // 2  # slower than this the means tell
-    edges = np.linspace(first, spectrum.shape[1], BANDS + 1).round().astype(int)
+    edges = np.linspace(1, spectrum.shape[1], BANDS + 1).round().astype(int)
     return np.stack([spectrum[:, a:b].mean(axis=1) for a, b in zip(edges[:-1], edges[1:], strict=True)], axis=1)
 
 
@@ -101,22 +114,33 @@ def comparison(pieces: Pieces, noise: NoiseFloor, resting: np.ndarray) -> Compar
         resting: Whether each joint's command rests in each window, shape (W, n_joints).
     """
     real = pieces.real[:, pieces.warm_up :]
-    shaking = np.array([_shakes(real[rests, :, joint], noise.resolution) for joint, rests in enumerate(resting.T)])
+    at_rest = [_level(real[rests, :, joint]) for joint, rests in enumerate(resting.T)]
+    shaking = np.array([_shakes(x, noise.resolution) for x in at_rest])
     calm = np.median(noise.sd[~shaking]) if not shaking.all() else 3.0 * noise.resolution
-    return Comparison(np.where(shaking, np.minimum(noise.sd, calm), noise.sd), shaking)
+    sway = np.array([_sway(x) if shakes else 0.0 for x, shakes in zip(at_rest, shaking, strict=True)])
+    return Comparison(np.where(shaking, np.minimum(noise.sd, calm), noise.sd), shaking, sway)
+
+
+def _level(rest: np.ndarray) -> np.ndarray:
+    """Return the calmest of resting windows, shape (W, scored), each less its line."""
+    x = rest - rest.mean(axis=1, keepdims=True)
+    line = np.linspace(-1.0, 1.0, rest.shape[1])
+    x = x - np.outer(x @ line / (line @ line), line)
+    return x[np.argsort((x**2).mean(axis=1))[: max(1, round(USUAL * len(x)))]]
+
+
+def _sway(rest: np.ndarray) -> float:
+    """Return the standard deviation of the means over MEAN ticks [rad] of what `_level` returns."""
+    return float(np.sqrt((_parted(rest[..., None], rest.shape[1] // MEAN)[0] ** 2).mean()))
 
 
 def _shakes(rest: np.ndarray, resolution: float) -> bool:
-    """Whether a resting joint's log, shape (W, scored), moves by more than rounding and not as noise does.
+    """Whether a resting joint, as `_level` returns it, moves by more than rounding and not as noise does.
 
     What happens in a few windows only is no shaking.
     """
     if len(rest) < MIN_RESTS:
         return False
-    x = rest - rest.mean(axis=1, keepdims=True)
-    line = np.linspace(-1.0, 1.0, rest.shape[1])
-    x = x - np.outer(x @ line / (line @ line), line)
-    x = x[np.argsort((x**2).mean(axis=1))[: max(1, round(USUAL * len(x)))]]
-    power = float((x**2).mean())
-    colour = max(abs(float((x[:, lag:] * x[:, :-lag]).mean())) for lag in range(1, LAGS + 1))
+    power = float((rest**2).mean())
+    colour = max(abs(float((rest[:, lag:] * rest[:, :-lag]).mean())) for lag in range(1, LAGS + 1))
     return power > resolution**2 and colour > COLOURED * power

@@ -102,7 +102,7 @@ def _answer(bench: Bench, ground: Ground, candidate: Candidate) -> np.ndarray:
         moved[k] += probe
         z = bench.residual(merged(ground.effects, candidate, moved), ground.nuisances)
         own.append((z - ground.residual) / probe)
-    change = proportional(ground.residual, np.array(own), ground.slopes, ground.nuisances)
+    change = proportional(ground.residual, np.array(own), ground.slopes, ground.nuisances, bench.simulator.spread)
     return np.clip(candidate.neutral + change, *candidate.bounds)
 
 
@@ -117,7 +117,7 @@ def _costs(
         trace = max(trace, float(np.sqrt(np.mean((z - ground.residual) ** 2, axis=(0, 1)).max())))
         if trace == 0.0:
             break
-        nuisances[row], costs[row] = projected(z, ground.slopes, ground.nuisances)
+        nuisances[row], costs[row] = projected(z, ground.slopes, ground.nuisances, bench.simulator.spread)
     return costs, nuisances, trace
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import BEAM, Arena, Gain, Hypothesis, gain
 from gsl.diagnosis.screen import Screening
 
@@ -16,6 +15,7 @@ MUCH = 1.1  # cost of a residual that leaves room for more than a small further 
 NOTHING = 1.0  # cost of a residual that leaves room for none: that of noise is .96
 FLAW = 0.005  # of the cost of calibration, that a simulator's own flaws (its time step, say) let any effect gain
 HIDDEN = 1.5  # cost of a nuisance, on average, beyond which a calibration hides a cause
+NEAR, CHALLENGERS = 0.2, 2  # share of what is explained within which rivals are polished, and how many
 PAIRS = 5  # leads that are fitted beside an effect that stands already
 
 
@@ -84,12 +84,14 @@ def selected(
             if not _lacking(arena, chosen, MUCH):
                 break
         chosen = _polished(arena, _pruned(arena, chosen, none, thresholds, tried), tried)
+        if thresholds.share:
+            chosen = _challenged(arena, chosen, none, tried)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
 
 
 def _begins(one: Hypothesis, none: Hypothesis, least: float) -> bool:
     """Whether a first effect gains enough, be it on the residuals, flaws apart, or by freeing the nuisances."""
-    freed = nuisance.cost(none.fit.nuisances) - nuisance.cost(one.fit.nuisances)
+    freed = none.fit.toll - one.fit.toll
     on_residuals = float(none.costs.sum() - one.costs.sum())
     beyond = freed + (max(0.0, on_residuals - FLAW * none.cost) if on_residuals > 0.0 else on_residuals)
     return _stands(one, none, least) and beyond > least
@@ -108,7 +110,7 @@ def _least(thresholds: Thresholds, standing: Hypothesis, none: Hypothesis) -> fl
 
 def _lacking(arena: Arena, standing: Hypothesis, level: float) -> bool:
     """Whether more is left than noise, or hidden in nuisances; the cost of joints that shake does not tell."""
-    hides = nuisance.cost(standing.fit.nuisances) > HIDDEN * standing.fit.nuisances.size
+    hides = standing.fit.toll > HIDDEN * standing.fit.nuisances.size
     return standing.level > level or hides or bool(arena.train.comparison.shaking.any())
 
 
@@ -139,6 +141,18 @@ def _without(arena: Arena, chosen: Hypothesis, k: int) -> Hypothesis:
     rest = [index for index in range(len(chosen.candidates)) if index != k]
     start = np.concatenate([chosen.parameters[index] for index in rest])
     return arena.fitted(tuple(chosen.candidates[index] for index in rest), start, chosen.fit.nuisances)
+
+
+def _challenged(arena: Arena, chosen: Hypothesis, none: Hypothesis, tried: list[Hypothesis]) -> Hypothesis:
+    """Polish the nearest rivals too, and return the best: where joints shake costs jump by as much as they differ."""
+    names, rivals = [set(chosen.names)], []
+    for one in sorted(tried, key=lambda one: one.cost):
+        near = one.cost - chosen.cost < NEAR * (none.cost - chosen.cost)
+        if near and len(one.candidates) == len(chosen.candidates) and set(one.names) not in names:
+            names.append(set(one.names))
+            rivals.append(one)
+    polished = [_polished(arena, one, tried) for one in rivals[:CHALLENGERS]]
+    return min([chosen, *polished], key=lambda one: one.cost)
 
 
 def _polished(arena: Arena, chosen: Hypothesis, tried: list[Hypothesis]) -> Hypothesis:

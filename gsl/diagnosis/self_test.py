@@ -65,7 +65,7 @@ def relogged(found: Experiment, arena: Arena, effects: Hypothesis, rng: np.rando
     """Return the arena with a simulated log in the real one's place, made with fresh nuisances."""
     simulator = arena.train.simulator
     plant = nuisance.calibrated(
-        applied(simulator.plant, built(effects.effects)), nuisance.drawn(rng, len(found.joints))
+        applied(simulator.plant, built(effects.effects)), nuisance.drawn(rng, len(found.joints), simulator.spread)
     )
     made = simulated(found, plant, simulator.step, rng)
     length = found.pieces.real.shape[1]

@@ -64,7 +64,7 @@ def judged(
     found: Selection,
     expected: float,
     margins: Sequence[tuple[str, float]] = (),
-    chance: float = 0.0,
+    doubt: float = 0.0,
     *,
     walking: bool = False,
 ) -> Verdict:
@@ -74,7 +74,7 @@ def judged(
         found: What attribution came to.
         expected: Cost of a residual where only noise is left.
         margins: Spread of the difference of costs to a rival, by the rival's effect, as a self-test measured it.
-        chance: Share of a cost by which it may differ without a cause.
+        doubt: Share of a cost by which that of two causes differs by chance.
         walking: Whether the robot is on the ground, where the base tells what is alike in the air.
     """
     chosen, none = found.chosen, found.none
@@ -86,7 +86,7 @@ def judged(
     if not chosen.candidates:
         return Verdict("unknown" if strange > 1.0 else "no_gap", (), (), 0.0, remaining, 1.0)
     spreads = dict(margins)
-    causes = tuple(_cause(found, k, excess, spreads, chance) for k in range(len(chosen.candidates)))
+    causes = tuple(_cause(found, k, excess, spreads, doubt) for k in range(len(chosen.candidates)))
     known = _known(explained, float(strange))
     alike = () if walking else ALIKE
     groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in alike if twins & set(chosen.names)]
@@ -106,7 +106,7 @@ def _known(explained: float, strange: float) -> float:
     return float(1.0 / (1.0 + np.exp(min(missing, unexplained) / KNOWN_SOFT)))
 
 
-def _cause(found: Selection, k: int, excess: float, spreads: dict[str, float], chance: float) -> Cause:
+def _cause(found: Selection, k: int, excess: float, spreads: dict[str, float], doubt: float) -> Cause:
     chosen, effect = found.chosen, found.chosen.names[k]
     rivals = [one for one in found.tried if len(one.candidates) <= len(chosen.candidates) and effect not in one.names]
     fewer = min((one for one in rivals if len(one.candidates) < len(chosen.candidates)), key=_cost, default=found.none)
@@ -116,9 +116,7 @@ def _cause(found: Selection, k: int, excess: float, spreads: dict[str, float], c
     if best is None:
         return Cause(k, 0.99, None, value, low, high)
     other = next((name for name in best.names if name not in chosen.names), best.names[-1])
-    return Cause(
-        k, _ahead(best, chosen, max(spreads.get(other, 0.0), 0.5 * chance * chosen.cost)), other, value, low, high
-    )
+    return Cause(k, _ahead(best, chosen, max(spreads.get(other, 0.0), doubt * chosen.cost)), other, value, low, high)
 
 
 def _ahead(rival: Hypothesis, chosen: Hypothesis, spread: float) -> float:

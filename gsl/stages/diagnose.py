@@ -104,7 +104,7 @@ class Diagnose:
 
     def _options(self) -> Options:
         clocks = self.clocks == "synchronised"
-        return Options(self.without, self.most, self.duels, self.nulls, self._threads, clocks, self.seed)
+        return Options(self.without, self.most, self.duels, self.nulls, self._threads, clocks, seed=self.seed)
 
     @property
     def _threads(self) -> int:
