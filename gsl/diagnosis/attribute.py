@@ -94,6 +94,10 @@ class Arena:
         spread = np.unique(np.linspace(0, count - 1, min(count, looked_at)).round().astype(int))
         return replace(self.train, pieces=self.train.pieces.chosen(spread))
 
+    def only(self, effects: Sequence[str]) -> Arena:
+        """Return the arena with a part of the library."""
+        return replace(self, library=tuple(one for one in self.library if one.effect in effects))
+
     def calibration(self) -> Hypothesis:
         """Return the hypothesis without an effect."""
         return self.fitted((), np.zeros(0), nuisance.none(self.train.joints), every=1)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import BEAM, Arena, Gain, Hypothesis, gain
 from gsl.diagnosis.screen import Screening
 
@@ -16,6 +17,8 @@ NOTHING = 1.0  # cost of a residual that leaves room for none: that of noise is 
 FLAW = 0.005  # of the cost of calibration, that a simulator's own flaws (its time step, say) let any effect gain
 HIDDEN = 1.5  # cost of a nuisance, on average, beyond which a calibration hides a cause
 NEAR, CHALLENGERS = 0.2, 2  # share of what is explained within which rivals are polished, and how many
+SHIFTS = ("zero_offset", "sensor_bias")
+MANY, ASIDE = 4, 4.0  # joints, and standard errors by which their mean zero is off, that are no chance
 PAIRS = 5  # leads that are fitted beside an effect that stands already
 
 
@@ -71,47 +74,54 @@ def selected(
     none = none or arena.calibration()
     singles, screening = arena.successors(none)
     tried, chosen = [none, *singles], none
-    if singles and _begins(singles[0], none, max(thresholds.gain, thresholds.share * none.cost)):
+    least = max(thresholds.gain, thresholds.share * none.cost)
+    if singles and _stands(singles[0], none, least, FLAW * none.cost):
         chosen = _polished(arena, singles[0], tried) if thresholds.share else singles[0]
-        beam = _distinct(singles, width)
-        while len(chosen.candidates) < most and _lacking(arena, chosen, NOTHING):
-            found = [one for base in beam for one in arena.successors(base, PAIRS)[0]]
+        beam, level = _distinct(singles, width), NOTHING
+        while len(chosen.candidates) < most:
+            if not (_lacking(arena, chosen, level) or _shifted(arena, chosen)):
+                break
+            where = arena if _lacking(arena, chosen, level) else arena.only(SHIFTS)
+            found = [one for base in beam for one in where.successors(base, PAIRS)[0]]
             tried += found
-            best = min(found, key=lambda one: one.cost, default=chosen)
-            if not _stands(best, chosen, _least(thresholds, chosen, none)):
+            better = [one for one in found if _stands(one, chosen, *_bar(thresholds, chosen, none))]
+            if not better:
                 break
-            chosen, beam = best, [best]
-            if not _lacking(arena, chosen, MUCH):
-                break
+            best = min(better, key=lambda one: one.cost)
+            chosen, beam, level = best, [best], MUCH
         chosen = _polished(arena, _pruned(arena, chosen, none, thresholds, tried), tried)
         if thresholds.share:
             chosen = _challenged(arena, chosen, none, tried)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
 
 
-def _begins(one: Hypothesis, none: Hypothesis, least: float) -> bool:
-    """Whether a first effect gains enough, be it on the residuals, flaws apart, or by freeing the nuisances."""
-    freed = none.fit.toll - one.fit.toll
-    on_residuals = float(none.costs.sum() - one.costs.sum())
-    beyond = freed + (max(0.0, on_residuals - FLAW * none.cost) if on_residuals > 0.0 else on_residuals)
-    return _stands(one, none, least) and beyond > least
+def _stands(one: Hypothesis, other: Hypothesis, least: float, flaw: float) -> bool:
+    """Whether a hypothesis is surely better, be it on the residuals beyond a flaw, or by freeing the nuisances."""
+    found, freed = gain(one, other), other.fit.toll - one.fit.toll
+    on_residuals = found.value - freed
+    beyond = freed + (max(0.0, on_residuals - flaw) if on_residuals > 0.0 else on_residuals)
+    return found.low > 0.0 and beyond > least
 
 
-def _stands(one: Hypothesis, other: Hypothesis, least: float) -> bool:
-    found = gain(one, other)
-    return found.value > least and found.low > 0.0
-
-
-def _least(thresholds: Thresholds, standing: Hypothesis, none: Hypothesis) -> float:
-    """Return what a further effect has to gain over what stands."""
-    floor = max(thresholds.further, thresholds.share * standing.cost, MINOR * (none.cost - standing.cost))
-    return max(floor, LEAST_SHARE * max(0.0, standing.cost - float(standing.counts.sum())))
+def _bar(thresholds: Thresholds, standing: Hypothesis, none: Hypothesis) -> tuple[float, float]:
+    """Return what a further effect has to gain over what stands, and what a flaw of the model may gain."""
+    left = max(0.0, standing.cost - float(standing.counts.sum()))
+    least = max(thresholds.further, thresholds.share * standing.cost, LEAST_SHARE * left)
+    return least, MINOR * (none.cost - standing.cost)
 
 
 def _lacking(arena: Arena, standing: Hypothesis, level: float) -> bool:
     """Whether more is left than noise, or hidden in nuisances; the cost of joints that shake does not tell."""
     hides = standing.fit.toll > HIDDEN * standing.fit.nuisances.size
     return standing.level > level or hides or bool(arena.train.comparison.shaking.any())
+
+
+def _shifted(arena: Arena, standing: Hypothesis) -> bool:
+    """Whether the zeros of many joints are off to one side, which those of one make are not."""
+    size = arena.train.simulator.spread * np.hypot(*nuisance.SIZES[[nuisance.ZERO, nuisance.OFFSET]])
+    off = standing.fit.nuisances[[nuisance.ZERO, nuisance.OFFSET]].sum(axis=0) / size
+    scopes = [mask for mask in arena.scopes.values() if mask.sum() >= MANY]
+    return any(abs(float(off[mask].sum())) > ASIDE * np.sqrt(mask.sum()) for mask in scopes)
 
 
 def _distinct(singles: list[Hypothesis], width: int) -> list[Hypothesis]:
@@ -131,7 +141,7 @@ def _pruned(
         fewer = [_without(arena, chosen, k) for k in range(len(chosen.candidates))]
         tried += fewer
         best = min(fewer, key=lambda one: one.cost)
-        if _stands(chosen, best, _least(thresholds, best, none)):
+        if _stands(chosen, best, *_bar(thresholds, best, none)):
             break
         chosen = best
     return chosen
