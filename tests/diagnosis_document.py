@@ -171,7 +171,8 @@ def document(joints: tuple[str, ...] = NAO, *, causes: int = 2) -> dict[str, Any
             ranked(["gain_fade"], ["legs"], "rate 0.004", -0.03, 3.3, 0.0),
         ],
         "calibration": [
-            {"joint": joint, "kp": 1.02, "kd": 0.97, "coulomb": 0.0102, "zero": -0.002} for joint in joints
+            {"joint": joint, "kp": 1.02, "kd": 0.97, "coulomb": 0.0102, "viscous": 0.004, "zero": -0.002}
+            for joint in joints
         ],
         "floor": {"source": "repeats", "pairs": 2, "sd": {joint: 0.0015 for joint in joints}},
         "invisible": ["ground_friction", "ground_compliance", "uneven_ground"],

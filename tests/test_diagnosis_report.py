@@ -284,8 +284,8 @@ def test_noise_is_told_in_mrad_and_where_it_comes_from() -> None:
 
 
 def test_calibration_is_told_without_a_minus_before_nothing() -> None:
-    row = {"joint": "Knee", "kp": 0.9951, "kd": 1.0, "coulomb": -2e-6, "zero": -1e-6}
-    assert "Knee 0.995 1.000 0.0000 0.00" in words(report_html({"calibration": [row]}))
+    row = {"joint": "Knee", "kp": 0.9951, "kd": 1.0, "coulomb": -2e-6, "viscous": 0.01234, "zero": -1e-6}
+    assert "Knee 0.995 1.000 0.0000 0.0123 0.00" in words(report_html({"calibration": [row]}))
 
 
 def test_where_speaks_of_regimes_if_no_joint_stands_out_as_a_whole() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.nuisance import calibrated
 from gsl.diagnosis.options import Options
-from gsl.diagnosis.reference import calibrated_on
+from gsl.diagnosis.reference import SAME, calibrated_on
 from gsl.effects.effect import applied, built
 
 BULKY = ("replays", "horizon", "sides", "next_experiment")  # parts of a document that no mark asks for
@@ -83,7 +83,7 @@ def answered_by_baselines(
     if question.reference is not None:
         base = calibrated_on(question.reference, question.robot, plant, step, options, tick)
         plant = calibrated(applied(plant, built(base.effects)), base.nuisances)
-        found = found.with_model_error(base.error)
+        found, options = found.with_model_error(base.error), replace(options, spread=SAME)
     arena = arena_of(found, plant, step, options, tick)
     answers = {}
     for name, baseline in BASELINES.items():

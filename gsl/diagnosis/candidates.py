@@ -41,6 +41,7 @@ class Candidate:
         documented: Lower and upper ends of their documented ranges, shape (2, p).
         bounds: Within which they are fitted, shape (2, p).
         grid: Values for a screening, shape (g, p); none if the log answers in proportion.
+        seen: Value of its only parameter that a look at the log found; what lies beside it is no better.
     """
 
     effect: str
@@ -50,6 +51,7 @@ class Candidate:
     documented: np.ndarray
     bounds: np.ndarray
     grid: np.ndarray
+    seen: float | None = None
 
     @property
     def probes(self) -> np.ndarray:
@@ -78,7 +80,7 @@ class Candidate:
 
     def beginning_at(self, value: float | None) -> Candidate:
         """Return the same with one more value of its only parameter in the grid."""
-        return self if value is None else replace(self, grid=np.vstack([self.grid, [[value]]]))
+        return self if value is None else replace(self, grid=np.vstack([self.grid, [[value]]]), seen=value)
 
     def entry(self, parameters: np.ndarray) -> dict[str, Any]:
         """Return the parameters of a world's `effects:` entry."""

@@ -16,7 +16,7 @@ from gsl.diagnosis.attribute import BEAM, Arena, Hypothesis
 from gsl.diagnosis.experiment import Experiment, experiment, fitting_step
 from gsl.diagnosis.on_ground import Walking, jitter_error, restart_error
 from gsl.diagnosis.options import Options
-from gsl.diagnosis.reference import Baseline, calibrated_on, clock_shift
+from gsl.diagnosis.reference import SAME, Baseline, calibrated_on, clock_shift
 from gsl.diagnosis.refuted import refuted
 from gsl.diagnosis.replay import Simulator
 from gsl.diagnosis.select import Selection, Thresholds, selected
@@ -34,7 +34,6 @@ DOUBT_ON_FOOT, DOUBT = (
     0.05,
     0.08,
 )  # share of the cost by which two causes differ by chance, there and of joints that shake
-SAME = 0.3  # of the usual spread: by how much the calibration of one robot may change from a reference to its log
 RESTARTS = 40  # windows that measure what a log does not show of a walk
 
 

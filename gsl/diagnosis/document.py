@@ -143,9 +143,10 @@ def _calibration(joints: Sequence[str], nuisances: np.ndarray) -> list[dict[str,
             "kp": float(np.exp(kp)),
             "kd": float(np.exp(kd)),
             "coulomb": float(coulomb),
+            "viscous": float(viscous),
             "zero": float(zero + offset),
         }
-        for joint, (kp, kd, coulomb, zero, offset, _) in zip(joints, nuisances.T, strict=True)
+        for joint, (kp, kd, coulomb, zero, offset, _, viscous) in zip(joints, nuisances.T, strict=True)
     ]
 
 

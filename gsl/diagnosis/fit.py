@@ -26,14 +26,14 @@ Build = Callable[[np.ndarray], Effects]
 
 
 def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """Return derivatives of the residuals to each joint's own nuisances, shape (6, W, scored, n_joints).
+    """Return derivatives of the residuals to each joint's own nuisances, shape (7, W, scored, n_joints).
 
     All joints are probed at once: a joint's answer to its neighbours' probes counts as its own.
 
     Args:
         bench: The log.
         effects: That are switched on.
-        at: Nuisances, shape (6, n_joints).
+        at: Nuisances, shape (7, n_joints).
         base: Residuals there.
     """
     if not bench.simulator.calibrates:
@@ -49,12 +49,12 @@ def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarr
 
 
 def projected(z: np.ndarray, slopes: np.ndarray, at: np.ndarray, spread: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Return the best nuisances, shape (6, n_joints), and each joint's cost with them, shape (n_joints,).
+    """Return the best nuisances, shape (7, n_joints), and each joint's cost with them, shape (n_joints,).
 
     Args:
         z: Residuals with nuisances `at`, shape (W, scored, n_joints).
         slopes: From `sensitivities`.
-        at: Nuisances, shape (6, n_joints).
+        at: Nuisances, shape (7, n_joints).
         spread: Of the nuisances, as a share of the usual one.
     """
     flat = z.reshape(-1, z.shape[2])
@@ -77,7 +77,7 @@ def proportional(z: np.ndarray, own: np.ndarray, slopes: np.ndarray, at: np.ndar
         z: Residuals without the effects, nuisances `at`, shape (W, scored, n_joints).
         own: Derivatives to the parameters, shape (p, W, scored, n_joints).
         slopes: From `sensitivities`.
-        at: Nuisances, shape (6, n_joints).
+        at: Nuisances, shape (7, n_joints).
         spread: Of the nuisances, as a share of the usual one.
     """
     theta = np.zeros(len(own))
@@ -95,7 +95,7 @@ class Fit:
 
     Attributes:
         parameters: Of the effects, shape (p,).
-        nuisances: Shape (6, n_joints).
+        nuisances: Shape (7, n_joints).
         cost: Robust cost of the residuals and of the nuisances.
         toll: Of the nuisances alone.
         covariance: Of the parameters, nuisances free, shape (p, p).
@@ -126,7 +126,7 @@ def refined(
         build: From parameters to effects.
         start: Parameters, shape (p,).
         bounds: Lower and upper, shape (2, p).
-        at: Nuisances to begin with, shape (6, n_joints).
+        at: Nuisances to begin with, shape (7, n_joints).
         ratios: Which parameters multiply, and are stepped in their logarithms as such nuisances are, shape (p,).
         every: Steps for which sensitivities to the nuisances, which change little, are kept.
         rounds: Steps at most.
@@ -246,7 +246,7 @@ def _own_slopes(
 def _normal(
     z: np.ndarray, own: np.ndarray, slopes: np.ndarray, n: np.ndarray, spread: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal equations of (parameters, nuisances), of shapes (p + 6 n, p + 6 n) and (p + 6 n,)."""
+    """Return the normal equations of (parameters, nuisances), of shapes (p + 7 n, p + 7 n) and (p + 7 n,)."""
     p, joints = len(own), z.shape[2]
     w, size = weight(z), p + n.size
     matrix, right = np.zeros((size, size)), np.zeros(size)

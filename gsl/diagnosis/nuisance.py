@@ -12,11 +12,12 @@ import numpy as np
 
 from gsl.core.plant import Plant, Servo
 
-NAMES = ("kp", "kd", "coulomb", "zero", "offset", "inertia")
-# Logarithms of factors, [N·m], [rad] in the log, [rad] in the servo, `inertia_unit`s: of one make of servo (estimate).
-SIZES = np.array([0.04, 0.07, 0.012, 0.003, 0.003, 1.0])
-PROBES = np.array([0.05, 0.10, 0.02, 0.002, 0.002, 0.5])  # of the finite differences
-KP, KD, COULOMB, ZERO, OFFSET, INERTIA = range(6)
+NAMES = ("kp", "kd", "coulomb", "zero", "offset", "inertia", "viscous")
+# Logarithms of factors, [N·m], [rad] in the log, [rad] in the servo, `inertia_unit`s, [N·m·s/rad]: of one make of servo
+# (estimate). Viscous friction is what a gain's damping is until torque is limited.
+SIZES = np.array([0.04, 0.07, 0.012, 0.003, 0.003, 1.0, 0.015])
+PROBES = np.array([0.05, 0.10, 0.02, 0.002, 0.002, 0.5, 0.02])  # of the finite differences
+KP, KD, COULOMB, ZERO, OFFSET, INERTIA, VISCOUS = range(7)
 HALF_STEP = 1e-3  # of a simulator at 2 ms [s]
 FACTORS = (0.1, 10.0)  # of the gains, at most
 LEAST = 0.2  # share of the nominal inertia that is left
@@ -33,12 +34,12 @@ def inertia_unit(servo: Servo) -> np.ndarray:
 
 
 def none(joints: int) -> np.ndarray:
-    """Return nuisances that do nothing, shape (6, n_joints)."""
+    """Return nuisances that do nothing, shape (7, n_joints)."""
     return np.zeros((len(NAMES), joints))
 
 
 def drawn(rng: np.random.Generator, joints: int, spread: float = 1.0) -> np.ndarray:
-    """Return nuisances as one make of servo has them, or a share of that, shape (6, n_joints).
+    """Return nuisances as one make of servo has them, or a share of that, shape (7, n_joints).
 
     A robot's inertia is never below the simulator's: its time has no step that damping could lag behind.
     """
@@ -48,12 +49,12 @@ def drawn(rng: np.random.Generator, joints: int, spread: float = 1.0) -> np.ndar
 
 
 def cost(nuisances: np.ndarray, spread: float = 1.0) -> float:
-    """Return what nuisances, shape (6, n_joints), cost where they spread by a share of SIZES."""
+    """Return what nuisances, shape (7, n_joints), cost where they spread by a share of SIZES."""
     return float(((nuisances / (spread * SIZES[:, None])) ** 2).sum())
 
 
 def bounded(nuisances: np.ndarray) -> np.ndarray:
-    """Return the nearest nuisances that are possible, shape (6, n_joints)."""
+    """Return the nearest nuisances that are possible, shape (7, n_joints)."""
     result = nuisances.copy()
     result[INERTIA] = np.clip(result[INERTIA], -5.0, 20.0)
     result[: KD + 1] = np.clip(result[: KD + 1], *np.log(FACTORS))
@@ -65,7 +66,7 @@ def calibrated(plant: Plant, nuisances: np.ndarray) -> Plant:
 
     Args:
         plant: Its first motors are the logged joints.
-        nuisances: Shape (6, n_joints).
+        nuisances: Shape (7, n_joints).
     """
     wide = nuisances[:, plant.robot.drive]
     servo = plant.servo
@@ -74,6 +75,7 @@ def calibrated(plant: Plant, nuisances: np.ndarray) -> Plant:
         kd=servo.kd * np.exp(wide[KD]),
         coulomb=np.maximum(0.0, servo.coulomb + wide[COULOMB]),
         offset=servo.offset + wide[OFFSET],
+        viscous=np.maximum(0.0, servo.viscous + wide[VISCOUS]),
         armature=np.maximum(LEAST * servo.armature, servo.armature + wide[INERTIA] * inertia_unit(servo)),
     )
     return replace(changed, sensors=replace(plant.sensors, bias=plant.sensors.bias + wide[ZERO]))

@@ -17,6 +17,7 @@ from gsl.diagnosis.options import Options
 from gsl.diagnosis.replay import Effects
 from gsl.diagnosis.select import Thresholds, selected
 
+SAME = 0.3  # of the usual spread: by how much the calibration of one robot may change from a reference to its log
 SHIFTS = (0.002, 0.02, 0.05)  # where a fit of two clocks' shift starts [s]
 
 
@@ -26,7 +27,7 @@ class Baseline:
 
     Attributes:
         effects: Which the reference shows already.
-        nuisances: Shape (6, n_joints).
+        nuisances: Shape (7, n_joints).
         error: What is left of the model's error [rad], shape (n_joints,).
     """
 

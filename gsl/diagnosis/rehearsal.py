@@ -29,7 +29,7 @@ THREADS = 2  # more would hold more logs at once for little
 
 
 class Explanation(NamedTuple):
-    """Effects and the calibration, shape (6, n_joints), that go with them."""
+    """Effects and the calibration, shape (7, n_joints), that go with them."""
 
     effects: Effects
     nuisances: np.ndarray

@@ -21,7 +21,7 @@ class Lead:
     Attributes:
         candidate: With its scope.
         parameters: Where the fit starts, shape (p,).
-        nuisances: That go with them, shape (6, n_joints).
+        nuisances: That go with them, shape (7, n_joints).
         cost: As the screening sees it.
     """
 
@@ -50,11 +50,11 @@ class Ground:
 
     Attributes:
         effects: That are switched on already.
-        nuisances: Fitted with them, shape (6, n_joints).
+        nuisances: Fitted with them, shape (7, n_joints).
         residual: There, shape (W, scored, n_joints).
         slopes: Sensitivities there.
         costs: Of each joint, nuisances free, shape (n_joints,).
-        best: These nuisances, shape (6, n_joints).
+        best: These nuisances, shape (7, n_joints).
     """
 
     effects: Effects
@@ -109,7 +109,7 @@ def _answer(bench: Bench, ground: Ground, candidate: Candidate) -> np.ndarray:
 def _costs(
     bench: Bench, ground: Ground, candidate: Candidate, grid: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return costs, shape (g, n_joints), nuisances, shape (g, 6, n_joints), of each point; and the strongest trace."""
+    """Return costs, shape (g, n_joints), nuisances, shape (g, 7, n_joints), of each point; and the strongest trace."""
     costs, nuisances = np.full((len(grid), bench.joints), np.inf), np.zeros((len(grid), *ground.nuisances.shape))
     trace = 0.0
     for row in range(len(grid) - 1, -1, -1):  # the strongest first: it tells whether there is a trace at all
@@ -137,7 +137,8 @@ def _leads(
         best = int(np.argmin(totals))
         chosen = candidate.on(scope) if wide else candidate
         start = np.where(mask, nuisances[best], ground.best)
-        leads.append(Lead(chosen, _between(grid, totals, best), start, float(totals[best])))
+        at = grid[best] if grid[best, 0] == candidate.seen else _between(grid, totals, best)
+        leads.append(Lead(chosen, at, start, float(totals[best])))
     return leads
 
 

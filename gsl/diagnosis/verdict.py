@@ -15,7 +15,7 @@ ALIKE = tuple(frozenset(pair) for pair in TWINS.items())  # in the air
 SEPARATED = 0.75  # probability below which two causes are not told apart
 BLUNT = 12.0  # least spread of a difference of costs, where no self-test has measured it
 COARSE = 0.12  # share of a difference of costs that an imperfect model makes
-FOREIGN, EXPLAINED = 1.2, 0.85  # remaining cost, and share explained, beyond which nothing of the library is the cause
+FOREIGN, EXPLAINED = 1.12, 0.85  # remaining cost, and share explained, beyond which nothing of the library is the cause
 LOCAL = 1.5  # and remaining cost of one joint
 KNOWN_SOFT = 0.15
 

@@ -30,7 +30,7 @@ def diagnosed_effects(found: Findings) -> dict[str, Any]:
 
 
 def calibration(joints: Sequence[str], nuisances: np.ndarray, unit: np.ndarray) -> Effects:
-    """Return nuisances, shape (6, n_joints), as effects of single joints; `unit` see `nuisance.inertia_unit`."""
+    """Return nuisances, shape (7, n_joints), as effects of single joints; `unit` see `nuisance.inertia_unit`."""
     rows = {joint: nuisances[:, k] for k, joint in enumerate(joints)}
     return {
         "servo_gain": [
@@ -41,6 +41,11 @@ def calibration(joints: Sequence[str], nuisances: np.ndarray, unit: np.ndarray) 
             {"torque": row[nuisance.COULOMB], "joints": joint}
             for joint, row in rows.items()
             if row[nuisance.COULOMB] > 0.0
+        ],
+        "viscous_friction": [
+            {"coefficient": row[nuisance.VISCOUS], "joints": joint}
+            for joint, row in rows.items()
+            if row[nuisance.VISCOUS] > 0.0
         ],
         "armature": [
             {"inertia": row[nuisance.INERTIA] * unit[k], "joints": joint} for k, (joint, row) in enumerate(rows.items())

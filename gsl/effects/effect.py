@@ -11,6 +11,7 @@ import importlib
 import pkgutil
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -39,6 +40,7 @@ class Effect(Protocol):
         """Return the plant with this effect in it."""
 
 
+@cache
 def names() -> tuple[str, ...]:
     """Return the names of the library's effects."""
     package = importlib.import_module("gsl.effects")

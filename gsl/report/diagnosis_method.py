@@ -28,11 +28,15 @@ def calibration(document: Document) -> Html | None:
             _scaled(one.get("kp"), 1.0, decimals=3),
             _scaled(one.get("kd"), 1.0, decimals=3),
             _scaled(one.get("coulomb"), 1.0, decimals=4),
+            _scaled(one.get("viscous"), 1.0, decimals=4),
             _scaled(one.get("zero"), 180.0 / math.pi, decimals=2),
         )
         for one in entries(document, "calibration")
     ]
-    columns = ("joint", "kp, factor", "kd, factor", "Coulomb friction, added [N·m]", "zero of the log [°]")
+    columns = (
+        *("joint", "kp, factor", "kd, factor", "Coulomb friction, added [N·m]", "viscous friction, added [N·m·s/rad]"),
+        "zero of the log [°]",
+    )
     note = (
         "Small deviations that every robot has; they were refitted for every explanation, so that none hides in them."
     )
