@@ -128,13 +128,13 @@ def diagnosed(
     shaking = _shaking(found)
     chance = ON_FOOT if walking else SHAKING * shaking
     doubt = DOUBT_ON_FOOT if walking else DOUBT * shaking
-    thresholds = Thresholds(gain=max(GAIN, CHANCE * max(nulls, default=0.0)), share=chance)
+    thresholds = Thresholds(max(GAIN, CHANCE * max(nulls, default=0.0)), chance)
     tick("trying the library on the log")
     selection, wrong = _upheld(found, arena, none, thresholds, options)
     survivors = _survivors(selection)
     tick("self-test: can the causes that are left be told apart")
     trials = tuple(duels(found, arena, survivors, options, tick)) if options.duels and not walking else ()
-    expected = _expected(selection, trials) * (1.0 + found.noise.slack)
+    expected = _expected(selection, trials, shakes=shaking > 0.0) * (1.0 + found.noise.slack)
     verdict = judged(selection, expected, _margins(trials, survivors), doubt, walking=walking)
     return Findings(
         found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong, options.seed
@@ -175,10 +175,11 @@ def _survivors(found: Selection) -> list[Hypothesis]:
     return survivors
 
 
-def _expected(found: Selection, trials: Sequence[Trial]) -> float:
+def _expected(found: Selection, trials: Sequence[Trial], *, shakes: bool) -> float:
     """Return what a residual costs where the chosen hypothesis is the truth."""
     levels = [trial.level for trial in trials if trial.truth == found.chosen.names]
-    return max(NOISE_COST, float(np.mean(levels))) if levels else NOISE_COST
+    least = 0.0 if shakes else NOISE_COST  # the rows of a joint that shakes are not scaled to cost as much as noise
+    return max(least, float(np.mean(levels))) if levels else NOISE_COST
 
 
 def _margins(trials: Sequence[Trial], survivors: Sequence[Hypothesis]) -> list[tuple[str, float]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gsl.diagnosis.records import Record
 
+MEAN = 5  # ticks of the low pass that joints that shake are seen through
 SETTLED = 15  # ticks after which the start of an episode is forgotten
 ESTIMATE = 200  # samples that an estimate from roughness is worth: other motion than noise is in it
 UNSTEADY = 4.0  # times the median of the joints
@@ -22,6 +23,7 @@ class NoiseFloor:
 
     Attributes:
         sd: Standard deviation of a measured position [rad], shape (n_joints,).
+        slow: Of its means over MEAN ticks, by repeats; 0 without [rad], shape (n_joints,).
         unsteady: Joints whose repeats differ by much more than those of the others, whose floor they get, (n_joints,).
         source: `repeats` or `estimated`.
         pairs: Repeats that were compared.
@@ -30,6 +32,7 @@ class NoiseFloor:
     """
 
     sd: np.ndarray
+    slow: np.ndarray
     unsteady: np.ndarray
     source: str
     pairs: int
@@ -54,15 +57,28 @@ def noise_floor(found: Sequence[Record], resolution: float, least: np.ndarray | 
     groups = [group for group in _repeats(found) if len(group) > 1]
     if groups:
         spread = [np.array([one.measured[SETTLED:] for one in group]) for group in groups]
-        square = sum(part.var(axis=0, ddof=1).sum(axis=0) for part in spread) / sum(part.shape[1] for part in spread)
+        square, slow = _variance(spread), _variance([_means(part) for part in spread])
         pairs = sum(len(group) - 1 for group in groups)
         samples = sum(part.shape[1] * (len(part) - 1) for part in spread) * len(square)
         sd = np.maximum(np.sqrt(square), least)
         usual = np.inf if least.ndim else float(np.median(sd))
         unsteady = sd > UNSTEADY * usual
-        return NoiseFloor(np.where(unsteady, usual, sd), unsteady, "repeats", pairs, resolution, samples)
+        return NoiseFloor(np.where(unsteady, usual, sd), np.sqrt(slow), unsteady, "repeats", pairs, resolution, samples)
     sd = np.maximum(_roughness(found), least)
-    return NoiseFloor(sd, np.zeros(len(sd), dtype=bool), "estimated", 0, resolution, ESTIMATE)
+    return NoiseFloor(sd, np.zeros(len(sd)), np.zeros(len(sd), dtype=bool), "estimated", 0, resolution, ESTIMATE)
+
+
+def _variance(spread: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the variance between repeats, shape (n_joints,), of groups of shapes (repeats, T, n_joints)."""
+    total: np.ndarray = np.sum([part.var(axis=0, ddof=1).sum(axis=0) for part in spread], axis=0)
+    return total / sum(part.shape[1] for part in spread)
+
+
+def _means(group: np.ndarray) -> np.ndarray:
+    """Return means over MEAN ticks, shape (repeats, T // MEAN, n_joints)."""
+    rows = group.shape[1] // MEAN
+    result: np.ndarray = group[:, : rows * MEAN].reshape(len(group), rows, MEAN, -1).mean(axis=2)
+    return result
 
 
 def _repeats(found: Sequence[Record]) -> list[list[Record]]:

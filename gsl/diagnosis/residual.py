@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsl.diagnosis.noise_floor import NoiseFloor
+from gsl.diagnosis.noise_floor import MEAN, NoiseFloor
 from gsl.diagnosis.records import Pieces
 
 SCALE = 5.0  # beyond this many floors a residual counts less and less
-MEAN = 5  # ticks of the low pass
 BANDS = 5  # of the spectrum
 POWER_SD = (
     0.6  # of the logarithm of a shaking joint's power in one window, measured on replays of shaking by its true cause
@@ -39,7 +38,7 @@ class Comparison:
     Attributes:
         floor: Standard deviation that noise and a known model error explain [rad], shape (n_joints,).
         shaking: Joints whose phase a log cannot carry, shape (n_joints,).
-        sway: How far these swing slowly while their commands rest [rad], shape (n_joints,).
+        sway: How far these swing slowly at rest, or from one repeat to the next [rad], shape (n_joints,).
     """
 
     floor: np.ndarray
@@ -118,6 +117,7 @@ def comparison(pieces: Pieces, noise: NoiseFloor, resting: np.ndarray) -> Compar
     shaking = np.array([_shakes(x, noise.resolution) for x in at_rest])
     calm = np.median(noise.sd[~shaking]) if not shaking.all() else 3.0 * noise.resolution
     sway = np.array([_sway(x) if shakes else 0.0 for x, shakes in zip(at_rest, shaking, strict=True)])
+    sway = np.where(shaking, np.maximum(sway, noise.slow), 0.0)
     return Comparison(np.where(shaking, np.minimum(noise.sd, calm), noise.sd), shaking, sway)
 
 

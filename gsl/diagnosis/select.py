@@ -27,13 +27,11 @@ class Thresholds:
     """What counts as more than chance, in units of cost.
 
     Attributes:
-        gain: Of a first effect over calibration alone.
-        further: Of a further effect.
+        gain: Of an effect over what stands without it.
         share: Of the cost of what stands, that any effect has to explain; noise holds no such share, and is let be.
     """
 
     gain: float = 20.0
-    further: float = 20.0
     share: float = 0.0
 
 
@@ -106,7 +104,7 @@ def _stands(one: Hypothesis, other: Hypothesis, least: float, flaw: float) -> bo
 def _bar(thresholds: Thresholds, standing: Hypothesis, none: Hypothesis) -> tuple[float, float]:
     """Return what a further effect has to gain over what stands, and what a flaw of the model may gain."""
     left = max(0.0, standing.cost - float(standing.counts.sum()))
-    least = max(thresholds.further, thresholds.share * standing.cost, LEAST_SHARE * left)
+    least = max(thresholds.gain, thresholds.share * standing.cost, LEAST_SHARE * left)
     return least, MINOR * (none.cost - standing.cost)
 
 

@@ -82,7 +82,7 @@ def judged(
     excess = max(none.cost - least, 1e-9)
     explained = float(np.clip((none.cost - chosen.cost) / excess, 0.0, 1.0))
     remaining = chosen.level / expected
-    strange = max(np.log(remaining) / np.log(FOREIGN), np.log(chosen.levels.max() / expected) / np.log(LOCAL))
+    strange = max(np.log(remaining) / np.log(FOREIGN), np.log(chosen.levels.max() / max(1.0, expected)) / np.log(LOCAL))
     if not chosen.candidates:
         return Verdict("unknown" if strange > 1.0 else "no_gap", (), (), 0.0, remaining, 1.0)
     spreads = dict(margins)
