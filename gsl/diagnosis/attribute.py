@@ -100,12 +100,18 @@ class Arena:
 
     def calibration(self) -> Hypothesis:
         """Return the hypothesis without an effect."""
-        return self.fitted((), np.zeros(0), nuisance.none(self.train.joints), every=1)
+        return self.fitted((), np.zeros(0), nuisance.none(self.train.joints), every=1, rounds=2 * ROUNDS)
 
     def fitted(
-        self, candidates: tuple[Candidate, ...], start: np.ndarray, at: np.ndarray, *, every: int = 2
+        self,
+        candidates: tuple[Candidate, ...],
+        start: np.ndarray,
+        at: np.ndarray,
+        *,
+        every: int = 2,
+        rounds: int = ROUNDS,
     ) -> Hypothesis:
-        """Fit a set of effects from a start and score it; `every` as in `refined`."""
+        """Fit a set of effects from a start and score it; `every` and `rounds` as in `refined`."""
         sizes = np.cumsum([len(candidate.free) for candidate in candidates])[:-1]
 
         def parted(values: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -116,7 +122,7 @@ class Arena:
 
         bounds = np.hstack([candidate.bounds for candidate in candidates]) if candidates else np.zeros((2, 0))
         ratios = np.concatenate([np.zeros(0, dtype=bool), *(candidate.ratios for candidate in candidates)])
-        fit = refined(self.train, build, start, bounds, at, ratios=ratios, every=every, rounds=ROUNDS)
+        fit = refined(self.train, build, start, bounds, at, ratios=ratios, every=every, rounds=rounds)
         return self._scored(candidates, parted(fit.parameters), fit, build)
 
     def _scored(

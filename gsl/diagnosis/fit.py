@@ -17,7 +17,8 @@ from gsl.diagnosis.replay import Bench, Effects
 from gsl.diagnosis.residual import loss, weight
 
 REWEIGHTINGS = 2
-DAMPINGS = (0.0, 1.0, 30.0)  # of a step, as shares of the diagonal; the first that descends is taken
+DAMPINGS = (0.0, 1.0, 30.0)  # of a step, as shares of the diagonal: friction's derivatives hold nearby only
+WELL = 0.05  # relative descent of a step that others are not tried beside
 FACTORS = (1.2, 1.08)  # of a parameter, in a search where joints shake or the fit is poor
 POOR = 1.5  # cost of a residual that makes a search worth its time
 ENOUGH = 1e-3  # relative descent at which a fit ends
@@ -191,17 +192,19 @@ def _descended(problem: _Problem, here: _Point, every: int, rounds: int) -> tupl
 
 
 def _stepped(problem: _Problem, here: _Point, matrix: np.ndarray, right: np.ndarray) -> _Point:
-    """Return the first of the damped steps that descends, else the point itself."""
-    p = len(here.theta)
+    """Return the first of the damped steps that descends well, else the best, else the point itself."""
+    p, best = len(here.theta), here
     for damping in DAMPINGS:
         step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
         theta = problem.moved(here.theta, step[:p])
         nuisances = nuisance.bounded(here.nuisances + step[p:].reshape(here.nuisances.shape))
         z = problem.bench.residual(problem.build(theta), nuisances)
         cost = float(loss(z).sum()) + nuisance.cost(nuisances, problem.bench.simulator.spread)
-        if cost < here.cost:
-            return _Point(theta, nuisances, z, cost)
-    return here
+        if cost < best.cost:
+            best = _Point(theta, nuisances, z, cost)
+        if best.cost < (1.0 - WELL) * here.cost:
+            break
+    return best
 
 
 def _searched(bench: Bench, build: Build, here: _Point, bounds: np.ndarray) -> _Point:
