@@ -8,6 +8,7 @@ import pytest
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import diagnosed
+from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import Experiment, experiment
 from gsl.diagnosis.localise import Cell, cells, regimes
 from gsl.errors import GslError
@@ -53,6 +54,14 @@ def test_intervals_of_one_held_out_trajectory_have_a_width() -> None:
     cause = result.verdict.causes[0]
     assert result.selection.chosen.names == ("command_latency",)
     assert cause.low < cause.value < cause.high
+
+
+def test_a_joint_that_is_stuck_is_told_first() -> None:
+    whole = log({})
+    still = tuple(replace(one, position=one.position * [1.0, 0.0]) for one in whole.episodes)
+    result = diagnosed(replace(whole, episodes=still), arm(), nominal(arm()), 0.002, QUICK, lambda phase: None)
+    (said,) = [one for one in document(result)["caveats"] if "do not" in one]
+    assert "elbow" in said and "shoulder" not in said
 
 
 def test_a_log_without_a_whole_window_is_refused() -> None:

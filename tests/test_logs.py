@@ -41,6 +41,10 @@ def flipped(episode: Trajectory) -> Trajectory:
     return replace(episode, position=-3.0 * episode.position)
 
 
+def spinning(episode: Trajectory) -> Trajectory:
+    return replace(episode, velocity=np.degrees(np.gradient(episode.position, 0.02, axis=0)))
+
+
 def standing(episode: Trajectory) -> Trajectory:
     force = np.full(len(episode.time), 20.0)
     return replace(episode, sensors={"foot_force.left": force, "foot_force.right": force})
@@ -55,6 +59,7 @@ def test_a_good_log_passes() -> None:
     ("bad", "words"),
     [
         (changed(log(), degrees), "are these degrees?"),
+        (changed(log(), spinning), "times the slope of position"),
         (changed(log(), flipped), "is the zero or the sign another?"),
         (changed(log(), constant), "no command ever changes"),
         (log(20), "too short"),

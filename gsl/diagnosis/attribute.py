@@ -17,6 +17,7 @@ from gsl.diagnosis.fit import Build, Fit, projected, refined, sensitivities
 from gsl.diagnosis.replay import Bench, Effects
 from gsl.diagnosis.residual import loss
 from gsl.diagnosis.screen import Ground, Screening, best_of, screened
+from gsl.diagnosis.shared import shares
 
 WIDTH = 8  # leads that are fitted after a screening
 BEAM = 2  # sets of effects that are continued
@@ -122,7 +123,8 @@ class Arena:
 
         bounds = np.hstack([candidate.bounds for candidate in candidates]) if candidates else np.zeros((2, 0))
         ratios = np.concatenate([np.zeros(0, dtype=bool), *(candidate.ratios for candidate in candidates)])
-        fit = refined(self.train, build, start, bounds, at, ratios=ratios, every=every, rounds=rounds)
+        common = shares(candidates, self.scopes) if self.train.simulator.calibrates else ()
+        fit = refined(self.train, build, start, bounds, at, ratios=ratios, common=common, every=every, rounds=rounds)
         return self._scored(candidates, parted(fit.parameters), fit, build)
 
     def _scored(

@@ -21,6 +21,8 @@ from gsl.diagnosis.verdict import Cause
 from gsl.effects.effect import effect_class
 
 RANKED = 12  # hypotheses that are listed
+ASKED, STUCK = 0.05, 0.1  # command [rad], and share of it, below which a joint that moves less does not move
+FAR_OFF = 5.0  # spreads of the calibration beyond which it is told
 WIDER = 2.0  # than white noise makes them: what is left of a joint hangs together in time and over nuisances. Estimate
 REPLAYS, SHOWN = 6, 400  # pictures of replays, and their ticks at most
 WORDS = {
@@ -178,10 +180,33 @@ def _caveats(found: Findings) -> list[str]:
         said.append(
             f"These joints are never commanded to move, so hardly anything can be said of them: {', '.join(still)}."
         )
+    stuck = [name for k, name in enumerate(exp.joints) if _stuck(found, k)]
+    if stuck:
+        said.append(f"These joints are commanded to move and do not: {', '.join(stuck)}. Look at them first.")
+    far = _far_off(found)
+    if far:
+        said.append(
+            f"The calibration of these joints is far from what robots of one make differ by, so that it may hide a "
+            f"cause: {', '.join(far)}."
+        )
     said += [f"{effect} would explain much, but {reason}." for effect, reason in found.refuted.items()]
     if 0.0 < found.verdict.explained < 0.9 and found.verdict.word in ("causes", "inseparable"):
         said.append(f"{1.0 - found.verdict.explained:.0%} of the excess remains: something else is at work as well.")
     return said
+
+
+def _stuck(found: Findings, k: int) -> bool:
+    """Whether a joint stays where it is for all that it is commanded."""
+    records = found.experiment.records
+    asked = max(float(np.ptp(one.targets[:, k])) for one in records)
+    moved = max(float(np.ptp(one.position[:, k])) for one in records)
+    return asked > ASKED and moved < STUCK * asked
+
+
+def _far_off(found: Findings) -> list[str]:
+    exp, sizes = found.experiment, found.simulator.spread * nuisance.SIZES[:, None]
+    off = np.abs(found.answer.fit.nuisances[:, : len(exp.joints)] / sizes).max(axis=0)
+    return [name for name, far in zip(exp.joints, off, strict=True) if far > FAR_OFF]
 
 
 def _summary(found: Findings, causes: Sequence[Mapping[str, Any]]) -> str:

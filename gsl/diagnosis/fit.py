@@ -6,7 +6,7 @@ A refinement takes all derivatives by finite differences where it stands (Levenb
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.replay import Bench, Effects
 from gsl.diagnosis.residual import loss, weight
+from gsl.diagnosis.shared import Share, handed_over
 
 REWEIGHTINGS = 2
 DAMPINGS = (0.0, 1.0, 30.0)  # of a step, as shares of the diagonal: friction's derivatives hold nearby only
@@ -117,6 +118,7 @@ def refined(
     at: np.ndarray,
     *,
     ratios: np.ndarray | None = None,
+    common: Sequence[Share] = (),
     every: int = 1,
     rounds: int = 4,
 ) -> Fit:
@@ -129,16 +131,16 @@ def refined(
         bounds: Lower and upper, shape (2, p).
         at: Nuisances to begin with, shape (7, n_joints).
         ratios: Which parameters multiply, and are stepped in their logarithms as such nuisances are, shape (p,).
+        common: What parameters share with the nuisances.
         every: Steps for which sensitivities to the nuisances, which change little, are kept.
         rounds: Steps at most.
     """
     multiplies = np.zeros(len(start), dtype=bool) if ratios is None else ratios
-    problem = _Problem(bench, build, bounds, multiplies)
+    problem = _Problem(bench, build, bounds, multiplies, common)
     first = np.clip(start, *bounds)
-    z = bench.residual(build(first), at)
-    here = _Point(first, at, z, float(loss(z).sum()) + nuisance.cost(at, bench.simulator.spread))
+    here = _relieved(problem, problem.at(first, at))
     here, matrix = _descended(problem, here, every, rounds)
-    if len(first) and (here.cost > POOR * z.size or bench.comparison.shaking.any()):
+    if len(first) and (here.cost > POOR * here.z.size or bench.comparison.shaking.any()):
         there, other = _descended(problem, _searched(bench, build, here, bounds), every, rounds)
         here, matrix = (there, other) if there.cost < here.cost else (here, matrix)
     scale = problem.scale(here.theta)
@@ -147,12 +149,18 @@ def refined(
 
 
 class _Problem(NamedTuple):
-    """What a descent works on: windows, effects, bounds of the parameters, and which of them multiply."""
+    """What a descent works on: windows, effects, their parameters' bounds, which multiply, which nuisances know too."""
 
     bench: Bench
     build: Build
     bounds: np.ndarray
     ratios: np.ndarray
+    common: Sequence[Share]
+
+    def at(self, theta: np.ndarray, nuisances: np.ndarray) -> _Point:
+        """Return the point with its residuals and their cost."""
+        z = self.bench.residual(self.build(theta), nuisances)
+        return _Point(theta, nuisances, z, float(loss(z).sum()) + nuisance.cost(nuisances, self.bench.simulator.spread))
 
     def scale(self, theta: np.ndarray) -> np.ndarray:
         """Return how much a parameter moves by a unit of its step, shape (p,)."""
@@ -182,7 +190,7 @@ def _descended(problem: _Problem, here: _Point, every: int, rounds: int) -> tupl
         own = _own_slopes(bench, build, here.theta, problem.bounds, here.nuisances, here.z)
         own = own * problem.scale(here.theta)[:, None, None, None]
         matrix, right = _normal(here.z, own, slopes, here.nuisances, bench.simulator.spread)
-        before, here = here, _stepped(problem, here, matrix, right)
+        before, here = here, _relieved(problem, _stepped(problem, here, matrix, right))
         if before.cost - here.cost < ENOUGH * before.cost:
             if age == 0:
                 break
@@ -198,13 +206,21 @@ def _stepped(problem: _Problem, here: _Point, matrix: np.ndarray, right: np.ndar
         step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
         theta = problem.moved(here.theta, step[:p])
         nuisances = nuisance.bounded(here.nuisances + step[p:].reshape(here.nuisances.shape))
-        z = problem.bench.residual(problem.build(theta), nuisances)
-        cost = float(loss(z).sum()) + nuisance.cost(nuisances, problem.bench.simulator.spread)
-        if cost < best.cost:
-            best = _Point(theta, nuisances, z, cost)
+        best = min(best, problem.at(theta, nuisances), key=_cost)
         if best.cost < (1.0 - WELL) * here.cost:
             break
     return best
+
+
+def _relieved(problem: _Problem, here: _Point) -> _Point:
+    """Hand over to the parameters what nuisances share, if that costs less."""
+    if not problem.common:
+        return here
+    return min(here, problem.at(*handed_over(here.theta, here.nuisances, problem.bounds, problem.common)), key=_cost)
+
+
+def _cost(here: _Point) -> float:
+    return here.cost
 
 
 def _searched(bench: Bench, build: Build, here: _Point, bounds: np.ndarray) -> _Point:

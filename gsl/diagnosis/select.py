@@ -9,6 +9,7 @@ import numpy as np
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import BEAM, Arena, Gain, Hypothesis, gain
 from gsl.diagnosis.screen import Screening
+from gsl.diagnosis.shared import shares
 
 LEAST_SHARE = 0.2  # of what is left, that a further effect has to explain
 MINOR = 0.005  # of what is explained already: less is no cause but a flaw of the model
@@ -17,6 +18,7 @@ NOTHING = 1.0  # cost of a residual that leaves room for none: that of noise is 
 FLAW = 0.005  # of the cost of calibration, that a simulator's own flaws (its time step, say) let any effect gain
 HIDDEN = 1.5  # cost of a nuisance, on average, beyond which a calibration hides a cause
 NEAR, CHALLENGERS = 0.2, 2  # share of what is explained within which rivals are polished, and how many
+APART = 1.5  # spreads by which the mean calibration of a group is off that is a cause's
 SHIFTS = ("zero_offset", "sensor_bias")
 MANY, ASIDE = 4, 4.0  # joints, and standard errors by which their mean zero is off, that are no chance
 PAIRS = 5  # leads that are fitted beside an effect that stands already
@@ -88,6 +90,7 @@ def selected(
             best = min(better, key=lambda one: one.cost)
             chosen, beam, level = best, [best], MUCH
         chosen = _polished(arena, _pruned(arena, chosen, none, thresholds, tried), tried)
+        chosen = _split(arena, chosen, none, thresholds, tried)
         if thresholds.share:
             chosen = _challenged(arena, chosen, none, tried)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
@@ -142,6 +145,29 @@ def _pruned(
         if _stands(chosen, best, *_bar(thresholds, best, none)):
             break
         chosen = best
+    return chosen
+
+
+def _split(
+    arena: Arena, chosen: Hypothesis, none: Hypothesis, thresholds: Thresholds, tried: list[Hypothesis]
+) -> Hypothesis:
+    """Give causes of all joints to the groups apart, where the calibration makes up for what these differ by."""
+    size, count = arena.train.simulator.spread * nuisance.SIZES, arena.train.joints
+    groups = {name: mask for name, mask in arena.scopes.items() if 1 < mask.sum() < count}
+    if not groups or not np.all(np.sum(list(groups.values()), axis=0) == 1):
+        return chosen
+    for k, candidate in enumerate(chosen.candidates):
+        rows = {share.row for share in shares([candidate], arena.scopes) if share.joints.all()}
+        means = [chosen.fit.nuisances[row, mask].mean() / size[row] for row in rows for mask in groups.values()]
+        if max(map(abs, means), default=0.0) < APART:
+            continue
+        apart = [candidate.on(name) for name in groups]
+        values = [*chosen.parameters[:k], *[chosen.parameters[k]] * len(apart), *chosen.parameters[k + 1 :]]
+        candidates = (*chosen.candidates[:k], *apart, *chosen.candidates[k + 1 :])
+        one = arena.fitted(candidates, np.concatenate(values), chosen.fit.nuisances, every=1)
+        tried.append(one)
+        if _stands(one, chosen, *_bar(thresholds, chosen, none)):
+            return one
     return chosen
 
 

@@ -16,6 +16,7 @@ from gsl.storage.trajectories import read
 
 MOVES = 1e-4  # a command that changes less is constant [rad]
 LATE = 0.5  # of a control period, by which a row may come early or late
+FASTER, SLOW = 10.0, 0.05  # times the slope of the positions that velocities may be; slopes below are noise [rad/s]
 BEYOND = 0.35  # measured past a joint's limits by more than this is another unit or another robot [rad]
 
 
@@ -75,6 +76,7 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
             f"{name}: no command ever changes, so nothing shows; play a motion, see `gsl collect task=excite`"
         )
     _check_units(batch, robot, name)
+    _check_velocities(batch, name)
 
 
 def _check_time(batch: Batch, name: str) -> None:
@@ -99,6 +101,19 @@ def _walks(sensors: object) -> bool:
     """Whether feet carry load in a good part of an episode."""
     forces = [values for key, values in getattr(sensors, "items", dict)() if key.startswith("foot_force")]
     return bool(forces) and float(np.mean(np.sum(forces, axis=0) > 1.0)) > 0.2
+
+
+def _check_velocities(batch: Batch, name: str) -> None:
+    """Refuse velocities that are not the slope of the positions: another unit, another joint, or another sign."""
+    for k, joint in enumerate(batch.joints):
+        slopes = np.concatenate([np.gradient(one.position[:, k], batch.control_period) for one in batch.episodes])
+        told = np.concatenate([one.velocity[:, k] for one in batch.episodes])
+        size, own = float(np.sqrt(np.mean(slopes**2))), float(np.sqrt(np.mean(told**2)))
+        if own > FASTER * max(size, SLOW):
+            raise GslError(
+                f"{name}: velocity.{joint} is {own / max(size, SLOW):.3g} times the slope of position.{joint}; "
+                "velocities are in rad/s, are these degrees?"
+            )
 
 
 def _check_units(batch: Batch, robot: Robot, name: str) -> None:

@@ -1,0 +1,55 @@
+"""What joints share in their calibration belongs to a cause that does the same to all of them.
+
+A gain of 0.4 on all joints is also one of 0.3 and a calibration of 1.33 on each. Replays cannot tell, only the cost of
+the calibration can, and a descent finds its way along such a valley slowly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gsl.diagnosis.candidates import Candidate
+from gsl.diagnosis.nuisance import COULOMB, KD, KP, OFFSET, VISCOUS, ZERO
+
+ROWS = {
+    ("servo_gain", "kp"): KP,
+    ("servo_gain", "kd"): KD,
+    ("coulomb_friction", "torque"): COULOMB,
+    ("viscous_friction", "coefficient"): VISCOUS,
+    ("zero_offset", "offset"): OFFSET,
+    ("sensor_bias", "bias"): ZERO,
+}
+FACTORS = (KP, KD)  # rows that are logarithms of factors
+
+
+class Share(NamedTuple):
+    """A parameter and the row of the calibration that does the same to the joints of its scope, shape (n_joints,)."""
+
+    parameter: int
+    row: int
+    joints: np.ndarray
+
+
+def shares(candidates: Sequence[Candidate], scopes: Mapping[str, np.ndarray]) -> tuple[Share, ...]:
+    """Return what parameters of candidates, in their order, share with the calibration."""
+    parameters = [(candidate, name) for candidate in candidates for name in candidate.free]
+    return tuple(
+        Share(index, ROWS[candidate.effect, name], scopes[candidate.scope])
+        for index, (candidate, name) in enumerate(parameters)
+        if (candidate.effect, name) in ROWS and candidate.scope in scopes
+    )
+
+
+def handed_over(
+    theta: np.ndarray, nuisances: np.ndarray, bounds: np.ndarray, common: Sequence[Share]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return parameters, shape (p,), with what nuisances, shape (7, n_joints), share, and the nuisances without it."""
+    theta, nuisances = theta.copy(), nuisances.copy()
+    for k, row, joints in common:
+        mean, old = float(nuisances[row, joints].mean()), theta[k]
+        theta[k] = np.clip(old * np.exp(mean) if row in FACTORS else old + mean, *bounds[:, k])
+        nuisances[row, joints] -= np.log(theta[k] / old) if row in FACTORS else theta[k] - old
+    return theta, nuisances
