@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 ECHO = 2.0  # seconds in which the same wish may arrive again, as from `timeout`, which tells the process and its group
@@ -33,6 +35,22 @@ def checkpoint() -> None:
     """Raise KeyboardInterrupt if this process was interrupted and is still running."""
     if _asked:
         raise KeyboardInterrupt
+
+
+@contextmanager
+def processes_starting() -> Iterator[None]:
+    """Let processes that start in the block leave Ctrl-C to this one, which hears it afterwards and ends them."""
+    from multiprocessing import resource_tracker
+
+    from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
+
+    resource_tracker.ensure_running()  # both would let Ctrl-C through again when they start in the block
+    loky_resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _interrupt(number: int, frame: Any) -> None:

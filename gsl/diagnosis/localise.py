@@ -16,7 +16,8 @@ REVERSAL = 0.06  # before and after a change of direction [s]
 LOADED, SATURATED = 0.4, 1.0  # shares of the torque limit that the nominal servo would want
 SAMPLES = 400  # of the bootstrap
 ABOVE = 1.1  # floors: a lower bound has to be above it to be named, for of many cells some are high by chance
-LEAST = 3  # samples that have to show a cell
+LEAST = 3  # samples that have to show a cell, and windows a pair of joints
+ALIKE = 0.1  # share of the larger reach by which those of two commands may differ
 OF_ALL = ("all", "early", "late", "after_contact")  # regimes to which the base belongs
 CONTACT = 0.08  # after a foot has touched the ground [s]
 
@@ -154,12 +155,19 @@ def horizon(found: Experiment, told: np.ndarray) -> tuple[list[float], dict[str,
 
 
 def sides(found: Experiment, z: np.ndarray) -> list[dict[str, object]]:
-    """Return mirrored joints with the rms of each side and the chance that sides that are alike differ as much."""
+    """Return mirrored joints with the rms of each side and the chance that sides that are alike differ as much.
+
+    Only windows count in which both are commanded to move as far: else the motions would be compared.
+    """
     names, result = found.joints, []
+    reach = np.ptp(found.pieces.windows.commands[..., : len(names)], axis=1)
     for left, right in mirrored(found.robot):
         own = [names.index(one) for one in (left, right)]
-        pair = _by_sample(z[..., own] ** 2, found.pieces.samples).T
-        counts = found.comparison.used(z.shape[1])[own] * len(z)
+        alike = np.abs(np.diff(reach[:, own], axis=1)[:, 0]) < ALIKE * reach[:, own].max(axis=1)
+        if alike.sum() < LEAST:
+            continue
+        pair = _by_sample(z[alike][..., own] ** 2, found.pieces.chosen(alike.nonzero()[0]).samples).T
+        counts = found.comparison.used(z.shape[1])[own] * alike.sum()
         difference = pair[0] - pair[1]
         flips = np.random.default_rng(0).choice([-1.0, 1.0], (SAMPLES, len(difference)))
         as_far = int((np.abs(flips @ difference) >= abs(difference.sum()) - 1e-9).sum())

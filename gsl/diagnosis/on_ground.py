@@ -10,6 +10,7 @@ from joblib import Parallel, delayed
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import lumped
+from gsl.core.interruption import processes_starting
 from gsl.core.plant import GRAVITY, Plant
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.records import OnGround, Pieces
@@ -61,8 +62,11 @@ class Walking:
         parts = [(OnGround(*(part[share] for part in windows)), heights[share]) for share in shares]
         if len(parts) == 1:
             return _all_replayed(plant, physics, *parts[0])
-        parallel = Parallel(n_jobs=len(parts), max_nbytes=None)  # else joblib leaves a file for every call
-        return np.concatenate(parallel(delayed(_all_replayed)(plant, physics, *one) for one in parts))
+        # Without max_nbytes=None joblib leaves a file for every call.
+        parallel = Parallel(n_jobs=len(parts), max_nbytes=None, return_as="generator")
+        with processes_starting():
+            told = parallel(delayed(_all_replayed)(plant, physics, *one) for one in parts)
+        return np.concatenate(list(told))
 
 
 def _all_replayed(plant: Plant, physics: Physics, windows: OnGround, heights: np.ndarray) -> np.ndarray:

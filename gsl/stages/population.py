@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import os
 import pickle
-import signal
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator
 
+from gsl.core.interruption import processes_starting
 from gsl.core.setting import setting
 from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
@@ -88,27 +87,11 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: list[i
         return
     parallel = joblib.Parallel(n_jobs=workers, batch_size=1, return_as="generator_unordered")
     try:
-        with _deaf_to_ctrl_c():
+        with processes_starting():
             found = parallel(joblib.delayed(_numbered)(function, frozen, jobs[index], index) for index in missing)
         yield from found
     except TerminatedWorkerError:
         return
-
-
-@contextmanager
-def _deaf_to_ctrl_c() -> Iterator[None]:
-    """Let processes that start in the block leave Ctrl-C to this one, which hears it afterwards and ends them."""
-    from multiprocessing import resource_tracker
-
-    from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
-
-    resource_tracker.ensure_running()  # both would let Ctrl-C through again when they start in the block
-    loky_resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _numbered(function: Any, frozen: bytes, job: Any, index: int) -> tuple[int, Any]:
