@@ -191,7 +191,9 @@ def _caveats(found: Findings) -> list[str]:
         )
     said += [f"{effect} would explain much, but {reason}." for effect, reason in found.refuted.items()]
     if 0.0 < found.verdict.explained < 0.9 and found.verdict.word in ("causes", "inseparable"):
-        said.append(f"{1.0 - found.verdict.explained:.0%} of the excess remains: something else is at work as well.")
+        said.append(
+            f"{100.0 * (1.0 - found.verdict.explained):.0f} % of the excess remains: something else is at work as well."
+        )
     return said
 
 
@@ -213,13 +215,17 @@ def _summary(found: Findings, causes: Sequence[Mapping[str, Any]]) -> str:
     verdict = found.verdict
     if verdict.word in WORDS and not causes:
         return WORDS[verdict.word]
-    *most, last = [f"{one['effect']} ({one['scope'] or 'everywhere'})" for one in causes]
+    *most, last = [f"{one['effect'].replace('_', ' ')}{_of(one['scope'])}" for one in causes]
     named = f"{', '.join(most)} and {last}" if most else last
     if verdict.word == "inseparable":
-        groups = "; ".join(" or ".join(group) for group in verdict.inseparable)
+        groups = "; ".join(" or ".join(group) for group in verdict.inseparable).replace("_", " ")
         return f"The gap looks like {named}, but this log cannot tell apart: {groups}."
     explain = "which together explain" if most else "which explains"
-    return f"The gap is caused by {named}, {explain} {verdict.explained:.0%} of it on held-out data."
+    return f"The gap is caused by {named}, {explain} {100.0 * verdict.explained:.0f} % of it on held-out data."
+
+
+def _of(scope: str) -> str:
+    return "" if not scope else f" of {'all joints' if scope == 'all' else scope}"
 
 
 def _replays(found: Findings, before: np.ndarray, after: np.ndarray) -> list[dict[str, Any]]:

@@ -29,7 +29,7 @@ from gsl.report.diagnosis_words import (
     value,
 )
 
-CAUSES, JOINTS = 5, 5  # rows at most
+CAUSES, JOINTS = 8, 5  # rows at most
 
 
 class Told(NamedTuple):
