@@ -1,7 +1,5 @@
 """What joints share in their calibration is handed over to a cause, and a cause is split where groups differ."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -62,7 +60,7 @@ def test_friction_that_differs_between_legs_and_arms_is_told_apart() -> None:
     )
     batch = Batch(episodes, NAO.controlled, PERIOD, {"episodes": [{"policy": str(k)} for k in range(4)]})
     arena = arena_of(experiment(batch, NAO), plant, 0.002, Options(threads=1), lambda phase: None)
-    friction = replace(candidate("coulomb_friction", "torque"))
+    friction = candidate("coulomb_friction", "torque")
     everywhere = arena.fitted((friction,), np.array([0.15]), none(15), every=1)
     apart = _split(arena, everywhere, arena.calibration(), Thresholds(), [])
     found = {one.scope: float(value[0]) for one, value in zip(apart.candidates, apart.parameters, strict=True)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,8 @@ from gsl.diagnosis.arena import arena_of
 from gsl.diagnosis.diagnose import diagnosed
 from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import experiment
-from gsl.diagnosis.nuisance import calibrated
 from gsl.diagnosis.options import Options
-from gsl.diagnosis.reference import SAME, calibrated_on
-from gsl.effects.effect import applied, built
+from gsl.diagnosis.reference import calibrated_on
 
 BULKY = ("replays", "horizon", "sides", "next_experiment")  # parts of a document that no mark asks for
 
@@ -82,8 +80,7 @@ def answered_by_baselines(
     found = experiment(question.log, question.robot)
     if question.reference is not None:
         base = calibrated_on(question.reference, question.robot, plant, step, options, tick)
-        plant = calibrated(applied(plant, built(base.effects)), base.nuisances)
-        found, options = found.with_model_error(base.error), replace(options, spread=SAME)
+        found, plant, options = base.taken_out(found, plant, options)
     arena = arena_of(found, plant, step, options, tick)
     answers = {}
     for name, baseline in BASELINES.items():

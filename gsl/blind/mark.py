@@ -83,8 +83,7 @@ def marked(label: Label, answer: Mapping[str, Any]) -> Mark:
         label=label,
         told=names[0] if names else str(answer["verdict"]) if answer["verdict"] in (NO_GAP, UNKNOWN) else UNKNOWN,
         named=tuple(dict.fromkeys([*names, *sorted(alike)])),
-        first=first
-        and not truth & {twins.get(name, name) for group in answer.get("inseparable") or [] for name in group},
+        first=first and not truth & set().union(*groups),
         twin=first and not truth & alike,
         second=bool(names) and bool(truth & {*list(dict.fromkeys([*names, *_ranked(answer, twins)]))[:2], *alike}),
         both=bool(truth) and truth <= set(names),

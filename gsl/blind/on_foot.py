@@ -17,7 +17,7 @@ from gsl.blind.walks import Individual, Walks
 from gsl.core.body import lumped
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.experiment import experiment, fitting_step
-from gsl.diagnosis.on_ground import Walking, jitter_error, restart_error
+from gsl.diagnosis.on_ground import Walking, model_error
 from gsl.diagnosis.records import BASE, Pieces
 from gsl.errors import GslError
 from gsl.worlds.bullet import BulletWorld
@@ -55,8 +55,7 @@ class Yardstick:
         found = experiment(log, lumped(sim.plant.robot), walking=True)
         simulator = Walking(sim.plant, fitting_step(sim.step, sim.period), sim.period)
         pieces = _some(found.pieces)
-        unknown = np.hypot(restart_error(simulator, pieces), jitter_error(simulator, pieces, rng))
-        floor = found.with_model_error(unknown).comparison.floor
+        floor = found.with_model_error(model_error(simulator, pieces, rng)).comparison.floor
         return cls(simulator, pieces, floor, simulator.told({}, np.zeros(0), pieces))
 
     def gap(self, dial: Dial) -> Callable[[float], float]:

@@ -132,11 +132,12 @@ class Arena:
     ) -> Hypothesis:
         z = self.held_out.residual(build(fit.parameters), fit.nuisances)
         used, sample = self.held_out.comparison.used(z.shape[1]), self.held_out.pieces.samples
-        names, cost = np.unique(sample), loss(z).sum(axis=1)
+        lost, names = loss(z), np.unique(sample)
+        cost = lost.sum(axis=1)
         costs = np.array([cost[sample == name].sum() for name in names])
         counts = np.array([used.sum() * (sample == name).sum() for name in names])
         self.tick("")
-        return Hypothesis(candidates, parameters, fit, costs, counts, self.held_out.comparison.levels(loss(z)))
+        return Hypothesis(candidates, parameters, fit, costs, counts, self.held_out.comparison.levels(lost))
 
     def ground(self, base: Hypothesis) -> Ground:
         """Return where a screening on top of a hypothesis starts: without its nuisances, which hide what is missing."""

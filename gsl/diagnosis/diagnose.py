@@ -10,13 +10,12 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
-from gsl.diagnosis import nuisance
 from gsl.diagnosis.arena import LATENCY, arena_of, looked_at
 from gsl.diagnosis.attribute import BEAM, Arena, Hypothesis
 from gsl.diagnosis.experiment import Experiment, experiment, fitting_step
-from gsl.diagnosis.on_ground import Walking, jitter_error, restart_error
+from gsl.diagnosis.on_ground import Walking, model_error
 from gsl.diagnosis.options import Options
-from gsl.diagnosis.reference import SAME, Baseline, calibrated_on, clock_shift
+from gsl.diagnosis.reference import Baseline, calibrated_on, clock_shift
 from gsl.diagnosis.refuted import refuted
 from gsl.diagnosis.replay import Simulator
 from gsl.diagnosis.select import Selection, Thresholds, selected
@@ -104,14 +103,12 @@ def diagnosed(
     if walking:
         simulator = Walking(plant, fitting_step(step, found.period), found.period, workers=options.threads)
         spread = found.pieces.chosen(np.arange(0, len(found.pieces), max(1, len(found.pieces) // RESTARTS)))
-        unknown = np.hypot(restart_error(simulator, spread), jitter_error(simulator, spread, np.random.default_rng(0)))
-        found = found.with_model_error(unknown)
+        found = found.with_model_error(model_error(simulator, spread, np.random.default_rng(0)))
     baseline, shift = None, 0.0
     if reference is not None:
         tick("calibrating the simulator on the reference")
         baseline = calibrated_on(reference, robot, plant, step, options, tick)
-        plant = nuisance.calibrated(applied(plant, built(baseline.effects)), baseline.nuisances)
-        found, options = found.with_model_error(baseline.error), replace(options, spread=SAME)
+        found, plant, options = baseline.taken_out(found, plant, options)
     if not options.clocks:
         tick("setting the clocks")
         shift = clock_shift(found, plant, step, options, tick)

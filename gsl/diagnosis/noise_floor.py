@@ -57,7 +57,7 @@ def noise_floor(found: Sequence[Record], resolution: float, least: np.ndarray | 
     groups = [group for group in _repeats(found) if len(group) > 1]
     if groups:
         spread = [np.array([one.measured[SETTLED:] for one in group]) for group in groups]
-        square, slow = _variance(spread), _variance([_means(part) for part in spread])
+        square, slow = _variance(spread), _variance([in_blocks(part).mean(axis=2) for part in spread])
         pairs = sum(len(group) - 1 for group in groups)
         samples = sum(part.shape[1] * (len(part) - 1) for part in spread) * len(square)
         sd = np.maximum(np.sqrt(square), least)
@@ -74,11 +74,10 @@ def _variance(spread: Sequence[np.ndarray]) -> np.ndarray:
     return total / sum(part.shape[1] for part in spread)
 
 
-def _means(group: np.ndarray) -> np.ndarray:
-    """Return means over MEAN ticks, shape (repeats, T // MEAN, n_joints)."""
-    rows = group.shape[1] // MEAN
-    result: np.ndarray = group[:, : rows * MEAN].reshape(len(group), rows, MEAN, -1).mean(axis=2)
-    return result
+def in_blocks(x: np.ndarray) -> np.ndarray:
+    """Return what is of shape (n, T, n_joints) in blocks of MEAN ticks, shape (n, T // MEAN, MEAN, n_joints)."""
+    rows = x.shape[1] // MEAN
+    return x[:, : rows * MEAN].reshape(len(x), rows, MEAN, -1)
 
 
 def _repeats(found: Sequence[Record]) -> list[list[Record]]:

@@ -66,7 +66,7 @@ class Walking:
         parallel = Parallel(n_jobs=len(parts), max_nbytes=None, return_as="generator")
         with processes_starting():
             told = parallel(delayed(_all_replayed)(plant, physics, *one) for one in parts)
-        return np.concatenate(list(told))
+        return np.concatenate([*told])
 
 
 def _all_replayed(plant: Plant, physics: Physics, windows: OnGround, heights: np.ndarray) -> np.ndarray:
@@ -128,6 +128,12 @@ def _heights(plant: Plant, windows: OnGround) -> np.ndarray:
     sunk = plant.robot.mass * GRAVITY / (8.0 * stiffness)  # at eight corners
     seen = sunk**2 / (sunk**2 + HEIGHT**2)
     return -SUNK - sunk + seen * (soles - np.median(soles)) - low
+
+
+def model_error(simulator: Walking, pieces: Pieces, rng: np.random.Generator) -> np.ndarray:
+    """Return how far a replay on the ground is off with nothing wrong, by both reasons below, shape (n_channels,)."""
+    result: np.ndarray = np.hypot(restart_error(simulator, pieces), jitter_error(simulator, pieces, rng))
+    return result
 
 
 def restart_error(simulator: Walking, pieces: Pieces) -> np.ndarray:

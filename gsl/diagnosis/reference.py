@@ -16,6 +16,7 @@ from gsl.diagnosis.experiment import Experiment, experiment
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.replay import Effects
 from gsl.diagnosis.select import Thresholds, selected
+from gsl.effects.effect import applied, built
 
 SAME = 0.3  # of the usual spread: by how much the calibration of one robot may change from a reference to its log
 SHIFTS = (0.002, 0.02, 0.05)  # where a fit of two clocks' shift starts [s]
@@ -34,6 +35,11 @@ class Baseline:
     effects: Effects
     nuisances: np.ndarray
     error: np.ndarray
+
+    def taken_out(self, found: Experiment, plant: Plant, options: Options) -> tuple[Experiment, Plant, Options]:
+        """Return a log of the same robot, the simulator and the options with what the reference has told."""
+        plant = nuisance.calibrated(applied(plant, built(self.effects)), self.nuisances)
+        return found.with_model_error(self.error), plant, replace(options, spread=SAME)
 
 
 def calibrated_on(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsl.diagnosis.noise_floor import MEAN, NoiseFloor
+from gsl.diagnosis.noise_floor import MEAN, NoiseFloor, in_blocks
 from gsl.diagnosis.records import Pieces
 
 SCALE = 5.0  # beyond this many floors a residual counts less and less
@@ -77,7 +77,7 @@ class Comparison:
         """Slow parts as far as sim and real need not swing alike, and the power in each band; other rows are zero."""
         floor, sway, rows = self.floor[self.shaking], self.sway[self.shaking], sim.shape[1] // MEAN
         z = np.zeros_like(sim)
-        slow, fast = zip(*(_parted(x, rows) for x in (sim, real)), strict=True)
+        slow, fast = zip(*(_parted(x) for x in (sim, real)), strict=True)
         z[:, :rows] = (slow[0] - slow[1]) / np.sqrt(floor**2 + fast[1] / MEAN + 2.0 * sway**2)[:, None]
         power = [_bands(x) for x in (sim, real)]
         noise = floor**2  # the replay has none of it
@@ -85,11 +85,10 @@ class Comparison:
         return z
 
 
-def _parted(x: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
+def _parted(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return means over MEAN ticks, shape (W, rows, n), and the mean square about them, shape (W, n)."""
-    blocks = x[:, : rows * MEAN].reshape(len(x), rows, MEAN, -1)
-    slow = blocks.mean(axis=2)
-    return slow, ((blocks - slow[:, :, None]) ** 2).mean(axis=(1, 2))
+    blocks = in_blocks(x)
+    return blocks.mean(axis=2), blocks.var(axis=2).mean(axis=1)
 
 
 def _bands(x: np.ndarray) -> np.ndarray:
@@ -131,7 +130,7 @@ def _level(rest: np.ndarray) -> np.ndarray:
 
 def _sway(rest: np.ndarray) -> float:
     """Return the standard deviation of the means over MEAN ticks [rad] of what `_level` returns."""
-    return float(np.sqrt((_parted(rest[..., None], rest.shape[1] // MEAN)[0] ** 2).mean()))
+    return float(np.sqrt((in_blocks(rest[..., None]).mean(axis=2) ** 2).mean()))
 
 
 def _shakes(rest: np.ndarray, resolution: float) -> bool:

@@ -10,6 +10,7 @@ from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import BEAM, Arena, Gain, Hypothesis, gain
 from gsl.diagnosis.screen import Screening
 from gsl.diagnosis.shared import shares
+from gsl.effects.effect import TWINS
 
 LEAST_SHARE = 0.2  # of what is left, that a further effect has to explain
 MINOR = 0.005  # of what is explained already: less is no cause but a flaw of the model
@@ -19,7 +20,7 @@ FLAW = 0.005  # of the cost of calibration, that a simulator's own flaws (its ti
 HIDDEN = 1.5  # cost of a nuisance, on average, beyond which a calibration hides a cause
 NEAR, CHALLENGERS = 0.2, 2  # share of what is explained within which rivals are polished, and how many
 APART = 1.5  # spreads by which the mean calibration of a group is off that is a cause's
-SHIFTS = ("zero_offset", "sensor_bias")
+SHIFTS = (*TWINS, *TWINS.values())
 MANY, ASIDE = 4, 4.0  # joints, and standard errors by which their mean zero is off, that are no chance
 PAIRS = 5  # leads that are fitted beside an effect that stands already
 
@@ -79,9 +80,10 @@ def selected(
         chosen = _polished(arena, singles[0], tried) if thresholds.share else singles[0]
         beam, level = _distinct(singles, width), NOTHING
         while len(chosen.candidates) < most:
-            if not (_lacking(arena, chosen, level) or _shifted(arena, chosen)):
+            lacking = _lacking(arena, chosen, level)
+            if not (lacking or _shifted(arena, chosen)):
                 break
-            where = arena if _lacking(arena, chosen, level) else arena.only(SHIFTS)
+            where = arena if lacking else arena.only(SHIFTS)
             found = [one for base in beam for one in where.successors(base, PAIRS)[0]]
             tried += found
             better = [one for one in found if _stands(one, chosen, *_bar(thresholds, chosen, none))]
