@@ -195,10 +195,35 @@ def gain(better: Hypothesis, worse: Hypothesis, *, samples: int = 1000, seed: in
     """Compare two hypotheses sample by sample; the difference of their nuisances' costs is in every sample."""
     difference = worse.costs - better.costs
     extra = worse.fit.toll - better.fit.toll
-    index = np.random.default_rng(seed).integers(0, len(difference), (samples, len(difference)))
-    totals = difference[index].sum(axis=1) + extra
+    totals = difference[_drawn(len(difference), samples, seed)].sum(axis=1) + extra
     low, high = np.quantile(totals, [0.025, 0.975])
     return Gain(float(difference.sum() + extra), float(low), float(high), float((totals > 0.0).mean()))
+
+
+def share(
+    better: Hypothesis, worse: Hypothesis, none: Hypothesis, least: float, *, samples: int = 1000, seed: int = 0
+) -> tuple[float, float, float]:
+    """Return a gain as a share of the excess, in [-1, 1], and its 95 % interval by bootstrap over samples.
+
+    Args:
+        better: What gains.
+        worse: Over which it gains.
+        none: What costs the excess: the hypothesis without an effect.
+        least: Cost of one residual where only noise is left.
+        samples: Of the bootstrap.
+        seed: Of the bootstrap.
+    """
+    index = np.vstack([np.arange(len(none.costs)), _drawn(len(none.costs), samples, seed)])
+    gains = (worse.costs - better.costs)[index].sum(axis=1) + worse.fit.toll - better.fit.toll
+    excess = (none.costs - least * none.counts)[index].sum(axis=1) + none.fit.toll
+    value, *drawn = np.clip(gains / np.maximum(excess, 1e-9), -1.0, 1.0)
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return float(value), float(low), float(high)
+
+
+def _drawn(count: int, samples: int, seed: int) -> np.ndarray:
+    """Return samples with replacement, as indices of shape (samples, count)."""
+    return np.random.default_rng(seed).integers(0, count, (samples, count))
 
 
 def scopes_of(

@@ -11,7 +11,7 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.setting import settings_of
 from gsl.diagnosis import nuisance
-from gsl.diagnosis.attribute import Hypothesis, gain
+from gsl.diagnosis.attribute import Hypothesis, share
 from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.diagnose import NOISE_COST, Findings
 from gsl.diagnosis.localise import cells, horizon, regimes, sides
@@ -112,12 +112,12 @@ def _parameters(candidate: Candidate, values: np.ndarray, sd: np.ndarray) -> dic
 
 
 def _ranking(found: Findings) -> list[dict[str, Any]]:
-    none, expected = found.selection.none, float(found.selection.none.counts.sum())
-    excess = max(none.cost - NOISE_COST * expected, 1e-9)
-    rows = []
-    for one in found.selection.tried[:RANKED]:
-        share = gain(one, none)
-        value, low, high = (float(np.clip(x / excess, -1.0, 1.0)) for x in (share.value, share.low, share.high))
+    none, rows = found.selection.none, []
+    best: dict[frozenset[tuple[str, str]], Hypothesis] = {}
+    for one in found.selection.tried:
+        best.setdefault(frozenset((candidate.effect, candidate.scope) for candidate in one.candidates), one)
+    for one in [*best.values()][:RANKED]:
+        value, low, high = share(one, none, none, NOISE_COST)
         rows.append(
             {
                 "effects": list(one.names),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsl.diagnosis.attribute import Hypothesis, gain
+from gsl.diagnosis.attribute import Hypothesis, gain, share
 from gsl.diagnosis.select import Selection
 from gsl.effects.effect import TWINS
 
@@ -86,7 +86,7 @@ def judged(
     if not chosen.candidates:
         return Verdict("unknown" if strange > 1.0 else "no_gap", (), (), 0.0, remaining, 1.0)
     spreads = dict(margins)
-    causes = tuple(_cause(found, k, excess, spreads, doubt) for k in range(len(chosen.candidates)))
+    causes = tuple(_cause(found, k, expected, spreads, doubt) for k in range(len(chosen.candidates)))
     known = _known(explained, float(strange))
     alike = () if walking else ALIKE
     groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in alike if twins & set(chosen.names)]
@@ -106,12 +106,11 @@ def _known(explained: float, strange: float) -> float:
     return float(1.0 / (1.0 + np.exp(min(missing, unexplained) / KNOWN_SOFT)))
 
 
-def _cause(found: Selection, k: int, excess: float, spreads: dict[str, float], doubt: float) -> Cause:
+def _cause(found: Selection, k: int, expected: float, spreads: dict[str, float], doubt: float) -> Cause:
     chosen, effect = found.chosen, found.chosen.names[k]
     rivals = [one for one in found.tried if len(one.candidates) <= len(chosen.candidates) and effect not in one.names]
     fewer = min((one for one in rivals if len(one.candidates) < len(chosen.candidates)), key=_cost, default=found.none)
-    share = gain(chosen, fewer)
-    value, low, high = (float(np.clip(x / excess, 0.0, 1.0)) for x in (share.value, share.low, share.high))
+    value, low, high = (max(0.0, x) for x in share(chosen, fewer, found.none, expected))
     best = min((one for one in rivals if len(one.candidates) == len(chosen.candidates)), key=_cost, default=None)
     if best is None:
         return Cause(k, 0.99, None, value, low, high)
