@@ -9,8 +9,10 @@ import pytest
 from toy_plant import LAYOUT, QUICK, SLOW, ToyEnv, a_batch
 
 from gsl.errors import TrajectoryError
-from gsl.grounding.gat import LoadedTransformation
+from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.models.config import ModelConfig
+from gsl.models.ensemble import Ensemble
+from gsl.stages.chain import as_needed
 from gsl.stages.train_forward import HELDOUT, TrainForward
 from gsl.stages.train_inverse import TrainInverse
 from gsl.stages.training import labels
@@ -123,3 +125,20 @@ def test_logs_of_the_other_world_are_refused(real: str, sim: str, tmp_path: Path
         TrainForward(data=sim, model=LINEAR).run(tmp_path, QUIET)
     with pytest.raises(TrajectoryError, match="role=real"):
         TrainInverse(data=real, model=LINEAR).run(tmp_path, QUIET)
+
+
+def test_a_gaussian_ensemble_is_trained_by_likelihood_and_knows_what_it_has_seen(real: str, tmp_path: Path) -> None:
+    model = ModelConfig(family="linear", ridge=1e-6, likelihood="gaussian", members=3)
+    measured = TrainForward(data=real, model=model).run(tmp_path, QUIET)["heldout"]["off_pi0"]
+    assert measured["nll"] < -5.0
+    found = read_forward_model(str(tmp_path / "forward_model.safetensors"))
+    assert isinstance(found, Ensemble)
+    assert len(found.members) == 3
+    assert found.doubt(np.full(found.history.size(2), 50.0)).min() > 3.0
+
+
+def test_a_grounding_is_trained_the_forward_model_that_it_needs() -> None:
+    point, wanted = ModelConfig(), ActionTransformation("f", "i", predicts="mixture", gate=1.0)
+    assert (as_needed(point, wanted).likelihood, as_needed(point, wanted).members) == ("mixture", 5)
+    own = ModelConfig(likelihood="gaussian", members=3)
+    assert as_needed(own, ActionTransformation("f", "i", gate=1.0)) == own

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 
-def grounded(action: np.ndarray, inverse: np.ndarray, alpha: float) -> np.ndarray:
+def grounded(action: np.ndarray, inverse: np.ndarray, alpha: float | np.ndarray) -> np.ndarray:
     """Return the grounded action, shape (n,).
 
     Args:
         action: What the agent issued, a [rad], shape (n,).
         inverse: What has the predicted effect in the simulator, f_inv(s, f(s, a)) [rad], shape (n,).
-        alpha: How far to go from the one to the other, in [0, 1].
+        alpha: How far to go from the one to the other, in [0, 1], one for all or shape (n,).
     """
     sent: np.ndarray = action + alpha * (inverse - action)
     return sent

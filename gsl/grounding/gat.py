@@ -1,5 +1,8 @@
 """Grounded action transformation: each action becomes the one that does in the simulator what it would do in reality.
 
+Stochastic (SGAT) where the forward model's answer is drawn from a distribution: what a robot may do, not what it does
+on average. Where an ensemble of forward models disagrees, a gate leaves the action alone.
+
 Hanna, Desai, Karnan, Warnell, Stone: Grounded action transformation for sim-to-real reinforcement learning (2021).
 """
 
@@ -17,7 +20,8 @@ from gsl.core.layout import Layout
 from gsl.core.observation import Senses
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.models.forward import ForwardModel
+from gsl.models.ensemble import Ensemble, Forward
+from gsl.models.head import Likelihood
 from gsl.models.inverse import InverseModel
 
 REACH = 0.5  # [rad]; a servo told to go farther than this from the agent's target is at its torque limit anyway
@@ -34,10 +38,17 @@ class ActionTransformation:
         setting("how far to go from the agent's action to the grounded one; auto: as far as pi0 keeps its feet"),
     ] = "auto"
     noise: Annotated[float, setting("action noise on top", unit="rad", ge=0)] = 0.0
+    predicts: Annotated[
+        Likelihood, setting("a point, what f expects (GAT); a distribution, drawn from in every tick (SGAT)")
+    ] = "point"
+    gate: Annotated[
+        float | None,
+        setting(
+            "disagreement of an ensemble, 1 where it knows, from which on it is trusted less; none for always", gt=0
+        ),
+    ] = None
 
-    def load(
-        self, forward: Callable[[str], ForwardModel], inverse: Callable[[str], InverseModel]
-    ) -> LoadedTransformation:
+    def load(self, forward: Callable[[str], Forward], inverse: Callable[[str], InverseModel]) -> LoadedTransformation:
         """Return the grounding with its models, alpha 1 for `auto`.
 
         Args:
@@ -45,9 +56,14 @@ class ActionTransformation:
             inverse: Reads an inverse model.
 
         Raises:
-            ConfigError: The models are of different joints, or look ahead differently far.
+            ConfigError: The models are of different joints, look ahead differently far, or cannot do what is asked.
         """
         f, f_inv = forward(self.forward_model), inverse(self.inverse_model)
+        if self.predicts not in ("point", f.head.likelihood):
+            problem = f"predicts a {f.head.likelihood}; train it with model.likelihood={self.predicts}"
+            raise ConfigError("forward_model", problem)
+        if self.gate is not None and not isinstance(f, Ensemble):
+            raise ConfigError("gate", "needs an ensemble; train the forward model with model.members=5, say")
         if f.joints != f_inv.joints:
             different = sorted(set(f.joints) ^ set(f_inv.joints)) or ["their order"]
             raise ConfigError(
@@ -58,7 +74,8 @@ class ActionTransformation:
                 f"it looks {f_inv.horizon} ticks ahead, the forward model {f.horizon}; train both with one horizon"
             )
             raise ConfigError("inverse_model", problem)
-        return LoadedTransformation(f, f_inv, 1.0 if self.alpha == "auto" else self.alpha, self.noise)
+        alpha = 1.0 if self.alpha == "auto" else self.alpha
+        return LoadedTransformation(f, f_inv, alpha, self.noise, self.predicts != "point", self.gate)
 
     def start(self, layout: Layout, rng: np.random.Generator) -> TransformationRun:
         """Refuse to start without models.
@@ -78,12 +95,16 @@ class LoadedTransformation:
         inverse: f_inv, of the simulator.
         alpha: In [0, 1].
         noise: Standard deviation of the noise on top [rad].
+        draws: Whether f's answer is drawn and not expected.
+        gate: Doubt of f from which on it is trusted less, None for never.
     """
 
-    forward: ForwardModel
+    forward: Forward
     inverse: InverseModel
     alpha: float = 1.0
     noise: float = 0.0
+    draws: bool = False
+    gate: float | None = None
 
     def start(self, layout: Layout, rng: np.random.Generator) -> TransformationRun:
         """Return the grounding at the beginning of an episode.
@@ -114,10 +135,11 @@ class TransformationRun:
         grounding, real, sim = self._grounding, self._real, self._sim
         position = self._senses.position(observation)
         real.see(position, self._senses.sensed(observation))
-        wanted = grounding.forward.effect(real.complete(action), self._rng)
+        window = real.complete(action)
+        wanted = grounding.forward.effect(window, self._rng if grounding.draws else None)
         sim.see(position, ())
         inverse = grounding.inverse.action(sim.complete(action), action, wanted)
-        sent = grounded(action, inverse, grounding.alpha)
+        sent = grounded(action, inverse, grounding.alpha * self._trust(window))
         if grounding.noise:
             sent = sent + grounding.noise * self._rng.standard_normal(len(sent))
         # np.clip takes four times as long
@@ -125,3 +147,10 @@ class TransformationRun:
         real.remember(action)
         sim.remember(sent)
         return sent
+
+    def _trust(self, window: np.ndarray) -> float | np.ndarray:
+        """How far to believe f, from 1 up to the gate to 0 at twice that, joint by joint."""
+        gate, forward = self._grounding.gate, self._grounding.forward
+        if gate is None or not isinstance(forward, Ensemble):
+            return 1.0
+        return np.clip(2.0 - forward.doubt(window) / gate, 0.0, 1.0)

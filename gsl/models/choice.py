@@ -8,7 +8,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from gsl.models.config import ModelConfig
-from gsl.models.linear import fit_linear
+from gsl.models.head import POINT, Head
+from gsl.models.linear import fit_linear, with_spread
 from gsl.models.network import Network, Samples
 
 M = TypeVar("M")
@@ -21,14 +22,17 @@ class Choice(NamedTuple):
     scores: dict[str, float]
 
 
-def fit_network(family: str, training: Samples, validation: Samples, config: ModelConfig, *, seed: int) -> Network:
+def fit_network(
+    family: str, training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT
+) -> Network:
     """Return a network of one family; the linear one, which needs no early stopping, learns from all samples."""
     if family == "linear":
         inputs, targets = (np.concatenate(both) for both in zip(training, validation, strict=True))
-        return fit_linear(inputs, targets, ridge=config.ridge)
+        network = fit_linear(inputs, targets, ridge=config.ridge)
+        return with_spread(network, inputs, targets) if head.draws else network
     from gsl.models.fitting import fit_mlp
 
-    return fit_mlp(training, validation, config, seed=seed)
+    return fit_mlp(training, validation, config, seed=seed, head=head)
 
 
 def best(config: ModelConfig, fit: Callable[[str], M], score: Callable[[M], float]) -> tuple[M, Choice]:

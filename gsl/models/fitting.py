@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 import torch
 
 from gsl.core.scaling import scaling
 from gsl.models.config import ModelConfig
+from gsl.models.head import POINT, Head
 from gsl.models.network import Network, Samples, unscaled
 
 Pair = tuple[torch.Tensor, torch.Tensor]
+Loss = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+LEAST_LOG_SD = -5.0  # in units of the targets' spread: where data are all but exact the likelihood has no end
 
 
-def fit_mlp(training: Samples, validation: Samples, config: ModelConfig, *, seed: int) -> Network:
-    """Return the network of the epoch with the least squared error on `validation`; the same seed, the same weights.
+def fit_mlp(training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT) -> Network:
+    """Return the network of the epoch with the least loss on `validation`; the same seed, the same weights.
+
+    The loss is the squared error of a point, the negative log likelihood of a distribution.
 
     The caller's number of threads and torch's random state are as before afterwards.
     """
@@ -22,32 +29,34 @@ def fit_mlp(training: Samples, validation: Samples, config: ModelConfig, *, seed
     try:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            return _fitted(training, validation, config)
+            return _fitted(training, validation, config, head)
     finally:
         torch.set_num_threads(threads)
 
 
-def _fitted(training: Samples, validation: Samples, config: ModelConfig) -> Network:
+def _fitted(training: Samples, validation: Samples, config: ModelConfig, head: Head) -> Network:
     given, wanted = scaling(training[0]), scaling(training[1])
     known, unseen = ((_tensor(given.apply(x)), _tensor(wanted.apply(y))) for x, y in (training, validation))
-    network = _network((training[0].shape[1], *config.hidden, training[1].shape[1]))
-    _descend(network, known, unseen, config)
+    network = _network((training[0].shape[1], *config.hidden, head.width(training[1].shape[1])))
+    _descend(network, known, unseen, config, _LOSSES[head.likelihood](head))
     affine = [layer for layer in network if isinstance(layer, torch.nn.Linear)]
     layers = [(_array(layer.weight), _array(layer.bias)) for layer in affine]
-    return unscaled(layers, given, wanted)
+    return unscaled(layers, given, head.scaling(wanted))
 
 
-def _descend(network: torch.nn.Sequential, training: Pair, validation: Pair, config: ModelConfig) -> None:
+def _descend(
+    network: torch.nn.Sequential, training: Pair, validation: Pair, config: ModelConfig, loss_of: Loss
+) -> None:
     """Leave the network with the weights of its best epoch."""
     adam = torch.optim.Adam(network.parameters(), lr=config.rate, weight_decay=config.decay)
     best, weights, without_progress = np.inf, {}, 0
     for _ in range(config.epochs):
         for chosen in torch.split(torch.randperm(len(training[0])), config.batch):
             adam.zero_grad()
-            _loss(network, training[0][chosen], training[1][chosen]).backward()  # type: ignore[no-untyped-call]
+            loss_of(network(training[0][chosen]), training[1][chosen]).backward()  # type: ignore[no-untyped-call]
             adam.step()
         with torch.no_grad():
-            loss = _loss(network, *validation).item()
+            loss = loss_of(network(validation[0]), validation[1]).item()
         without_progress += 1
         if loss < best:
             best, without_progress = loss, 0
@@ -57,8 +66,26 @@ def _descend(network: torch.nn.Sequential, training: Pair, validation: Pair, con
     network.load_state_dict(weights or network.state_dict())
 
 
-def _loss(network: torch.nn.Sequential, inputs: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
-    return torch.nn.functional.mse_loss(network(inputs), targets)
+def _squared(head: Head) -> Loss:
+    return torch.nn.functional.mse_loss
+
+
+def _surprise(head: Head) -> Loss:
+    """The negative log likelihood of scaled targets, per output."""
+    k, logits = head.components, 0 if head.likelihood == "gaussian" else head.components
+
+    def loss(raw: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
+        means, logs = raw[:, logits:].reshape(len(raw), 2, k, -1).unbind(1)
+        normal = torch.distributions.Normal(means, logs.clamp(min=LEAST_LOG_SD).exp())
+        each = normal.log_prob(targets[:, None]).sum(dim=2)  # type: ignore[no-untyped-call]
+        if logits:
+            each = each + torch.log_softmax(raw[:, :logits], dim=1)
+        return -torch.logsumexp(each, dim=1).mean() / targets.shape[1]
+
+    return loss
+
+
+_LOSSES: Mapping[str, Callable[[Head], Loss]] = {"point": _squared, "gaussian": _surprise, "mixture": _surprise}
 
 
 def _network(widths: tuple[int, ...]) -> torch.nn.Sequential:

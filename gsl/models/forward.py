@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gsl.core.angles import Encoding, decode
+from gsl.core.angles import Encoding, decode, encode
 from gsl.core.history import History
+from gsl.models.head import Head
 from gsl.models.network import Network
 
 
@@ -23,6 +24,7 @@ class ForwardModel:
         joints: Names of the joints, in order.
         encoding: Of its outputs.
         horizon: Ticks ahead.
+        head: How its outputs are read.
     """
 
     kind: ClassVar[str] = "forward_model"
@@ -32,18 +34,28 @@ class ForwardModel:
     joints: tuple[str, ...]
     encoding: Encoding = "plain"
     horizon: int = 1
+    head: Head = Head()
 
     def __post_init__(self) -> None:
         """Hold network and windows together."""
-        check_sizes(self.network, self.history, self.joints, self.encoding)
+        check_sizes(self.network, self.history, self.joints, self.encoding, self.head)
 
-    def effect(self, window: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return the change [rad], shape (n_joints,); a model that knows its uncertainty draws it with `rng`."""
-        return decode(self.network.predict(window), self.encoding)
+    def effect(self, window: np.ndarray, rng: np.random.Generator | None = None) -> np.ndarray:
+        """Return the expected change [rad], shape (n_joints,); with `rng`, one drawn from what may happen."""
+        raw = self.network.predict(window)
+        return decode(self.head.expected(raw) if rng is None else self.head.drawn(raw, rng), self.encoding)
 
     def effects(self, windows: np.ndarray) -> np.ndarray:
         """Return the expected changes [rad], shape (N, n_joints), for many windows."""
-        return decode(self.network.predict_many(windows), self.encoding)
+        return decode(self.head.expected(self.network.predict_many(windows)), self.encoding)
+
+    def surprise(self, windows: np.ndarray, changes: np.ndarray) -> np.ndarray:
+        """Return the negative log likelihood of changes, shape (N, n_joints), per output in nats, shape (N,).
+
+        Only a model with a distribution has one.
+        """
+        outputs = encode(changes, self.encoding)
+        return self.head.surprise(self.network.predict_many(windows), outputs) / outputs.shape[1]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint stores."""
@@ -57,13 +69,15 @@ class ForwardModel:
             "history": vars(self.history),
             "encoding": self.encoding,
             "horizon": self.horizon,
+            **vars(self.head),
         }
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, np.ndarray], about: Mapping[str, Any]) -> ForwardModel:
         """Return the model that a checkpoint holds."""
         network, history = Network.from_arrays(arrays), history_from(about["history"])
-        return cls(network, history, tuple(about["joints"]), about["encoding"], about["horizon"])
+        head = Head(about["likelihood"], about["components"])
+        return cls(network, history, tuple(about["joints"]), about["encoding"], about["horizon"], head)
 
 
 def history_from(stored: Mapping[str, Any]) -> History:
@@ -71,9 +85,11 @@ def history_from(stored: Mapping[str, Any]) -> History:
     return History(**{**stored, "sensors": tuple(stored["sensors"])})
 
 
-def check_sizes(network: Network, history: History, joints: tuple[str, ...], encoding: Encoding) -> None:
+def check_sizes(
+    network: Network, history: History, joints: tuple[str, ...], encoding: Encoding, head: Head | None = None
+) -> None:
     """Assert that a network takes windows and answers for every joint."""
     n = len(joints)
-    outputs = n if encoding == "plain" else 2 * n
+    outputs = (head or Head()).width(n if encoding == "plain" else 2 * n)
     assert network.inputs == history.size(n), f"{network.inputs} inputs but windows of {history.size(n)}"
     assert network.outputs == outputs, f"{network.outputs} outputs but {outputs} are due"

@@ -11,7 +11,7 @@ from gsl.core.history import History, windows
 from gsl.core.observation import sensed
 from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import actions, usable
-from gsl.models.forward import ForwardModel
+from gsl.models.ensemble import Forward
 from gsl.models.inverse import InverseModel
 
 TICKS = 10  # of a free run: 0.2 s at 50 Hz
@@ -44,7 +44,7 @@ def segments(episodes: Sequence[Trajectory], history: History, *, carried_out: b
     return Segments(position, action, body, history.span + length * np.arange(len(parts)))
 
 
-def predicted_error(model: ForwardModel, pieces: Segments) -> np.ndarray:
+def predicted_error(model: Forward, pieces: Segments) -> np.ndarray:
     """Return the error of the joint positions after `TICKS` ticks [rad], shape (N, n_joints)."""
     x, last = pieces.position.copy(), pieces.starts + TICKS
     for tick in range(TICKS):

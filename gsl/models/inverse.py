@@ -118,8 +118,7 @@ class Solver:
 
     def action(self, window: np.ndarray, action: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the action [rad], shape (n_joints,); arguments as those of `Regression`."""
-        simulator = self.simulator
-        return solved(action, self.correction, wanted, decode(simulator.network.predict(window), simulator.encoding))
+        return solved(action, self.correction, wanted, self.simulator.effect(window))
 
     def actions(self, windows: np.ndarray, actions: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the actions [rad], shape (N, n_joints), for many windows."""

@@ -25,6 +25,8 @@ from gsl.storage.artifact import Artifact
 from gsl.tasks.task import REAL, SIM, Task
 from gsl.worlds.world import World
 
+MEMBERS = 5  # of the ensemble behind a gate, where nothing else is said
+
 
 @component
 class Budget:
@@ -99,7 +101,7 @@ class Chain:
                 seed=seed,
             )
             built(stage, home / f"collect_{role}", console)
-        forward = TrainForward(str(home / "collect_real"), self.forward_model, seed=seed)
+        forward = TrainForward(str(home / "collect_real"), as_needed(self.forward_model, grounding), seed=seed)
         inverse = TrainInverse(str(home / "collect_sim"), self.inverse_model, method=self.inverse_method, seed=seed)
         f, f_inverse = (built(stage, home / stage.kind, console) for stage in (forward, inverse))
         return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))
@@ -134,3 +136,9 @@ class Chain:
             seed=seed,
         )
         return built(stage, out, console)
+
+
+def as_needed(model: ModelConfig, grounding: ActionTransformation) -> ModelConfig:
+    """Return the settings of a forward model that can do what a grounding asks of it."""
+    wanted = model if grounding.predicts == "point" else replace(model, likelihood=grounding.predicts)
+    return wanted if grounding.gate is None or wanted.members > 1 else replace(wanted, members=MEMBERS)

@@ -6,13 +6,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
+
 from gsl.core.angles import encode
+from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
-from gsl.core.trajectory import Batch, Trajectory
+from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import Transitions, transitions, usable
 from gsl.errors import TrajectoryError
 from gsl.models.choice import best, fit_network
 from gsl.models.config import ModelConfig
+from gsl.models.ensemble import Forward, ensemble
 from gsl.models.forward import ForwardModel
 from gsl.models.free_run import TICKS, predicted_error, segments, standstill_error
 from gsl.models.network import Samples
@@ -40,7 +44,8 @@ class TrainForward:
 
     `auto` takes the family whose own prediction, fed back to it for 0.2 s, is nearest to the validation trajectories,
     those off pi0 if there are any: the error of one tick says little, for in a gait all joints move together. A model
-    with body sensors is fed the recorded ones.
+    with body sensors is fed the recorded ones. Of models with a distribution it takes the one that finds those
+    trajectories likelier.
     """
 
     kind: ClassVar[str] = "train_forward"
@@ -92,22 +97,36 @@ class TrainForward:
     def _transitions(self, episodes: Sequence[Trajectory]) -> Transitions:
         return transitions(episodes, self.model.of_body, self.model.horizon, carried_out=False)
 
-    def _fitted(self, family: str, data: Parts) -> ForwardModel:
-        config = self.model
-        known, unseen = (self._samples(part) for part in (data.training, data.validation))
-        network = fit_network(family, known, unseen, config, seed=self.seed)
-        return ForwardModel(network, config.of_body, data.training.joints, config.encoding, config.horizon)
+    def _fitted(self, family: str, data: Parts) -> Forward:
+        episodes = data.training.episodes
+        if self.model.members == 1:
+            return self._member(family, episodes, data, self.seed)
+        rng = np.random.default_rng(derived_seed(self.seed, "members"))
+        drawn = [rng.integers(len(episodes), size=len(episodes)) for _ in range(self.model.members)]
+        members = [
+            self._member(family, [episodes[index] for index in indices], data, self.seed + number)
+            for number, indices in enumerate(drawn)
+        ]
+        return ensemble(tuple(members), self._transitions(data.validation.episodes).windows)
 
-    def _samples(self, part: Batch) -> Samples:
-        rows = self._transitions(part.episodes)
+    def _member(self, family: str, episodes: Sequence[Trajectory], data: Parts, seed: int) -> ForwardModel:
+        config = self.model
+        known, unseen = (self._samples(part) for part in (episodes, data.validation.episodes))
+        network = fit_network(family, known, unseen, config, seed=seed, head=config.head)
+        return ForwardModel(network, config.of_body, data.training.joints, config.encoding, config.horizon, config.head)
+
+    def _samples(self, episodes: Sequence[Trajectory]) -> Samples:
+        rows = self._transitions(episodes)
         return rows.windows, encode(rows.change, self.model.encoding)
 
-    def _score(self, model: ForwardModel, episodes: Sequence[Trajectory]) -> float:
+    def _score(self, model: Forward, episodes: Sequence[Trajectory]) -> float:
         measured = measures(model, episodes)
+        if model.head.draws:
+            return float(measured["nll"])
         return float(measured["free_run_deg"] if model.horizon == 1 else measured["one_step_deg"])
 
 
-def measures(model: ForwardModel, episodes: Sequence[Trajectory]) -> dict[str, Any]:
+def measures(model: Forward, episodes: Sequence[Trajectory]) -> dict[str, Any]:
     """Return the errors of a forward model on trajectories, beside those of "nothing changes" [degrees]."""
     data = transitions(episodes, model.history, model.horizon, carried_out=False)
     pieces = segments(episodes, model.history, carried_out=False)
@@ -120,6 +139,8 @@ def measures(model: ForwardModel, episodes: Sequence[Trajectory]) -> dict[str, A
         "one_step_by_joint_deg": degrees_by_joint(errors, model.joints),
         "free_run_no_change_deg": degrees(standstill_error(pieces)),
     }
+    if model.head.draws:
+        measured["nll"] = float(model.surprise(data.windows, data.change).mean())
     if model.horizon == 1:
         ahead = predicted_error(model, pieces)
         measured |= {"free_run_deg": degrees(ahead), "free_run_by_joint_deg": degrees_by_joint(ahead, model.joints)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gsl.errors import ArtifactError
+from gsl.models.ensemble import Forward, forward_from
 from gsl.models.forward import ForwardModel
 from gsl.models.inverse import KIND as INVERSE
 from gsl.models.inverse import InverseModel, inverse_from
@@ -16,7 +17,7 @@ FILES = {FORWARD: "forward_model.safetensors", INVERSE: "inverse_model.safetenso
 MAKERS = {FORWARD: "train_forward", INVERSE: "train_inverse"}
 
 
-def write_model(folder: Path, model: ForwardModel | InverseModel) -> Path:
+def write_model(folder: Path, model: Forward | InverseModel) -> Path:
     """Write a model into a folder under the name of its kind and return the file."""
     about = model.description()
     path = folder / FILES[about["kind"]]
@@ -30,7 +31,7 @@ def model_file(reference: str, kind: str) -> Path:
     return found / FILES[kind] if found.is_dir() else found
 
 
-def read_forward_model(reference: str) -> ForwardModel:
+def read_forward_model(reference: str) -> Forward:
     """Read a forward model.
 
     Raises:
@@ -39,7 +40,7 @@ def read_forward_model(reference: str) -> ForwardModel:
     path = model_file(reference, FORWARD)
     arrays, about = read_checkpoint(path, kind=FORWARD)
     with _understood(path):
-        return ForwardModel.from_arrays(arrays, about)
+        return forward_from(arrays, about)
 
 
 def read_inverse_model(reference: str) -> InverseModel:
