@@ -15,7 +15,7 @@ from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Solver
 from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.grounding_check import ALPHAS, BARE, GROUNDED, OFF, PI0, STILL, check, largest_stable_alpha
+from gsl.stages.grounding_check import ALPHAS, BARE, GROUNDED, OFF, PI0, STILL, check, largest_stable
 from gsl.stages.grounding_replay import TICKS
 from gsl.stages.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
@@ -64,8 +64,9 @@ def test_a_grounding_that_makes_things_worse_is_not_acceptable_and_says_why() ->
 
 
 def test_alpha_stays_at_one_where_nothing_falls_and_sinks_where_all_falls() -> None:
-    assert largest_stable_alpha(replace(SCENARIO, grounding=a_transformation(0.0)), POLICY.initial, 1) == 1.0
-    assert largest_stable_alpha(replace(SCENARIO, grounding=a_transformation(3.0)), POLICY.initial, 1) < max(ALPHAS)
+    for push, largest in ((0.0, True), (3.0, False)):
+        tried = {alpha: replace(SCENARIO, grounding=replace(a_transformation(push), alpha=alpha)) for alpha in ALPHAS}
+        assert (largest_stable(tried, POLICY.initial, 1) == max(ALPHAS)) == largest
 
 
 def test_trajectories_without_the_body_cannot_be_replayed() -> None:

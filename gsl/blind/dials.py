@@ -11,7 +11,7 @@ import numpy as np
 from gsl.blind.extras import EXTRAS, Extra
 from gsl.core.body import Robot, lumped
 from gsl.core.plant import Plant
-from gsl.core.setting import REQUIRED, Setting, settings_of
+from gsl.core.setting import Setting, settings_of
 from gsl.effects.effect import effect_class, names
 
 UNSEEN = ("encoder_noise", "action_noise", "external_push")  # besides effects of contact: not for a log in the air
@@ -91,7 +91,7 @@ def drawn(effect: str, robot: Robot, rng: np.random.Generator, *, alone: bool = 
         if get_origin(hint) is Literal:
             fixed[key] = str(rng.choice(get_args(hint)))
     ranges = {key: one for key, one in known.items() if one.lower is not None and one.upper is not None}
-    dials = {key: start for key, one in ranges.items() if (start := _neutral(one)) is not None}
+    dials = {key: start for key, one in ranges.items() if (start := one.neutral) is not None}
     shapes = {key: _shape(one, rng) for key, one in ranges.items() if key not in dials}
     chosen = str(rng.choice(list(dials)))
     ends = _ends(ranges[chosen], dials[chosen])
@@ -131,13 +131,6 @@ def _scope(robot: Robot, rng: np.random.Generator, *, alone: bool) -> str:
         return str(rng.choice(robot.controlled))
     grouped = robot.groups and rng.random() < GROUPED
     return str(rng.choice(sorted(robot.groups))) if grouped else "all"
-
-
-def _neutral(known: Setting) -> float | None:
-    """Return the value that does nothing: the default, or 0 or 1 where there is none; None for a shape."""
-    assert known.lower is not None and known.upper is not None
-    possible = (0.0, 1.0) if known.default is REQUIRED else (known.default,)
-    return next((value for value in possible if value in (0.0, 1.0) and known.lower <= value <= known.upper), None)
 
 
 def _ends(known: Setting, start: float) -> list[float]:

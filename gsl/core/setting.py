@@ -87,6 +87,14 @@ class Setting:
     lower: float | None = None
     upper: float | None = None
 
+    @property
+    def neutral(self) -> float | None:
+        """The value of a strength that does nothing: the default, or 0 or 1 where there is none; None of a shape."""
+        if self.lower is None or self.upper is None:
+            return None
+        possible = (0.0, 1.0) if self.default is REQUIRED or self.default is None else (self.default,)
+        return next((value for value in possible if value in (0.0, 1.0) and self.lower <= value <= self.upper), None)
+
 
 def settings_of(target: Callable[..., Any]) -> Mapping[str, Setting]:
     """Return the settings of a component in order; of any other class or function, the names and defaults."""

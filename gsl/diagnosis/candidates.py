@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 
 from gsl.core.body import Robot, carrier, lumped
-from gsl.core.setting import REQUIRED, Setting, settings_of
+from gsl.core.setting import Setting, settings_of
 from gsl.diagnosis.replay import Effects
 from gsl.effects.effect import effect_class, names
 
@@ -147,12 +147,12 @@ def _of(
     ranges = {key: value for key, value in known.items() if value.lower is not None and value.upper is not None}
     numbers = {key: value for key, value in ranges.items() if key not in given}
     proportional = target.kind in ("body", "environment") and "joints" not in known
-    strengths = [key for key, value in numbers.items() if _neutral(value) is not None]
+    strengths = [key for key, value in numbers.items() if value.neutral is not None]
     shapes = [key for key in numbers if key not in strengths]
     together = [tuple(strengths)] if len(strengths) > 1 else []
     alone = [] if proportional and together else [(key,) for key in strengths]
     subsets = alone + together if strengths else [()]
-    rest = {key: _neutral(numbers[key]) for key in strengths}
+    rest = {key: numbers[key].neutral for key in strengths}
     return [
         _candidate(
             name,
@@ -185,22 +185,13 @@ def _candidate(
     return Candidate(name, fixed, tuple(free), neutral, documented, bounds, grid)
 
 
-def _neutral(known: Setting) -> float | None:
-    """Return the value of a parameter that does nothing, None for a shape."""
-    assert known.lower is not None and known.upper is not None
-    default = None if known.default is REQUIRED else known.default
-    possible = (0.0, 1.0) if default is None else (default,)
-    return next((value for value in possible if value in (0.0, 1.0) and known.lower <= value <= known.upper), None)
-
-
 def _start(setting: Setting) -> float:
-    neutral = _neutral(setting)
     assert setting.lower is not None and setting.upper is not None
-    return 0.5 * (setting.lower + setting.upper) if neutral is None else neutral
+    return 0.5 * (setting.lower + setting.upper) if setting.neutral is None else setting.neutral
 
 
 def _bounds(setting: Setting) -> tuple[float, float]:
-    neutral, lower, upper = _neutral(setting), setting.lower, setting.upper
+    neutral, lower, upper = setting.neutral, setting.lower, setting.upper
     assert lower is not None and upper is not None
     if neutral is None:
         return lower, upper

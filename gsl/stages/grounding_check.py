@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,6 @@ import numpy as np
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
 from gsl.errors import InputError
-from gsl.grounding.gat import LoadedTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.stages.grounding_replay import TICKS, Deviations, places, replayed, unmoved
 from gsl.stages.rollout import Scenario, rollout
@@ -153,21 +152,18 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
     )
 
 
-def largest_stable_alpha(scenario: Scenario, parameters: np.ndarray, seed: int) -> float:
-    """Return the largest alpha at which π0 stays up in all of `EPISODES` grounded episodes, else the least one tried.
+def largest_stable(scenarios: Mapping[float, Scenario], parameters: np.ndarray, seed: int) -> float:
+    """Return the first key of scenarios in which π0 stays up in all of `EPISODES` episodes, else the last.
 
     Args:
-        scenario: With a `LoadedTransformation` as its grounding.
+        scenarios: By how far each goes, the farthest first.
         parameters: Of π0, shape (n_parameters,).
         seed: Of all randomness.
     """
-    grounding = scenario.grounding
-    assert isinstance(grounding, LoadedTransformation)
-    for alpha in ALPHAS:
-        tried = replace(scenario, grounding=replace(grounding, alpha=alpha))
-        if not any(fell for _, fell in pi0_in(tried, parameters, seed, patient=False)):
-            return alpha
-    return ALPHAS[-1]
+    for far, scenario in scenarios.items():
+        if not any(fell for _, fell in pi0_in(scenario, parameters, seed, patient=False)):
+            return far
+    return far
 
 
 def _compared(env: Any, grounding: Any, episodes: Sequence[Any], seed: int) -> dict[str, dict[int, Deviations]]:

@@ -13,10 +13,12 @@ from gsl.core.seeds import derived_seed
 from gsl.errors import GslError, InputError, TrajectoryError
 from gsl.grounding.effects import DiagnosedEffects, switched_on
 from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.none import NoGrounding
+from gsl.grounding.randomised import RandomisedEffects, randomised
 from gsl.report.grounding_errors import grounding_errors
 from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.effects_check import check_effects
-from gsl.stages.grounding_check import TITLES, check, largest_stable_alpha
+from gsl.stages.grounding_check import ALPHAS, TITLES, check, largest_stable
 from gsl.stages.rollout import Scenario
 from gsl.stages.train_forward import HELDOUT
 from gsl.storage.documents import write_json
@@ -68,7 +70,17 @@ class Gate:
             return self._diagnosed(scenario, scenario.grounding)
         if isinstance(scenario.grounding, ActionTransformation):
             return self._transformed(scenario, scenario.grounding)
+        if isinstance(scenario.grounding, RandomisedEffects):
+            return self._randomised(scenario, scenario.grounding)
         return scenario, {}
+
+    def _randomised(self, scenario: Scenario, settings: RandomisedEffects) -> tuple[Scenario, Mapping[str, Any]]:
+        """Settle the width; what knows nothing of the real robot has nothing else to pass."""
+        bare, seed = replace(scenario, grounding=NoGrounding()), derived_seed(self.seed, "width")
+        worlds = {width: replace(bare, world=randomised(bare.world, settings, width)) for width in settings.widths}
+        width = largest_stable(worlds, self.parameters, seed)
+        self.console.status(f"drawing from {100 * width:.0f} % of the documented ranges")
+        return worlds[width], {"width": width}
 
     def _diagnosed(self, scenario: Scenario, settings: DiagnosedEffects) -> tuple[Scenario, Mapping[str, Any]]:
         """Switch effects on; an inner grounding that learns is checked in the world that they make."""
@@ -90,8 +102,8 @@ class Gate:
         loaded = settings.load(read_forward_model, read_inverse_model)
         ready = replace(scenario, grounding=loaded)
         if settings.alpha == "auto":
-            alpha = largest_stable_alpha(ready, self.parameters, derived_seed(self.seed, "alpha"))
-            ready = replace(scenario, grounding=replace(loaded, alpha=alpha))
+            tried = {alpha: replace(ready, grounding=replace(loaded, alpha=alpha)) for alpha in ALPHAS}
+            ready = tried[largest_stable(tried, self.parameters, derived_seed(self.seed, "alpha"))]
         heldout = model_file(settings.forward_model, "forward_model").with_name(HELDOUT)
         try:
             report = check(ready, self.parameters, read(heldout), derived_seed(self.seed, "check"))

@@ -1,0 +1,72 @@
+"""Domain randomisation: every episode is in another world, the same one for the same seed."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gsl.core.setting import settings_of
+from gsl.effects.effect import effect_class
+from gsl.errors import ConfigError
+from gsl.grounding.none import NoGrounding
+from gsl.grounding.randomised import Draw, RandomisedEffects, randomised
+from gsl.worlds.bullet import BulletWorld
+
+WORLD = BulletWorld(robot="nao", effects={"coulomb_friction": {"torque": 0.1}}, floating=False, settle=0.0)
+SETTINGS = RandomisedEffects()
+
+
+def last_positions(env: object, seed: int) -> np.ndarray:
+    env.reset(seed=seed)  # type: ignore[attr-defined]
+    target = np.full(15, 0.2)
+    for _ in range(10):
+        seen, *_ = env.step(target)  # type: ignore[attr-defined]
+    return seen[:15]
+
+
+def test_an_episode_is_a_function_of_its_seed_whatever_came_before() -> None:
+    made = pickle.loads(pickle.dumps(randomised(WORLD, SETTINGS, 0.5)))
+    env, other = made.make(), made.make()
+    first, second = last_positions(env, 1), last_positions(env, 2)
+    assert np.abs(first - second).max() > 1e-4
+    np.testing.assert_array_equal(last_positions(other, 2), second)
+    env.close()
+    other.close()
+
+
+def test_a_draw_stays_within_its_share_of_the_documented_ranges_and_reaches_its_ends() -> None:
+    width, rng = 0.4, np.random.default_rng(0)
+    drawn = [Draw(SETTINGS.effects, width, "torso")(rng) for _ in range(400)]
+    for name in SETTINGS.effects:
+        for key, known in settings_of(effect_class(name)).items():
+            if known.neutral is None:
+                continue
+            values = np.array([one[name][key] for one in drawn])
+            low, high = (known.neutral + width * (end - known.neutral) for end in (known.lower, known.upper))
+            assert low <= values.min() < low + 0.02 * (high - low), name
+            assert high - 0.02 * (high - low) < values.max() <= high, name
+
+
+def test_what_the_world_has_already_stays() -> None:
+    effects = randomised(WORLD, RandomisedEffects(("command_latency",)), 0.5).world.effects
+    assert effects == WORLD.effects
+
+
+@pytest.mark.parametrize("name", ["uneven_grund", "ground_compliance"])
+def test_effects_that_cannot_be_drawn_are_refused(name: str) -> None:
+    with pytest.raises(ConfigError, match=r"effects"):
+        RandomisedEffects((name,))
+
+
+def test_a_world_without_effects_is_refused() -> None:
+    with pytest.raises(ConfigError, match="only Bullet worlds"):
+        randomised(NoGrounding(), SETTINGS, 0.5)
+
+
+def test_a_width_of_ones_own_is_the_only_one_tried() -> None:
+    assert replace(SETTINGS, width=0.3).widths == (0.3,)
+    assert SETTINGS.widths[0] == 1.0
+    assert list(SETTINGS.widths) == sorted(SETTINGS.widths, reverse=True)
