@@ -193,7 +193,7 @@ def test_help_shows_groups_settings_and_effects(capsys: pytest.CaptureFixture[st
     assert "backlash.width" in text
 
 
-NEEDED = {"diagnose": ("real=logs",)}  # what has no default
+NEEDED = {"diagnose": ("real=logs",), "identify": ("real=logs",)}  # what has no default
 
 
 def _choices() -> Iterator[tuple[str, ...]]:

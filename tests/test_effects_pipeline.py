@@ -99,3 +99,25 @@ def test_compare_sets_effects_beside_the_others(tmp_path: Path) -> None:
         measured = loaded(home / method / "trial_01/evaluate/metrics.json")["real_episodes"]
         assert trials[method]["real_episodes"] == measured + 5 + learned
     assert {path.name for path in (home / "diagnosis/trial_01").iterdir()} == {"collect_excitation", "diagnose"}
+
+
+def test_identification_fits_the_same_log_without_a_verdict(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    said = done(*LINE, "grounding=identified", "out=runs/air/identified", folder=folder)
+    assert any(line.startswith(f"{FIRST}/collect_excitation: ") and "(unchanged)" in line for line in said.lines)
+    found = loaded(folder / FIRST / "identify/report.json")
+    assert 0.01 < found["effects"]["command_latency"][0]["delay"] < 0.025
+    assert found["shrinkage"]["after"] < 0.6 * found["shrinkage"]["before"]
+    assert "Diagnosis: identified. 19 parameters of 18 effects were fitted at once: held out, " in said.out
+
+
+@pytest.mark.parametrize("grounding", ["sgat", "gat_gated", "randomised"])
+def test_every_other_grounding_goes_through_an_iteration(grounding: str, tmp_path: Path) -> None:
+    said = done(*LINE[:-2], f"name={grounding}", "accept=true", f"grounding={grounding}", folder=tmp_path)
+    assert "real data: " in said.out
+    optimized = loaded(tmp_path / f"runs/{grounding}/iteration_01/optimize/metrics.json")
+    assert ("width" if grounding == "randomised" else "alpha") in optimized
+    if grounding != "randomised":
+        trained = loaded(tmp_path / f"runs/{grounding}/iteration_01/train_forward/config.yaml")["model"]
+        wanted = ("gaussian", 1) if grounding == "sgat" else ("point", 5)
+        assert (trained["likelihood"], trained["members"]) == wanted

@@ -65,7 +65,7 @@ def test_effects_add_up_to_those_of_the_simulator() -> None:
 
 
 def test_a_diagnosis_of_another_simulator_is_refused() -> None:
-    with pytest.raises(ConfigError, match="of another simulator: the nao with no effects; diagnose this one"):
+    with pytest.raises(ConfigError, match="of another simulator: the nao with no effects; take this one"):
         switched_on(replace(AIR, effects=DRY), found(LATE))
     with pytest.raises(ConfigError, match="of another simulator"):
         switched_on(AIR, replace(found(LATE), robot="pepper"))
@@ -73,13 +73,13 @@ def test_a_diagnosis_of_another_simulator_is_refused() -> None:
 
 def test_a_grounding_without_diagnosis_or_before_its_effects_are_on_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"grounding\.diagnosis: is missing"):
-        DiagnosedEffects().load(lambda reference: found(LATE))
+        DiagnosedEffects().load(lambda reference, method: found(LATE))
     with pytest.raises(ConfigError, match="not switched on"):
         DiagnosedEffects(effects=LATE).start(Layout((), {}, 0.02), np.random.default_rng())
 
 
 def test_given_effects_need_no_diagnosis_and_win_over_one() -> None:
-    told = DiagnosedEffects(diagnosis="x", effects=LATE).load(lambda reference: found(DRY))
+    told = DiagnosedEffects(diagnosis="x", effects=LATE).load(lambda reference, method: found(DRY))
     assert (told.verdict, told.effects, told.causes) == ("given", LATE, ("command_latency",))
 
 

@@ -6,9 +6,9 @@ transformation inside, physics takes what has a name, and what is left is learne
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -22,13 +22,15 @@ from gsl.grounding.grounding import Grounding, GroundingRun
 from gsl.grounding.none import NoGrounding
 from gsl.worlds.world import World
 
+MANY = 6  # effects, more of which are counted and not named
+
 
 @dataclass(frozen=True)
 class Diagnosis:
     """What a diagnosis says of a simulator.
 
     Attributes:
-        verdict: `no_gap`, `causes`, `inseparable`, `unknown`; `given` where nobody diagnosed.
+        verdict: `no_gap`, `causes`, `inseparable`, `unknown`; `given` or `identified` where nobody diagnosed.
         causes: Names of the effects that it names.
         summary: In a sentence.
         robot: That was simulated.
@@ -51,7 +53,13 @@ class Diagnosis:
         """What is done with it, in a sentence."""
         if not self.causes:
             return "Nothing is switched on: the simulator is taken as it is, calibrated joint by joint."
-        return f"Switched on in the simulator: {', '.join(dict.fromkeys(self.causes))}."
+        return f"Switched on in the simulator: {named(self.causes)}."
+
+
+def named(causes: Sequence[str]) -> str:
+    """Return effects by name, or only how many they are."""
+    names = tuple(dict.fromkeys(causes))
+    return ", ".join(names) if len(names) <= MANY else f"{len(names)} effects"
 
 
 @component
@@ -62,12 +70,15 @@ class DiagnosedEffects:
     effects: Annotated[
         Mapping[str, Any], setting("what to switch on instead of a diagnosis, as in a world's `effects:`")
     ] = field(default_factory=dict)
+    method: Annotated[
+        Literal["diagnose", "identify"], setting("what finds the effects: a diagnosis, or a fit of all of them at once")
+    ] = "diagnose"
     inner: Annotated[
         Grounding | ActionTransformation, setting("what stands between action and the diagnosed simulator")
     ] = field(default_factory=NoGrounding)
 
-    def load(self, read: Callable[[str], Diagnosis]) -> Diagnosis:
-        """Return the diagnosis; `read` finds one by its reference.
+    def load(self, read: Callable[[str, str], Diagnosis]) -> Diagnosis:
+        """Return the diagnosis; `read` finds one by its reference and method.
 
         Raises:
             ConfigError: There is neither a diagnosis nor an effect.
@@ -77,8 +88,8 @@ class DiagnosedEffects:
             told = f"These effects were given, not diagnosed: {', '.join(names)}."
             return Diagnosis("given", names, told, "", {}, self.effects)
         if not self.diagnosis:
-            raise ConfigError("grounding.diagnosis", "is missing; name a run of gsl diagnose, or set effects")
-        return read(self.diagnosis)
+            raise ConfigError("grounding.diagnosis", f"is missing; name a run of gsl {self.method}, or set effects")
+        return read(self.diagnosis, self.method)
 
     def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
         """Refuse to start: the world has to be changed first.
@@ -100,7 +111,7 @@ def switched_on(world: World, found: Diagnosis) -> World:
     settings = described(world)
     if found.verdict != "given" and (settings["robot"], settings["effects"]) != (found.robot, found.simulated):
         other = f"the {found.robot} with {', '.join(found.simulated) or 'no effects'}"
-        raise ConfigError("grounding.diagnosis", f"is of another simulator: {other}; diagnose this one")
+        raise ConfigError("grounding.diagnosis", f"is of another simulator: {other}; take this one")
     return replace(world, effects=together([settings["effects"], found.effects]))
 
 

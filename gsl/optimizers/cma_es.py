@@ -10,6 +10,8 @@ import numpy as np
 
 from gsl.core.setting import component, setting
 
+Bounds = tuple[np.ndarray, np.ndarray] | None
+
 
 @component
 class CmaEs:
@@ -19,15 +21,17 @@ class CmaEs:
     generations: Annotated[int, setting("generations", ge=1)]
     sigma: Annotated[float, setting("first step size, in units of a parameter's scale", gt=0)] = 0.08
 
-    def start(self, parameters: np.ndarray, scale: np.ndarray, seed: int) -> CmaEsRun:
-        """Return the search at its beginning."""
-        return CmaEsRun(self, np.asarray(parameters, dtype=float), np.asarray(scale, dtype=float), seed)
+    def start(self, parameters: np.ndarray, scale: np.ndarray, seed: int, bounds: Bounds = None) -> CmaEsRun:
+        """Return the search at its beginning; bounds, if there are some, are the least and the greatest parameters."""
+        return CmaEsRun(self, np.asarray(parameters, dtype=float), np.asarray(scale, dtype=float), seed, bounds)
 
 
 class CmaEsRun:
     """A search in progress; it is the same again when the same values are told."""
 
-    def __init__(self, settings: CmaEs, parameters: np.ndarray, scale: np.ndarray, seed: int) -> None:
+    def __init__(
+        self, settings: CmaEs, parameters: np.ndarray, scale: np.ndarray, seed: int, bounds: Bounds = None
+    ) -> None:
         import cma  # takes 0.7 s
 
         self._origin, self._scale = parameters, scale
@@ -41,6 +45,7 @@ class CmaEsRun:
             "tolfun": 0.0,
             "tolx": 0.0,
             "tolflatfitness": settings.generations + 1,
+            "bounds": bounds and [(bound - parameters) / scale for bound in bounds],
         }
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

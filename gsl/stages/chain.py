@@ -65,7 +65,9 @@ class Chain:
         """Return a grounding that has its diagnosis, made below `home` if it wants one of its own."""
         if not isinstance(grounding, DiagnosedEffects) or grounding.effects:
             return grounding
-        made = self.diagnosis.carried_out(self.real, self.sim, home, workers=self.workers, seed=seed, console=console)
+        made = self.diagnosis.carried_out(
+            self.real, self.sim, grounding.method, home, workers=self.workers, seed=seed, console=console
+        )
         return replace(grounding, diagnosis=str(made.folder))
 
     def ready(self, home: Path, grounding: Grounding, previous: str | None, seed: int, console: Any) -> Grounding:

@@ -64,7 +64,8 @@ class Compare:
         chain = replace(self.iterate.chain, real=self.worlds[world], accept=True)
         place, air = home / world / method / name, home / world / "diagnosis" / name
         grounding = chain.diagnosed(air, self.methods[method], seed, console)
-        collected = flown(air).episodes if grounding is not self.methods[method] else 0
+        flight = flown(air, self.methods[method], grounding)
+        collected = flight.episodes if flight else 0
         if isinstance(innermost(grounding), ActionTransformation):
             collected += self.iterate.budget.real_episodes + self.iterate.budget.real_neighbours
         ready = chain.ready(place, grounding, None, seed, console)

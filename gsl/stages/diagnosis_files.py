@@ -22,13 +22,13 @@ def report_of(folder: Path) -> dict[str, Any]:
     return report | found
 
 
-def read_diagnosis(reference: str) -> Diagnosis:
-    """Return what an artifact of `gsl diagnose` says of its simulator.
+def read_diagnosis(reference: str, kind: str) -> Diagnosis:
+    """Return what an artifact of `gsl diagnose`, or of `gsl identify`, says of its simulator.
 
     Raises:
         ArtifactError: There is none, or it is not as it was written.
     """
-    artifact = load(reference, "diagnose")
+    artifact = load(reference, kind)
     report, sim = report_of(artifact.folder), artifact.config["sim"]
     gap = report["shrinkage"]
     return Diagnosis(

@@ -8,11 +8,13 @@ from typing import Annotated, Any, NamedTuple
 
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.grounding.effects import Diagnosis
+from gsl.grounding.effects import DiagnosedEffects, Diagnosis
+from gsl.grounding.grounding import Grounding
 from gsl.policies.excitation import Excitation
 from gsl.stages.collect import Collect
 from gsl.stages.diagnose import Diagnose
 from gsl.stages.diagnosis_files import read_diagnosis
+from gsl.stages.identify import Identify
 from gsl.stages.link import built
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
@@ -21,7 +23,7 @@ from gsl.tasks.task import REAL
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.world import World
 
-EXCITATION, DIAGNOSIS = "collect_excitation", "diagnose"
+EXCITATION = "collect_excitation"
 
 
 @component
@@ -32,9 +34,12 @@ class DiagnosisPlan:
     most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
+    evaluations: Annotated[int, setting("replays that an identification may take", ge=16)] = 4800
 
-    def carried_out(self, real: World, sim: World, home: Path, *, workers: int, seed: int, console: Any) -> Artifact:
-        """Return the diagnosis of a simulator against an excitation of the real robot, both built below `home`.
+    def carried_out(
+        self, real: World, sim: World, method: str, home: Path, *, workers: int, seed: int, console: Any
+    ) -> Artifact:
+        """Return what a method finds of a simulator in an excitation of the real robot, both built below `home`.
 
         Raises:
             ConfigError: One of the two worlds is not of a kind that is diagnosed.
@@ -51,16 +56,20 @@ class DiagnosisPlan:
             seed=seed,
         )
         log = built(played, home / EXCITATION, console)
-        found = Diagnose(
-            real=str(log.folder),
-            sim=sim,
-            most=self.most,
-            duels=self.duels,
-            nulls=self.nulls,
-            workers=workers,
-            seed=seed,
+        stage: Diagnose | Identify = Identify(
+            str(log.folder), sim, evaluations=self.evaluations, workers=workers, seed=seed
         )
-        return built(found, home / DIAGNOSIS, console)
+        if method == Diagnose.kind:
+            stage = Diagnose(
+                real=str(log.folder),
+                sim=sim,
+                most=self.most,
+                duels=self.duels,
+                nulls=self.nulls,
+                workers=workers,
+                seed=seed,
+            )
+        return built(stage, home / method, console)
 
 
 class Flight(NamedTuple):
@@ -77,7 +86,9 @@ class Flight(NamedTuple):
         return f"Diagnosis: {found.verdict.replace('_', ' ')}. {found.summary} {found.told}"
 
 
-def flown(home: Path) -> Flight:
-    """Return what lies below `home` of a plan that was carried out."""
+def flown(home: Path, asked: Grounding, ready: Grounding) -> Flight | None:
+    """Return what lies below `home` of a plan that was carried out, None if a grounding needed none to be ready."""
+    if ready is asked or not isinstance(ready, DiagnosedEffects):
+        return None
     spent = Artifact(home / EXCITATION, manifest.read(home / EXCITATION)).metrics
-    return Flight(spent["real_episodes"], spent["seconds"], read_diagnosis(str(home / DIAGNOSIS)))
+    return Flight(spent["real_episodes"], spent["seconds"], read_diagnosis(str(home / ready.method), ready.method))

@@ -32,7 +32,7 @@ REPORT, FIGURE = "grounding.json", "grounding.png"
 def grounding_parents(grounding: Any, path: str = "grounding") -> Mapping[str, Path]:
     """Return what a grounding is made of, by role: the dotted name of the setting, seen from `path`."""
     if isinstance(grounding, DiagnosedEffects):
-        own = {} if grounding.effects else {f"{path}.diagnosis": resolve(grounding.diagnosis, kind="diagnose")}
+        own = {} if grounding.effects else {f"{path}.diagnosis": resolve(grounding.diagnosis, kind=grounding.method)}
         return {**own, **grounding_parents(grounding.inner, f"{path}.inner")}
     if not isinstance(grounding, ActionTransformation):
         return {}

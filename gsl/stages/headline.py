@@ -6,6 +6,7 @@ import importlib
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from gsl.grounding.effects import named
 from gsl.storage.artifact import Artifact
 
 Metrics = Mapping[str, Any]
@@ -73,6 +74,10 @@ def _diagnose(metrics: Metrics, unit: Unit) -> str:
     return f"{verdict}: {causes}{gone}" if causes else f"{verdict}{gone}"
 
 
+def _identify(metrics: Metrics, unit: Unit) -> str:
+    return f"{metrics['effects']} effects; {metrics['before']:.1f} noise floors became {metrics['after']:.1f}"
+
+
 def _train_forward(metrics: Metrics, unit: Unit) -> str:
     names = {"pi0": "of π0", "off_pi0": "off π0"}
     errors = {
@@ -89,7 +94,7 @@ def _train_inverse(metrics: Metrics, unit: Unit) -> str:
 def _optimize(metrics: Metrics, unit: Unit) -> str:
     told = f"{metrics['generations']} generations, best {unit.shown(metrics['best_value_sim'])} in simulation"
     if "effects" in metrics:
-        told += f"; {', '.join(metrics['effects']) or 'calibration'} switched on"
+        told += f"; {named(metrics['effects']) or 'calibration'} switched on"
     alpha = metrics.get("alpha")
     if alpha is None:
         return told
@@ -121,6 +126,7 @@ def _survey(metrics: Metrics, unit: Unit) -> str:
 _TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
     "collect": _collect,
     "diagnose": _diagnose,
+    "identify": _identify,
     "train_forward": _train_forward,
     "train_inverse": _train_inverse,
     "optimize": _optimize,

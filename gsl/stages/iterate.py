@@ -131,8 +131,7 @@ class Iterate:
     def _diagnosed(self, home: Path, rounds: Rounds, console: Any) -> Grounding:
         """Return the grounding with its diagnosis: an excitation knows no policy, so that one serves all iterations."""
         grounding = self.chain.diagnosed(home / FIRST, self.grounding, self.seed, console)
-        if grounding is not self.grounding:
-            flight = flown(home / FIRST)
+        if flight := flown(home / FIRST, self.grounding, grounding):
             rounds.diagnosed(flight)
             console.status(flight.told)
         return grounding

@@ -1,0 +1,97 @@
+"""Identify: fit every parameter of the effect library at once to a log, as system identification does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import yaml
+
+from gsl.core.body import lumped
+from gsl.core.described import described
+from gsl.core.interruption import checkpoint
+from gsl.core.setting import component, setting
+from gsl.diagnosis import nuisance
+from gsl.diagnosis.arena import arena_of
+from gsl.diagnosis.experiment import experiment
+from gsl.diagnosis.identified import identified
+from gsl.diagnosis.options import Options
+from gsl.diagnosis.replay import Bench, Effects
+from gsl.diagnosis.world_file import joined
+from gsl.errors import GslError
+from gsl.stages.diagnosis_files import REPORT
+from gsl.stages.logs import check_log, log_files, on_ground, read_logs
+from gsl.stages.population import Workers
+from gsl.storage import documents
+from gsl.worlds.bullet import BulletWorld
+
+WORLD = "world/identified.yaml"
+
+
+@component
+class Identify:
+    """The baseline of `diagnose`: same log, same library, no verdict; `grounding=identified` trains in the result.
+
+    What the library lacks is absorbed by the parameters that come nearest to it: a good fit names no cause.
+    """
+
+    kind: ClassVar[str] = "identify"
+
+    real: Annotated[str, setting("trajectories in the air: a run, a parquet file or a folder of them", min_length=1)]
+    sim: Annotated[BulletWorld, setting("the simulator that is fitted to them")]
+    without: Annotated[tuple[str, ...], setting("effects that are left out of the library")] = ()
+    evaluations: Annotated[int, setting("replays of the log that the fit may take", ge=16)] = 4800
+    workers: Workers = -1
+    seed: Annotated[int, setting("of all randomness", ge=0)] = 1
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the files that are read."""
+        files = log_files(self.real)
+        return {"real" if len(files) == 1 else f"real.{k}": path for k, path in enumerate(files)}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write report.json and the identified world."""
+        robot, batch = lumped(self.sim.plant.robot), read_logs(self.real)
+        check_log(batch, robot, self.real)
+        if on_ground(batch):
+            raise GslError(f"{self.real}: identification needs the robot in the air; see `gsl collect task=excite`")
+        found = experiment(batch, robot)
+        if not len(found.train) or not len(found.held_out):
+            raise GslError(f"{self.real}: too little to fit and to check: two motions of some seconds are the least")
+        options = Options(self.without, threads=self._threads)
+        arena = arena_of(found, self.sim.plant, self.sim.step, options, lambda phase: checkpoint())
+        with console.progress(self.evaluations, "fitting all parameters at once") as progress:
+            fitted = identified(arena, evaluations=self.evaluations, seed=self.seed, tick=progress.advance)
+        before, after = (_gap(arena.held_out, effects) for effects in ({}, fitted.effects))
+        effects = joined([fitted.effects])
+        fit = f"{len(fitted.candidates)} parameters of {len(effects)} effects were fitted at once"
+        summary = f"{fit}: held out, {before:.1f} noise floors became {after:.1f}."
+        report = {
+            "verdict": "identified",
+            "causes": [{"effect": name} for name in effects],
+            "summary": summary,
+            "effects": effects,
+            "shrinkage": {"before": before, "after": after},
+        }
+        documents.write_json(folder / REPORT, report)
+        world = described(replace(self.sim, effects=joined([described(self.sim)["effects"], effects])))
+        (folder / WORLD).parent.mkdir()
+        text = yaml.safe_dump(documents.plain(world), sort_keys=False, allow_unicode=True)
+        (folder / WORLD).write_text(f"# {summary}\n{text}", encoding="utf-8")
+        return {"effects": len(effects), "before": before, "after": after}
+
+    @property
+    def _threads(self) -> int:
+        from joblib import cpu_count
+
+        return self.workers if self.workers > 0 else int(cpu_count())
+
+
+def _gap(bench: Bench, effects: Effects) -> float:
+    """Return the root mean square of the residuals [noise floors]."""
+    z = bench.residual(effects, nuisance.none(bench.joints))
+    used = bench.comparison.used(z.shape[1])
+    return float(np.sqrt((z**2).sum() / (used.sum() * len(z))))
