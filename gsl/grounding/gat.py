@@ -19,6 +19,7 @@ from gsl.core.history import Window
 from gsl.core.layout import Layout
 from gsl.core.observation import Senses
 from gsl.core.setting import component, setting
+from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
 from gsl.models.ensemble import Ensemble, Forward
 from gsl.models.head import Likelihood
@@ -41,6 +42,10 @@ class ActionTransformation:
     predicts: Annotated[
         Likelihood, setting("a point, what f expects (GAT); a distribution, drawn from in every tick (SGAT)")
     ] = "point"
+    x: Annotated[
+        tuple[str, ...] | Literal["all", "auto"],
+        setting("joints that are grounded; auto: the fewest that do as well on validation trajectories"),
+    ] = "all"
     gate: Annotated[
         float | None,
         setting(
@@ -74,8 +79,12 @@ class ActionTransformation:
                 f"it looks {f_inv.horizon} ticks ahead, the forward model {f.horizon}; train both with one horizon"
             )
             raise ConfigError("inverse_model", problem)
+        x = f.joints if isinstance(self.x, str) else self.x
+        if unknown := [joint for joint in x if joint not in f.joints]:
+            problem = f"the models have no joint of this name{did_you_mean(unknown[0], f.joints)}"
+            raise ConfigError("x", problem, given=unknown[0])
         alpha = 1.0 if self.alpha == "auto" else self.alpha
-        return LoadedTransformation(f, f_inv, alpha, self.noise, self.predicts != "point", self.gate)
+        return LoadedTransformation(f, f_inv, alpha, self.noise, x, self.predicts != "point", self.gate)
 
     def start(self, layout: Layout, rng: np.random.Generator) -> TransformationRun:
         """Refuse to start without models.
@@ -95,6 +104,7 @@ class LoadedTransformation:
         inverse: f_inv, of the simulator.
         alpha: In [0, 1].
         noise: Standard deviation of the noise on top [rad].
+        x: Names of the joints that are grounded, None for all; the others are sent the agent's actions.
         draws: Whether f's answer is drawn and not expected.
         gate: Doubt of f from which on it is trusted less, None for never.
     """
@@ -103,6 +113,7 @@ class LoadedTransformation:
     inverse: InverseModel
     alpha: float = 1.0
     noise: float = 0.0
+    x: tuple[str, ...] | None = None
     draws: bool = False
     gate: float | None = None
 
@@ -128,6 +139,8 @@ class TransformationRun:
         self._grounding, self._rng = grounding, rng
         self._senses = Senses(layout, grounding.forward.history.sensors)
         n = len(layout.joints)
+        x = layout.joints if grounding.x is None else grounding.x
+        self._alpha = grounding.alpha * np.array([joint in x for joint in layout.joints])
         self._real, self._sim = Window(grounding.forward.history, n), Window(grounding.inverse.history, n)
 
     def transform(self, observation: np.ndarray, action: np.ndarray) -> np.ndarray:
@@ -139,7 +152,7 @@ class TransformationRun:
         wanted = grounding.forward.effect(window, self._rng if grounding.draws else None)
         sim.see(position, ())
         inverse = grounding.inverse.action(sim.complete(action), action, wanted)
-        sent = grounded(action, inverse, grounding.alpha * self._trust(window))
+        sent = grounded(action, inverse, self._alpha * self._trust(window))
         if grounding.noise:
             sent = sent + grounding.noise * self._rng.standard_normal(len(sent))
         # np.clip takes four times as long

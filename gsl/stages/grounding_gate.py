@@ -10,17 +10,20 @@ from typing import Any
 import numpy as np
 
 from gsl.core.seeds import derived_seed
+from gsl.core.trajectory import Batch
 from gsl.errors import GslError, InputError, TrajectoryError
 from gsl.grounding.effects import DiagnosedEffects, switched_on
-from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import RandomisedEffects, randomised
 from gsl.report.grounding_errors import grounding_errors
 from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.effects_check import check_effects
-from gsl.stages.grounding_check import ALPHAS, TITLES, check, largest_stable
+from gsl.stages.grounding_check import ALPHAS, REPLAYS, TITLES, check, largest_stable
+from gsl.stages.grounding_joints import fewest
+from gsl.stages.grounding_replay import places
 from gsl.stages.rollout import Scenario
-from gsl.stages.train_forward import HELDOUT
+from gsl.stages.train_forward import HELDOUT, VALIDATION
 from gsl.storage.documents import write_json
 from gsl.storage.models import model_file, read_forward_model, read_inverse_model
 from gsl.storage.references import resolve
@@ -100,11 +103,14 @@ class Gate:
         """Load models, settle alpha, and compare with held-out real trajectories."""
         self.console.status("checking the grounded simulator against held-out real trajectories")
         loaded = settings.load(read_forward_model, read_inverse_model)
+        folder = model_file(settings.forward_model, "forward_model").parent
+        if settings.x == "auto":
+            loaded = replace(loaded, x=self._chosen(scenario, loaded, read(folder / VALIDATION)))
         ready = replace(scenario, grounding=loaded)
         if settings.alpha == "auto":
             tried = {alpha: replace(ready, grounding=replace(loaded, alpha=alpha)) for alpha in ALPHAS}
             ready = tried[largest_stable(tried, self.parameters, derived_seed(self.seed, "alpha"))]
-        heldout = model_file(settings.forward_model, "forward_model").with_name(HELDOUT)
+        heldout = folder / HELDOUT
         try:
             report = check(ready, self.parameters, read(heldout), derived_seed(self.seed, "check"))
         except InputError as error:
@@ -113,7 +119,16 @@ class Gate:
         grounding_errors(self.folder / FIGURE, report.by_joint())
         self.console.table("grounded simulator against held-out real trajectories", TITLES, report.rows())
         self._judge(report.problems, "Collect more data")
-        return ready, {"alpha": report.alpha, "grounding_acceptable": report.acceptable}
+        return ready, {"alpha": report.alpha, "x": loaded.x, "grounding_acceptable": report.acceptable}
+
+    def _chosen(self, scenario: Scenario, loaded: LoadedTransformation, validation: Batch) -> tuple[str, ...]:
+        """Return the joints to ground, and tell them."""
+        env = scenario.world.make()
+        starts = places(validation.episodes, scenario.world.layout, REPLAYS)
+        joints = fewest(env, loaded, starts, derived_seed(self.seed, "x"))
+        env.close()
+        self.console.status(f"grounding {len(joints)} of {len(loaded.forward.joints)} joints: {', '.join(joints)}")
+        return joints
 
     def _judge(self, problems: Sequence[str], advice: str) -> None:
         if not problems:

@@ -144,10 +144,12 @@ class Iterate:
     def _trace(self, folder: Path, home: Path, grounding: Grounding) -> None:
         """Draw a real walk that no model has seen, and what the first iteration's grounding makes of it."""
         place, inner = home / FIRST, innermost(grounding)
-        alpha = json.loads((place / "optimize" / "metrics.json").read_text(encoding="utf-8"))["alpha"]
+        settled = json.loads((place / "optimize" / "metrics.json").read_text(encoding="utf-8"))
         assert isinstance(inner, ActionTransformation), "only learned groundings are traced"
         forward, inverse = str(place / "train_forward"), str(place / "train_inverse")
-        settings = replace(inner, alpha=alpha, forward_model=forward, inverse_model=inverse)
+        settings = replace(
+            inner, alpha=settled["alpha"], x=tuple(settled["x"]), forward_model=forward, inverse_model=inverse
+        )
         heldout = read(place / "train_forward" / HELDOUT)
         walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
         sim = self.sim

@@ -35,12 +35,12 @@ from gsl.storage.models import write_model
 from gsl.storage.trajectories import write
 from gsl.tasks.task import SIM
 
-HELDOUT = "heldout.parquet"
+HELDOUT, VALIDATION = "heldout.parquet", "validation.parquet"
 
 
 @component
 class TrainForward:
-    """Fits f to a part of the real trajectories and measures it on the rest, which it stores beside the model.
+    """Fits f to a part of the real trajectories and measures it on another, which it stores beside the model.
 
     `auto` takes the family whose own prediction, fed back to it for 0.2 s, is nearest to the validation trajectories,
     those off pi0 if there are any: the error of one tick says little, for in a gait all joints move together. A model
@@ -72,6 +72,7 @@ class TrainForward:
         )
         write_model(folder, model)
         write(folder / HELDOUT, data.heldout)
+        write(folder / VALIDATION, data.validation)
         groups = {"pi0": of_policy(data.heldout, pi0=True), "off_pi0": of_policy(data.heldout, pi0=False)}
         measured = {name: measures(model, long) for name, part in groups.items() if (long := self._long(part))}
         return {**summary(choice), "trajectories": len(data.training) + len(data.validation), "heldout": measured}
