@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 
 from gsl.core.seeds import derived_seed
-from gsl.core.trajectory import Batch
+from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import InputError
+from gsl.grounding.gat import LoadedTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.stages.grounding_replay import TICKS, Deviations, places, replayed, unmoved
+from gsl.stages.reachability import Reachability, reachability
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.training import degrees, degrees_by_joint, of_policy
 
 PI0, OFF = "pi0", "off_pi0"
 GROUNDED, BARE, STILL = "grounded", "ungrounded", "no_change"
 REPLAYS = 60  # of each group of trajectories, at most
+ASKED = 40  # steps of which it is asked whether the simulator can do them
 EPISODES = 4  # of pi0 in the grounded simulator
 ALPHAS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3)
 
@@ -34,6 +37,7 @@ class GroundingReport:
         falls: How many of them ended in a fall.
         values: Their values, shape (episodes,).
         alpha: How far the grounding goes, where that is known.
+        reach: What of the forward model's predictions the simulator can do, where that was asked.
     """
 
     deviations: Mapping[str, Mapping[str, Mapping[int, Deviations]]]
@@ -42,6 +46,7 @@ class GroundingReport:
     falls: int
     values: np.ndarray
     alpha: float | None = None
+    reach: Reachability | None = None
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -74,6 +79,7 @@ class GroundingReport:
         return {
             "alpha": self.alpha,
             "errors": errors,
+            "reachability": self.reach.metrics() if self.reach else None,
             "pi0": pi0,
             "acceptable": self.acceptable,
             "problems": self.problems,
@@ -137,6 +143,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
             group: _compared(env, scenario.grounding, of_policy(heldout, pi0=group == PI0), seed)
             for group in (PI0, OFF)
         }
+        reach = _reach(env, scenario.grounding, heldout.episodes, seed)
     except KeyError as error:
         raise InputError(f"the real trajectories lack {error.args[0]}: no simulation can start from them") from error
     finally:
@@ -149,6 +156,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         sum(fell for _, fell in ran),
         np.array([value for value, _ in ran]),
         getattr(scenario.grounding, "alpha", None),
+        reach,
     )
 
 
@@ -164,6 +172,12 @@ def largest_stable(scenarios: Mapping[float, Scenario], parameters: np.ndarray, 
         if not any(fell for _, fell in pi0_in(scenario, parameters, seed, patient=False)):
             return far
     return far
+
+
+def _reach(env: Any, grounding: Any, episodes: Sequence[Trajectory], seed: int) -> Reachability | None:
+    starts = places(episodes, env.layout, ASKED)
+    asked = isinstance(grounding, LoadedTransformation) and grounding.forward.horizon == 1 and bool(starts)
+    return reachability(env, grounding, starts, seed) if asked else None
 
 
 def _compared(env: Any, grounding: Any, episodes: Sequence[Any], seed: int) -> dict[str, dict[int, Deviations]]:

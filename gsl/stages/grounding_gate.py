@@ -118,6 +118,8 @@ class Gate:
         write_json(self.folder / REPORT, report.metrics())
         grounding_errors(self.folder / FIGURE, report.by_joint())
         self.console.table("grounded simulator against held-out real trajectories", TITLES, report.rows())
+        if report.reach:
+            self.console.status(report.reach.told)
         self._judge(report.problems, "Collect more data")
         return ready, {"alpha": report.alpha, "x": loaded.x, "grounding_acceptable": report.acceptable}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -10,17 +10,20 @@ import numpy as np
 
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
+from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.optimizers.cma_es import CmaEs
 from gsl.policies.policy import Policy
-from gsl.stages.choices import FILE, PolicyChoice, policies, record
+from gsl.stages.choices import FILE, PolicyChoice, policies, record, vector
+from gsl.stages.drift import drifts, read_region
 from gsl.stages.generations import FILE as PROGRESS
 from gsl.stages.generations import Generation, GenerationLog
 from gsl.stages.grounding_gate import Gate, grounding_parents
 from gsl.stages.population import Job, Workers, episodes
 from gsl.stages.rollout import Scenario
-from gsl.storage.policies import write_policies
+from gsl.storage.models import model_file
+from gsl.storage.policies import PolicyRecord, write_policies
 from gsl.tasks.task import SIM, Task
 from gsl.worlds.world import World
 
@@ -69,7 +72,25 @@ class Optimize:
                 best = int(np.argmax(generation.values))
                 found.append(self._record(index, candidates[best], generation.values[best]))
         write_policies(folder / FILE, policies(self.policy, self.task, found))
-        return {"generations": len(found) - 1, "best_value_sim": max(p.value_sim or -np.inf for p in found), **checked}
+        best_value = max(p.value_sim or -np.inf for p in found)
+        return {
+            "generations": len(found) - 1,
+            "best_value_sim": best_value,
+            **checked,
+            **self._drift(scenario, found, console),
+        }
+
+    def _drift(self, scenario: Scenario, found: Sequence[PolicyRecord], console: Any) -> Mapping[str, Any]:
+        """Return and tell how far the policies have moved from what a learned grounding has seen."""
+        inner = innermost(self.grounding)
+        if not isinstance(inner, ActionTransformation):
+            return {}
+        known = read_region(model_file(inner.forward_model, "forward_model").parent)
+        shares = drifts(scenario, known, {one.name: vector(self.policy, one) for one in found}, self.seed)
+        first, *_, last = shares.items()
+        told = f"{last[0]} spends {100 * last[1]:.0f} % of its time where the grounding has seen nothing"
+        console.status(f"{told} ({first[0]}: {100 * first[1]:.0f} %)")
+        return {"drift": shares}
 
     def _evaluated(self, scenario: Scenario, candidates: list[np.ndarray], index: int, progress: Any) -> Generation:
         jobs = [

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from gsl.core.angles import encode
+from gsl.core.region import region
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
@@ -20,6 +21,7 @@ from gsl.models.ensemble import Forward, ensemble
 from gsl.models.forward import ForwardModel
 from gsl.models.free_run import TICKS, predicted_error, segments, standstill_error
 from gsl.models.network import Samples
+from gsl.stages.drift import write_region
 from gsl.stages.training import (
     Parts,
     checked,
@@ -73,6 +75,8 @@ class TrainForward:
         write_model(folder, model)
         write(folder / HELDOUT, data.heldout)
         write(folder / VALIDATION, data.validation)
+        known, unseen = (self._transitions(part.episodes).windows for part in (data.training, data.validation))
+        write_region(folder, region(known, unseen))
         groups = {"pi0": of_policy(data.heldout, pi0=True), "off_pi0": of_policy(data.heldout, pi0=False)}
         measured = {name: measures(model, long) for name, part in groups.items() if (long := self._long(part))}
         return {**summary(choice), "trajectories": len(data.training) + len(data.validation), "heldout": measured}

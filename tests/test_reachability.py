@@ -1,0 +1,82 @@
+"""Can the simulator do what the forward model predicts, and are policies still where the grounding has data?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gsl.core.history import History
+from gsl.core.region import INSIDE, region
+from gsl.core.transitions import transitions
+from gsl.grounding.gat import LoadedTransformation
+from gsl.grounding.none import NoGrounding
+from gsl.models.forward import ForwardModel
+from gsl.models.inverse import Solver
+from gsl.models.network import Network
+from gsl.policies.walk_engine import WalkEngine
+from gsl.stages.drift import drifts
+from gsl.stages.grounding_replay import places
+from gsl.stages.reachability import FLOOR, TOLERANCE, missed_by, reachability
+from gsl.stages.rollout import Scenario, rollout
+from gsl.tasks.walk import Walk
+from gsl.worlds.bullet import BulletWorld
+
+SIM = BulletWorld(robot="nao", effects={}, settle=0.1)
+POLICY = WalkEngine()
+WALK = Scenario(SIM, Walk(duration=1.2), POLICY, "sim", NoGrounding())
+JOINTS = SIM.layout.joints
+KNEE = JOINTS.index("LKneePitch")
+
+
+def predicts(bias: np.ndarray, rate: float = 0.05) -> LoadedTransformation:
+    """A robot whose joints go a `rate` of the way to their targets in a tick, and by `bias` [rad] beyond."""
+    n, history = len(JOINTS), History(0)
+    weight = np.zeros((n, history.size(n)))
+    weight[:, :n] = rate * np.eye(n)
+    f = ForwardModel(Network([(weight, bias)]), history, JOINTS)
+    return LoadedTransformation(f, Solver(f, rate * np.eye(n), 1e-9))
+
+
+def test_a_simulator_can_do_what_it_does_and_what_no_servo_can_is_told_joint_by_joint() -> None:
+    env = WALK.make()
+    walk = rollout(WALK, env, POLICY.initial, 1)
+    env.close()
+    starts, bare = places([walk], SIM.layout, 6), SIM.make()
+    x = SIM.layout["position"]
+    own = [place.seen[place.tick + 1][x] - place.seen[place.tick][x] for place in starts]
+    missed = np.array([missed_by(bare, place, change, 1) for place, change in zip(starts, own, strict=True)])
+    jump = np.zeros(len(JOINTS))
+    jump[KNEE] = 0.8
+    impossible = reachability(bare, predicts(jump), starts, 1)
+    bare.close()
+    assert (missed < FLOOR + TOLERANCE * np.sqrt(np.mean(np.square(own), axis=0))).mean() > 0.97
+    assert impossible.unreached[KNEE] == 1.0
+    assert "most often in LKneePitch (100 %)" in impossible.told
+    assert impossible.metrics()["by_joint"]["LKneePitch"] == 1.0
+
+
+def test_a_region_holds_its_own_kind_and_little_else() -> None:
+    rng = np.random.default_rng(0)
+    mix = rng.normal(size=(6, 6))
+
+    def samples(count: int) -> np.ndarray:
+        return rng.normal(size=(count, 6)) @ mix.T + 3.0
+
+    known = region(samples(2000), samples(2000))
+    assert known.outside(samples(4000)) == pytest.approx(1.0 - INSIDE, abs=0.006)
+    assert known.outside(samples(100) + 20.0) == 1.0
+
+
+def test_a_policy_that_does_something_else_drifts_from_the_data() -> None:
+    env = WALK.make()
+    walks = [rollout(WALK, env, POLICY.initial, seed) for seed in range(4)]
+    env.close()
+    grounding = predicts(np.zeros(len(JOINTS)))
+    history = grounding.forward.history
+    seen, unseen = (transitions(part, history, 1, carried_out=False).windows for part in (walks[:3], walks[3:]))
+    other = POLICY.initial + 2.0 * POLICY.scale * np.random.default_rng(1).standard_normal(len(POLICY.initial))
+    still = replace(WALK, grounding=replace(grounding, alpha=0.0))
+    shares = drifts(still, region(seen, unseen), {"pi0": POLICY.initial, "other": other}, 7)
+    assert shares["pi0"] < 0.1 < 0.5 < shares["other"]
