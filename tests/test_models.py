@@ -84,17 +84,17 @@ def test_an_mlp_fits_what_a_line_cannot_and_auto_notices() -> None:
     def error(network: Network) -> float:
         return float(np.mean((network.predict_many(unseen[0]) - unseen[1]) ** 2))
 
-    network, choice = best(QUICK, lambda family: fit_network(family, training, validation, QUICK, seed=1), error)
-    assert choice.family == "mlp"
+    network, choice = best(QUICK, lambda config: fit_network(training, validation, config, seed=1), error)
+    assert choice.config.family == "mlp"
     assert error(network) == choice.scores["mlp"] < 0.2 * choice.scores["linear"]
 
 
 def test_the_same_seed_fits_the_same_weights_and_leaves_torch_alone() -> None:
     import torch
 
-    training, validation, brief = bent(200), bent(50), ModelConfig(hidden=(8,), epochs=2)
+    training, validation, brief = bent(200), bent(50), ModelConfig("mlp", hidden=(8,), epochs=2)
     state = torch.get_rng_state()
-    first, again, other = (fit_network("mlp", training, validation, brief, seed=seed) for seed in (1, 1, 2))
+    first, again, other = (fit_network(training, validation, brief, seed=seed) for seed in (1, 1, 2))
     assert torch.equal(state, torch.get_rng_state())
     np.testing.assert_array_equal(first.layers[0][0], again.layers[0][0])
     assert not np.array_equal(first.layers[0][0], other.layers[0][0])

@@ -26,7 +26,7 @@ JOINTS, HISTORY = ("a", "b"), History(1)
 SIZE, N = HISTORY.size(2), 2
 GAUSSIAN, MIXTURE = Head("gaussian"), Head("mixture", 3)
 HEADS = pytest.mark.parametrize("head", [Head(), GAUSSIAN, MIXTURE], ids=lambda head: head.likelihood)
-QUICK = ModelConfig(hidden=(24,), epochs=60, rate=5e-3, batch=64, decay=0.0)
+QUICK = ModelConfig("mlp", hidden=(24,), epochs=60, rate=5e-3, batch=64, decay=0.0)
 
 
 def a_network(head: Head, seed: int = 0) -> Network:
@@ -91,10 +91,10 @@ def uneven(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_gaussian_learns_where_it_is_noisy_and_a_linear_one_how_noisy_it_is() -> None:
     config, unseen = replace(QUICK, likelihood="gaussian"), np.array([[0.3], [0.9]])
-    network = fit_network("mlp", uneven(4000, 0), uneven(500, 1), config, seed=1, head=GAUSSIAN)
+    network = fit_network(uneven(4000, 0), uneven(500, 1), config, seed=1, head=GAUSSIAN)
     sds = GAUSSIAN.parts(network.predict_many(unseen))[2][:, 0, 0]
     np.testing.assert_allclose(sds, [0.25, 0.55], rtol=0.15)
-    flat = fit_network("linear", uneven(4000, 0), uneven(500, 1), config, seed=1, head=GAUSSIAN)
+    flat = fit_network(uneven(4000, 0), uneven(500, 1), replace(config, family="linear"), seed=1, head=GAUSSIAN)
     x, y = uneven(4000, 0)
     assert np.ptp(GAUSSIAN.parts(flat.predict_many(x))[2]) == 0.0
     assert np.exp(flat.predict_many(x)[0, 1]) == pytest.approx((y - x).std(), rel=0.05)
@@ -107,7 +107,7 @@ def forked(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_mixture_learns_what_goes_either_way() -> None:
     config, head = replace(QUICK, likelihood="mixture", components=2), Head("mixture", 2)
-    network = fit_network("mlp", forked(2000, 0), forked(400, 1), config, seed=1, head=head)
+    network = fit_network(forked(2000, 0), forked(400, 1), config, seed=1, head=head)
     rng, raw = np.random.default_rng(0), network.predict(np.zeros(1))
     drawn = np.array([head.drawn(raw, rng)[0] for _ in range(2000)])
     assert (np.abs(np.abs(drawn) - 1.0) < 0.3).mean() > 0.98

@@ -10,7 +10,7 @@ from toy_plant import LAYOUT, QUICK, SLOW, ToyEnv, a_batch
 
 from gsl.errors import TrajectoryError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
-from gsl.models.config import ModelConfig
+from gsl.models.config import HISTORIES, ModelConfig
 from gsl.models.ensemble import Ensemble
 from gsl.stages.chain import as_needed
 from gsl.stages.train_forward import HELDOUT, TrainForward
@@ -142,3 +142,14 @@ def test_a_grounding_is_trained_the_forward_model_that_it_needs() -> None:
     assert (as_needed(point, wanted).likelihood, as_needed(point, wanted).members) == ("mixture", 5)
     own = ModelConfig(likelihood="gaussian", members=3)
     assert as_needed(own, ActionTransformation("f", "i", gate=1.0)) == own
+
+
+def test_auto_takes_the_history_that_predicts_best_and_says_what_it_tried(real: str, sim: str, tmp_path: Path) -> None:
+    model = ModelConfig(family="linear", ridge=1e-6, history="auto")
+    for stage, folder in ((TrainForward(real, model), tmp_path / "f"), (TrainInverse(sim, model), tmp_path / "g")):
+        folder.mkdir()
+        metrics = stage.run(folder, QUIET)
+        scores = metrics["scores"]
+        assert scores.keys() == {f"linear_{ticks}" for ticks in HISTORIES}
+        assert scores[f"linear_{metrics['history']}"] == min(scores.values())
+    assert read_forward_model(str(tmp_path / "f/forward_model.safetensors")).history.ticks in HISTORIES

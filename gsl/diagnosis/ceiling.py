@@ -31,8 +31,8 @@ def learned_residual(found: Experiment, told: np.ndarray, *, seed: int = 0) -> n
     train, check = found.train[np.arange(len(found.train)) % VALIDATION > 0], found.train[::VALIDATION]
     sets = [_flat(inputs[part], targets[part]) for part in (train, check)]
 
-    def fit(family: str) -> Network:
-        return fit_network(family, sets[0], sets[1], CONFIG, seed=seed)
+    def fit(config: ModelConfig) -> Network:
+        return fit_network(sets[0], sets[1], config, seed=seed)
 
     def score(network: Network) -> float:
         return float(np.mean((network.predict_many(sets[1][0]) - sets[1][1]) ** 2))

@@ -16,17 +16,17 @@ M = TypeVar("M")
 
 
 class Choice(NamedTuple):
-    """The score of every family that was tried, less is better, and the best one."""
+    """The best variant of a configuration, and the score of every one that was tried, less is better."""
 
-    family: str
+    config: ModelConfig
     scores: dict[str, float]
 
 
 def fit_network(
-    family: str, training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT
+    training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT
 ) -> Network:
     """Return a network of one family; the linear one, which needs no early stopping, learns from all samples."""
-    if family == "linear":
+    if config.family == "linear":
         inputs, targets = (np.concatenate(both) for both in zip(training, validation, strict=True))
         network = fit_linear(inputs, targets, ridge=config.ridge)
         return with_spread(network, inputs, targets) if head.draws else network
@@ -35,9 +35,10 @@ def fit_network(
     return fit_mlp(training, validation, config, seed=seed, head=head)
 
 
-def best(config: ModelConfig, fit: Callable[[str], M], score: Callable[[M], float]) -> tuple[M, Choice]:
-    """Fit every family and return the model with the least score; at a tie the simpler one."""
-    models = {family: fit(family) for family in config.families}
-    scores = {family: score(model) for family, model in models.items()}
-    family = min(scores, key=lambda name: scores[name])
-    return models[family], Choice(family, scores)
+def best(config: ModelConfig, fit: Callable[[ModelConfig], M], score: Callable[[M], float]) -> tuple[M, Choice]:
+    """Fit every variant and return the model with the least score; at a tie the simpler one."""
+    variants = config.variants
+    models = {name: fit(variant) for name, variant in variants.items()}
+    scores = {name: score(model) for name, model in models.items()}
+    name = min(scores, key=lambda one: scores[one])
+    return models[name], Choice(variants[name], scores)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Annotated, Any, Literal
 
 from gsl.core.angles import Encoding
 from gsl.core.history import History
@@ -11,6 +13,7 @@ from gsl.errors import ConfigError
 from gsl.models.head import Head, Likelihood
 
 Sensor = Literal["gyro", "tilt", "foot_force"]
+HISTORIES = (1, 2, 3, 5, 8)  # that `auto` tries
 
 
 @component
@@ -22,7 +25,10 @@ class ModelConfig:
     """
 
     family: Annotated[Literal["auto", "linear", "mlp"], setting("kind of model; auto takes the better one")] = "auto"
-    history: Annotated[int, setting("past positions and actions it sees, ticks of each", ge=0, le=20)] = 3
+    history: Annotated[
+        Annotated[int, setting("", ge=0, le=20)] | Literal["auto"],
+        setting("past positions and actions it sees, ticks of each; auto takes what does best"),
+    ] = 3
     sensors: Annotated[tuple[Sensor, ...], setting("body sensors a forward model sees besides")] = ()
     sensor_ticks: Annotated[int, setting("ticks of each sensor, the present one included", ge=1, le=20)] = 2
     horizon: Annotated[int, setting("ticks ahead it looks", ge=1, le=10)] = 1
@@ -46,11 +52,17 @@ class ModelConfig:
             raise ConfigError("family", "a linear model has no mixture; take mlp or auto", given=self.family)
 
     @property
-    def families(self) -> tuple[str, ...]:
-        """The families to try."""
-        if self.likelihood == "mixture":
-            return ("mlp",)
-        return ("linear", "mlp") if self.family == "auto" else (self.family,)
+    def variants(self) -> Mapping[str, ModelConfig]:
+        """What to try, by name, the simpler ones first: settings in which nothing is `auto`."""
+        families: tuple[Any, ...] = (self.family,)
+        if self.family == "auto":
+            families = ("mlp",) if self.likelihood == "mixture" else ("linear", "mlp")
+        histories = HISTORIES if self.history == "auto" else (self.history,)
+        return {
+            family if len(histories) == 1 else f"{family}_{ticks}": replace(self, family=family, history=ticks)
+            for family in families
+            for ticks in histories
+        }
 
     @property
     def head(self) -> Head:
@@ -59,10 +71,14 @@ class ModelConfig:
 
     @property
     def of_body(self) -> History:
-        """What a forward model of the robot sees."""
-        return History(self.history, self.sensors, self.sensor_ticks)
+        """What a forward model of the robot sees, at most."""
+        return History(self._ticks, self.sensors, self.sensor_ticks)
 
     @property
     def of_joints(self) -> History:
-        """What a model of the simulator sees: joints alone."""
-        return History(self.history)
+        """What a model of the simulator sees, at most: joints alone."""
+        return History(self._ticks)
+
+    @property
+    def _ticks(self) -> int:
+        return max(HISTORIES) if self.history == "auto" else self.history

@@ -70,12 +70,12 @@ class TrainForward:
         console.status(f"fitting a forward model to {len(data.training)} trajectories")
         judges = self._long(of_policy(data.validation, pi0=False)) or self._long(data.validation.episodes)
         model, choice = best(
-            self.model, lambda family: self._fitted(family, data), lambda model: self._score(model, judges)
+            self.model, lambda config: self._fitted(config, data), lambda model: self._score(model, judges)
         )
         write_model(folder, model)
         write(folder / HELDOUT, data.heldout)
         write(folder / VALIDATION, data.validation)
-        known, unseen = (self._transitions(part.episodes).windows for part in (data.training, data.validation))
+        known, unseen = (_rows(choice.config, part.episodes).windows for part in (data.training, data.validation))
         write_region(folder, region(known, unseen))
         groups = {"pi0": of_policy(data.heldout, pi0=True), "off_pi0": of_policy(data.heldout, pi0=False)}
         measured = {name: measures(model, long) for name, part in groups.items() if (long := self._long(part))}
@@ -93,42 +93,44 @@ class TrainForward:
         try:
             for part in data:
                 long = checked(path, part.episodes, self._needed)
-                self._transitions(long)
+                _rows(self.model, long)
         except KeyError as error:
             raise TrajectoryError(
                 path, "was not recorded; leave the sensor out of model.sensors", column=error.args[0]
             ) from error
 
-    def _transitions(self, episodes: Sequence[Trajectory]) -> Transitions:
-        return transitions(episodes, self.model.of_body, self.model.horizon, carried_out=False)
-
-    def _fitted(self, family: str, data: Parts) -> Forward:
+    def _fitted(self, config: ModelConfig, data: Parts) -> Forward:
         episodes = data.training.episodes
-        if self.model.members == 1:
-            return self._member(family, episodes, data, self.seed)
+        if config.members == 1:
+            return _member(config, episodes, data, self.seed)
         rng = np.random.default_rng(derived_seed(self.seed, "members"))
-        drawn = [rng.integers(len(episodes), size=len(episodes)) for _ in range(self.model.members)]
+        drawn = [rng.integers(len(episodes), size=len(episodes)) for _ in range(config.members)]
         members = [
-            self._member(family, [episodes[index] for index in indices], data, self.seed + number)
+            _member(config, [episodes[index] for index in indices], data, self.seed + number)
             for number, indices in enumerate(drawn)
         ]
-        return ensemble(tuple(members), self._transitions(data.validation.episodes).windows)
-
-    def _member(self, family: str, episodes: Sequence[Trajectory], data: Parts, seed: int) -> ForwardModel:
-        config = self.model
-        known, unseen = (self._samples(part) for part in (episodes, data.validation.episodes))
-        network = fit_network(family, known, unseen, config, seed=seed, head=config.head)
-        return ForwardModel(network, config.of_body, data.training.joints, config.encoding, config.horizon, config.head)
-
-    def _samples(self, episodes: Sequence[Trajectory]) -> Samples:
-        rows = self._transitions(episodes)
-        return rows.windows, encode(rows.change, self.model.encoding)
+        return ensemble(tuple(members), _rows(config, data.validation.episodes).windows)
 
     def _score(self, model: Forward, episodes: Sequence[Trajectory]) -> float:
         measured = measures(model, episodes)
         if model.head.draws:
             return float(measured["nll"])
         return float(measured["free_run_deg"] if model.horizon == 1 else measured["one_step_deg"])
+
+
+def _member(config: ModelConfig, episodes: Sequence[Trajectory], data: Parts, seed: int) -> ForwardModel:
+    known, unseen = (_samples(config, part) for part in (episodes, data.validation.episodes))
+    network = fit_network(known, unseen, config, seed=seed, head=config.head)
+    return ForwardModel(network, config.of_body, data.training.joints, config.encoding, config.horizon, config.head)
+
+
+def _samples(config: ModelConfig, episodes: Sequence[Trajectory]) -> Samples:
+    rows = _rows(config, episodes)
+    return rows.windows, encode(rows.change, config.encoding)
+
+
+def _rows(config: ModelConfig, episodes: Sequence[Trajectory]) -> Transitions:
+    return transitions(episodes, config.of_body, config.horizon, carried_out=False)
 
 
 def measures(model: Forward, episodes: Sequence[Trajectory]) -> dict[str, Any]:

@@ -61,7 +61,7 @@ class TrainInverse:
         fit = self._regression if self.method == "regression" else self._solver
         pieces = segments(data.heldout.episodes, self.model.of_joints, carried_out=True)
         model, choice = best(
-            self.model, lambda family: fit(family, data), lambda model: degrees(recovered_error(model, pieces))
+            self.model, lambda config: fit(config, data), lambda model: degrees(recovered_error(model, pieces))
         )
         write_model(folder, model)
         errors = recovered_error(model, pieces)
@@ -69,27 +69,28 @@ class TrainInverse:
         measured = {"recovered_action_deg": degrees(errors), "recovered_action_by_joint_deg": by_joint}
         return {**summary(choice), "method": self.method, "trajectories": len(data.training), "heldout": measured}
 
-    def _regression(self, family: str, data: Parts) -> InverseModel:
+    def _regression(self, config: ModelConfig, data: Parts) -> InverseModel:
         n = len(data.training.joints)
-        known, unseen = (self._turned(self._transitions(part), n) for part in (data.training, data.validation))
-        network = fit_network(family, known, unseen, self.model, seed=self.seed)
-        config, joints = self.model, data.training.joints
-        return Regression(network, config.of_joints, joints, config.encoding, config.horizon)
+        known, unseen = (_turned(_rows(config, part), n, config) for part in (data.training, data.validation))
+        network = fit_network(known, unseen, config, seed=self.seed)
+        return Regression(network, config.of_joints, data.training.joints, config.encoding, config.horizon)
 
-    def _turned(self, data: Transitions, n: int) -> Samples:
-        """Let the wanted change take the place of the action in the inputs, and the action become the target."""
-        inputs = np.concatenate([data.change, data.windows[:, n:]], axis=1)
-        return inputs, encode(data.windows[:, :n], self.model.encoding)
-
-    def _solver(self, family: str, data: Parts) -> InverseModel:
-        config, joints = self.model, data.training.joints
-        rows = [self._transitions(part) for part in (data.training, data.validation)]
+    def _solver(self, config: ModelConfig, data: Parts) -> InverseModel:
+        joints = data.training.joints
+        rows = [_rows(config, part) for part in (data.training, data.validation)]
         known, unseen = ((part.windows, encode(part.change, config.encoding)) for part in rows)
-        network = fit_network(family, known, unseen, config, seed=self.seed)
+        network = fit_network(known, unseen, config, seed=self.seed)
         simulator = ForwardModel(network, config.of_joints, joints, config.encoding, config.horizon)
         plain = fit_linear(rows[0].windows, rows[0].change, ridge=config.ridge)
         sensitivity = plain.layers[0][0][:, : len(joints)].astype(float)
         return Solver(simulator, sensitivity, self.damping)
 
-    def _transitions(self, part: Batch) -> Transitions:
-        return transitions(part.episodes, self.model.of_joints, self.model.horizon, carried_out=True)
+
+def _turned(data: Transitions, n: int, config: ModelConfig) -> Samples:
+    """Let the wanted change take the place of the action in the inputs, and the action become the target."""
+    inputs = np.concatenate([data.change, data.windows[:, n:]], axis=1)
+    return inputs, encode(data.windows[:, :n], config.encoding)
+
+
+def _rows(config: ModelConfig, part: Batch) -> Transitions:
+    return transitions(part.episodes, config.of_joints, config.horizon, carried_out=True)

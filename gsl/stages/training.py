@@ -115,5 +115,5 @@ def checked(path: Path, episodes: Sequence[Trajectory], needed: int) -> Sequence
 
 
 def summary(choice: Any) -> dict[str, Any]:
-    """Return which family was chosen, and the scores, as metrics."""
-    return {"family": choice.family, "scores": dict(choice.scores)}
+    """Return which variant was chosen, and the scores, as metrics."""
+    return {"family": choice.config.family, "history": choice.config.history, "scores": dict(choice.scores)}
