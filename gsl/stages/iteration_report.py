@@ -83,10 +83,12 @@ class Rounds:
         if self.best is None:
             return f"No improvement over π0 was found: π0 is returned. {cost}"
         after, before = self.best.metrics["returned"], self._done[0].metrics["baseline"]
-        low, high = (100.0 * bound / before["value"] for bound in self.best.metrics["gain"]["interval"])
-        values = [self._task.shown * one["value"] for one in (before, after)]
+        shown = self._task.shown
+        values = [shown * one["value"] for one in (before, after)]
         falls = f"{after['falls']} falls in {after['episodes']} fresh episodes"
-        last = f"gain of the last step {low:+.0f} to {high:+.0f} % of π0 (95 %)" if before["value"] else ""
+        factor, unit = (100.0 / before["value"], "% of π0") if before["interval"][0] > 0.0 else (shown, self._task.unit)
+        low, high = (factor * bound for bound in self.best.metrics["gain"]["interval"])
+        last = f"gain of the last step {low:+.0f} to {high:+.0f} {unit} (95 %)"
         return f"In real: π0 {values[0]:.1f}, returned {values[1]:.1f} {self._task.unit}, {last}, {falls}. {cost}"
 
     def metrics(self) -> Mapping[str, Any]:

@@ -37,12 +37,15 @@ def row(theta: PolicyRecord, done: Sequence[Episode]) -> dict[str, Any]:
 
 
 def gain(after: Sequence[Episode], before: Sequence[Episode]) -> dict[str, Any]:
-    """Return mean(after) - mean(before) with Welch's 95 % interval, and its share of the latter, None if that is 0."""
+    """Return mean(after) - mean(before) with Welch's 95 % interval, and its share of the latter if that is above 0.
+
+    Where the latter's own interval holds 0 there is no share: None.
+    """
     values = [np.array([episode.value for episode in done]) for done in (after, before)]
     if after is before:
         return {"value": 0.0, "interval": [0.0, 0.0], "share": 0.0}
     difference = difference_interval(*values)
-    share = difference.mean / mean(before) if mean(before) else None
+    share = difference.mean / mean(before) if mean_interval(values[1]).lower > 0.0 else None
     return {"value": difference.mean, "interval": [difference.lower, difference.upper], "share": share}
 
 
