@@ -58,9 +58,10 @@ app = typer.Typer(
 )
 
 
-blind = typer.Typer(rich_markup_mode=None)
+blind, reproduce = typer.Typer(rich_markup_mode=None), typer.Typer(rich_markup_mode=None)
 app.add_typer(blind, name="blind")
-GROUPS = {"blind": blind}
+app.add_typer(reproduce, name="reproduce")
+GROUPS = {"blind": blind, "reproduce": reproduce}
 
 
 def stage(name: str, summary: str) -> None:
@@ -93,6 +94,11 @@ stage("blind answer", "Diagnose every case without its label, and seal the answe
 stage("blind reveal", "Check the seals, set the answers against the labels, and count.")
 stage("evaluate", "Measure policies in the real world.")
 stage("compare", "Set groundings against each other over paired trials.")
+stage("reproduce table2", "Groundings against each other on the walk, beside the paper's table 2.")
+stage("reproduce table3", "Three iterations with either of two simulators, beside the paper's table 3.")
+stage("reproduce table4", "Uneven ground, two grounding steps, beside the paper's table 4.")
+stage("reproduce linear-walk", "A linear policy learns to walk, beside the paper's section 6.3.")
+stage("reproduce fig5", "The arms' final distance to their goal, as in the paper's figure 5.")
 stage("survey", "See how far real worlds are from the simulator.")
 stage("iterate", "The whole chain, again and again, until the real return stops improving.")
 
@@ -142,6 +148,13 @@ def benchmark(ctx: typer.Context) -> None:
         Console().result({}, text=ctx.get_help())
 
 
+@reproduce.callback(invoke_without_command=True)
+def paper(ctx: typer.Context) -> None:
+    """Rebuild the paper's tables and figures, ours beside them."""
+    if ctx.invoked_subcommand is None:
+        Console().result({}, text=ctx.get_help())
+
+
 @app.callback(invoke_without_command=True)
 def root(
     ctx: typer.Context,
@@ -168,7 +181,7 @@ def main() -> None:
 def call(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code, with whatever went wrong told in a line."""
     words = [word for word in arguments if not word.startswith("-")]
-    command = " ".join(["gsl", *words[: 1 + (words[:1] == ["blind"])]])
+    command = " ".join(["gsl", *words[: 1 + (words[:1] in (["blind"], ["reproduce"]))]])
     console = Console(json="--json" in arguments)
     try:
         code = int(app(args=list(arguments), prog_name="gsl", standalone_mode=False) or 0)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from gsl.stages.comparison import Trial, differences, markdown, rows, summaries
+from gsl.stages.comparison import differences, orders, summaries
+from gsl.stages.comparison_table import markdown, rows
+from gsl.stages.trial import Cell, Trial
 
 
 def _trial(method: str, number: int, gain: float, generation: int, stable: int = 3, falls: int = 0) -> Trial:
     measured = {
         "gain": {"value": 0.25 * gain, "interval": [0.25 * (gain - 0.02), 0.25 * (gain + 0.02)]},
-        "baseline": {"value": 0.25},
-        "returned": {"falls": falls},
+        "baseline": {"value": 0.25, "interval": [0.24, 0.26]},
+        "returned": {"value": 0.25 * (1.0 + gain), "falls": falls, "episodes": 10, "outcome": {}},
         "best": f"generation_{generation:02d}" if generation else "pi0",
         "best_generation": generation,
         "stable_policies": stable,
@@ -20,7 +22,8 @@ def _trial(method: str, number: int, gain: float, generation: int, stable: int =
         "real_episodes": 40,
     }
     found = {"alpha": 1.0, "grounding_acceptable": number > 1} if method == "gat" else {}
-    return Trial.of("nao_worn", method, number, found, measured, 30 if method == "gat" else 0)
+    cell = Cell("", "nao_worn", method, 1)
+    return Trial.of(cell, number, found, measured, spent=30 if method == "gat" else 0)
 
 
 TRIALS = [_trial("none", 1, 0.0, 0, 1), _trial("none", 2, -0.05, 1), _trial("gat", 1, 0.2, 4), _trial("gat", 2, 0.1, 2)]
@@ -47,7 +50,7 @@ def test_real_episodes_of_models_are_counted_and_refusals_told() -> None:
 
 
 def test_differences_are_paired_by_trial() -> None:
-    difference = differences(TRIALS, "nao_worn", "gat", "none")
+    difference = differences(TRIALS, Cell("", "nao_worn", "gat", 1), "none")
     assert difference.mean == pytest.approx((20.0 - 0.0 + 10.0 + 5.0) / 2)
 
 
@@ -61,3 +64,55 @@ def test_the_tables_show_every_method_and_every_trial() -> None:
     text = markdown(summaries(TRIALS), TRIALS)
     assert "20.0, 10.0" in text and "0.0*, -5.0*" in text and "gat - none" in text
     assert len(rows(summaries(TRIALS))) == 2
+
+
+def test_an_order_is_claimed_by_a_signed_rank_test_over_trials_with_holms_correction() -> None:
+    counts = {"none": [1, 0, 2, 1, 0, 1], "ane": [1, 1, 2, 0, 1, 1], "gat": [4, 5, 5, 4, 3, 5]}
+    trials = [
+        _trial(method, number + 1, 0.1, 2, stable)
+        for method, stables in counts.items()
+        for number, stable in enumerate(stables)
+    ]
+    found = {(one.method, one.other): one for one in orders(trials, "", "nao_worn")}
+    assert found["gat", "none"].difference == pytest.approx(21 / 6)
+    assert found["gat", "none"].p == found["gat", "ane"].p == pytest.approx(3 * 2 / 2**6)  # least of 6 pairs, times 3
+    assert found["ane", "none"].p == 1.0
+
+
+def test_a_start_that_may_be_worth_nothing_has_no_percentage() -> None:
+    measured = {
+        "gain": {"value": 0.03, "interval": [0.02, 0.04]},
+        "baseline": {"value": 0.001, "interval": [-0.001, 0.003]},
+        "returned": {"value": 0.031, "falls": 0, "episodes": 10, "outcome": {}},
+        "best": "generation_02",
+        "best_generation": 2,
+        "stable_policies": 3,
+        "improving_policies": 3,
+        "policies": 5,
+        "real_episodes": 40,
+    }
+    trial = Trial.of(Cell("", "w", "gat", 1), 1, {}, measured, spent=0)
+    assert trial.improvement is None and not trial.without
+    (summary,) = summaries([trial])
+    assert (summary.improvement, summary.value.mean) == (None, 0.031)
+
+
+def test_later_iterations_are_set_against_the_first_ones_start() -> None:
+    first = _trial("gat", 1, 0.2, 4)
+    later = {
+        "gain": {"value": 0.01, "interval": [0.0, 0.02]},
+        "baseline": {"value": 0.30, "interval": [0.29, 0.31]},
+        "returned": {"value": 0.31, "falls": 0, "episodes": 10, "outcome": {}},
+        "best": "generation_01",
+        "best_generation": 1,
+        "stable_policies": 3,
+        "improving_policies": 3,
+        "policies": 5,
+        "real_episodes": 40,
+    }
+    start = {"baseline": {"value": 0.25, "interval": [0.24, 0.26]}}
+    second = Trial.of(Cell("", "nao_worn", "gat", 2), 1, {}, later, spent=first.real_episodes, first=start)
+    assert second.improvement == pytest.approx(24.0)
+    assert second.real_episodes == first.real_episodes + 40
+    assert second.without  # the second iteration's gain may be none
+    assert [one.iteration for one in summaries([first, second])] == [1, 2]

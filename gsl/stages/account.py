@@ -129,12 +129,13 @@ def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 
 
 def _compare(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    from gsl.stages.comparison import COLUMNS, Trial, rows, summaries
-
-    trials = [Trial(**one) for one in json.loads((folder / "trials.json").read_text(encoding="utf-8"))]
-    found = summaries(trials)
     below = f"differences and every trial: {folder.as_posix()}/table.md"
-    return Told(f"{found[0].trials} trials of each method", COLUMNS, rows(found), below)
+    return Told(f"{metrics['summaries'][0]['trials']} trials of each method", *_markdown(folder / "table.md"), below)
+
+
+def _reproduce(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    below = f"every trial: {folder.as_posix()}/trials.json, tables: {folder.as_posix()}/table.md"
+    return Told(f"ours, and the paper's ({metrics['trials']} trials)", *_markdown(folder / "table.md"), below)
 
 
 def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
@@ -202,6 +203,7 @@ _TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told | list[Tol
     "evaluate": _evaluate,
     "iterate": _iterate,
     "compare": _compare,
+    "reproduce": _reproduce,
     "survey": _survey,
     "blind_reveal": _blind_reveal,
 }

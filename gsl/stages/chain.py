@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,6 +11,7 @@ from gsl.core.setting import component, setting
 from gsl.grounding.effects import DiagnosedEffects, switched_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
+from gsl.grounding.none import NoGrounding
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
 from gsl.policies.policy import Policy
@@ -21,6 +23,7 @@ from gsl.stages.link import built
 from gsl.stages.optimize import Optimize
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import TrainInverse
+from gsl.stages.values import Values
 from gsl.storage.artifact import Artifact
 from gsl.tasks.task import REAL, SIM, Task
 from gsl.worlds.world import World
@@ -42,6 +45,7 @@ class Budget:
     episodes: Annotated[int, setting("real episodes of each generation's best", ge=1)]
     check: Annotated[int, setting("real episodes the fastest stable policy has to walk without a fall", ge=1)]
     confirmation: Annotated[int, setting("fresh real episodes of the chosen policy", ge=2)]
+    tolerated: Annotated[float, setting("share of falls up to which a policy counts as stable", ge=0, le=1)] = 0.0
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,18 @@ class Chain:
         f, f_inverse = (built(stage, home / stage.kind, console) for stage in (forward, inverse))
         return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))
 
+    def values(self, out: Path, grounding: Grounding | None, found: Mapping[str, Any], console: Any) -> Artifact:
+        """Measure a fixed set of policies in the simulator with a grounding that is ready; without one, in real."""
+        stage = Values(
+            world=self.real if grounding is None else self.sim,
+            task=self.task,
+            policy=self.policy,
+            grounding=grounding or NoGrounding(),
+            found={key: found[key] for key in ("alpha", "x", "width") if key in found},
+            workers=self.workers,
+        )
+        return built(stage, out, console)
+
     def search(self, out: Path, grounding: Grounding, previous: str | None, seed: int, console: Any) -> Artifact:
         """Optimise in the simulator with a grounding that is ready."""
         stage = Optimize(
@@ -134,6 +150,7 @@ class Chain:
             episodes=self.budget.episodes,
             check=self.budget.check,
             confirmation=self.budget.confirmation,
+            tolerated=self.budget.tolerated,
             workers=self.workers,
             seed=seed,
         )

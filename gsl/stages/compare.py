@@ -1,4 +1,4 @@
-"""Groundings against each other: paired trials of one iteration each, in several real worlds (the paper's Table 2)."""
+"""Groundings against each other: paired trials of some iterations each, in several worlds (the paper's Table 2)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,14 @@ from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
-from gsl.stages.comparison import Trial, markdown, summaries
+from gsl.stages.chain import Chain
+from gsl.stages.comparison import summaries
+from gsl.stages.comparison_table import markdown
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.iterate import Iterate
+from gsl.stages.trial import Cell, Trial
+from gsl.stages.values import ranked
+from gsl.storage.artifact import Artifact
 from gsl.storage.documents import write_json
 from gsl.worlds.world import World
 
@@ -26,17 +31,23 @@ class Compare:
 
     A grounding that its check would refuse is gone on with, and the table says how often that was.
 
-    A search in a simulator that knows nothing of the real world (no grounding, action noise) is done once a trial and
-    measured in every world: columns of such a method are not independent of each other. Methods with diagnosed effects
-    share the diagnosis of their trial and world; each of them pays for it.
+    A search in a simulator that knows nothing of the real world (no grounding, noise, randomisation) is done once a
+    trial and measured in every world: columns of such a method are not independent of each other. Methods with effects
+    share the excitation of their trial and world; each of them pays for it.
+
+    A further iteration goes on from the policy that the one before returned, whether it gained or not.
     """
 
     kind: ClassVar[str] = "compare"
 
-    iterate: Annotated[Iterate, setting("what a trial is; its real world and grounding are replaced")]
+    iterate: Annotated[Iterate, setting("what a trial is; its worlds and grounding are replaced")]
     worlds: Annotated[Mapping[str, World], setting("the real worlds, by name")]
     methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name")]
     trials: Annotated[int, setting("trials of each method", ge=1)]
+    simulators: Annotated[
+        Mapping[str, World] | None, setting("the simulators, by name; none for the one of iterate")
+    ] = None
+    rank: Annotated[bool, setting("set a fixed set of policies in simulation against real")] = False
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
@@ -44,32 +55,61 @@ class Compare:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials; write every trial's figures and the tables."""
-        found = []
-        for trial in self._trials(folder.parent, console):
-            found.append(trial)
-            console.status(f"{trial.world}, {trial.method}, trial {trial.number}: {trial.told}")
+        found = self.carried_out(folder.parent, console)
         write_json(folder / DATA, [trial._asdict() for trial in found])
         summary = summaries(found)
         (folder / TABLE).write_text(markdown(summary, found), encoding="utf-8")
         return {"trials": len(found), "summaries": [one._asdict() for one in summary]}
 
-    def _trials(self, home: Path, console: Any) -> Iterator[Trial]:
+    def carried_out(self, home: Path, console: Any) -> list[Trial]:
+        """Return all trials, built below `home`, told as they end."""
+        found = []
         for number in range(1, self.trials + 1):
             for method in self.methods:
-                for world in self.worlds:
-                    yield self._trial(home, world, method, number, console)
+                for simulator, sim in (self.simulators or {"": self.iterate.sim}).items():
+                    for world in self.worlds:
+                        for trial in self._trial(home, sim, Cell(simulator, world, method, 1), number, console):
+                            found.append(trial)
+                            where = " ".join(filter(None, (simulator, world)))
+                            console.status(f"{where}, {method}, trial {number}: {trial.told}")
+        return found
 
-    def _trial(self, home: Path, world: str, method: str, number: int, console: Any) -> Trial:
-        seed, name = self.iterate.seed + number - 1, f"trial_{number:02d}"
-        chain = replace(self.iterate.chain, real=self.worlds[world], accept=True)
-        place, air = home / world / method / name, home / world / "diagnosis" / name
-        grounding = chain.diagnosed(air, self.methods[method], seed, console)
-        flight = flown(air, self.methods[method], grounding)
-        collected = flight.episodes if flight else 0
-        if isinstance(innermost(grounding), ActionTransformation):
-            collected += self.iterate.budget.real_episodes + self.iterate.budget.real_neighbours
-        ready = chain.ready(place, grounding, None, seed, console)
-        out = place if collected else home / "sim" / method / name
-        found = chain.search(out / "optimize", ready, None, seed, console)
-        measured = chain.measure(place / "evaluate", found, seed, console)
-        return Trial.of(world, method, number, found.metrics, measured.metrics, collected)
+    def _trial(self, home: Path, sim: World, cell: Cell, number: int, console: Any) -> Iterator[Trial]:
+        """Yield a trial iteration by iteration."""
+        seed, name, method = self.iterate.seed + number - 1, f"trial_{number:02d}", self.methods[cell.method]
+        chain = replace(self.iterate.chain, sim=sim, real=self.worlds[cell.world], accept=True)
+        below = home / cell.simulator
+        grounding = chain.diagnosed(below / cell.world / "diagnosis" / name, method, seed, console)
+        flight = flown(below / cell.world / "diagnosis" / name, method, grounding)
+        spent, previous, first = flight.episodes if flight else 0, None, None
+        learned = isinstance(innermost(grounding), ActionTransformation)
+        budget = self.iterate.budget
+        for iteration in range(1, self.iterate.iterations + 1):
+            place = below / cell.world / cell.method / name / (f"iteration_{iteration:02d}" if iteration > 1 else "")
+            apart = learned or flight is not None or iteration > 1
+            spent += (budget.real_episodes + budget.real_neighbours) if learned else 0
+            ready = chain.ready(place, grounding, previous, seed, console)
+            out = place if apart else below / "sim" / cell.method / name
+            found = chain.search(out / "optimize", ready, previous, seed, console)
+            measured = chain.measure(place / "evaluate", found, seed, console)
+            rank = self._ranked(chain, below / cell.world, out, ready, found, console) if iteration == 1 else None
+            trial = Trial.of(
+                cell._replace(iteration=iteration),
+                number,
+                found.metrics,
+                measured.metrics,
+                spent=spent,
+                first=first,
+                rank=rank,
+            )
+            yield trial
+            spent, previous, first = trial.real_episodes, str(measured.folder), first or measured.metrics
+            seed += 1000
+
+    def _ranked(
+        self, chain: Chain, world: Path, out: Path, ready: Grounding, found: Artifact, console: Any
+    ) -> float | None:
+        if not self.rank:
+            return None
+        simulated = chain.values(out / "values", ready, found.metrics, console)
+        return ranked(simulated, chain.values(world / "values", None, {}, console))

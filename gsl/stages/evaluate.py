@@ -43,6 +43,7 @@ class Evaluate:
     episodes: Annotated[int, setting("episodes of each policy for the choice", ge=1)]
     check: Annotated[int, setting("episodes the fastest stable policy has to walk without a fall", ge=1)]
     confirmation: Annotated[int, setting("fresh episodes of the chosen policy and of the baseline", ge=2)]
+    tolerated: Annotated[float, setting("share of falls up to which a policy counts as stable", ge=0, le=1)] = 0.0
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
@@ -57,13 +58,13 @@ class Evaluate:
         with console.progress(total, "measuring in the real world") as progress:
             tried = [self._measured(theta, _CHOICE, self.episodes, progress) for theta in found]
             checked = dict(self._checked(found, tried, progress))
-            best = next((index for index, done in checked.items() if not falls(done)), 0)
+            best = next((index for index, done in checked.items() if self._stable(done)), 0)
             fresh = {i: self._measured(found[i], _REPORT, self.confirmation, progress) for i in sorted({0, best})}
         rows = [row(theta, done) for theta, done in zip(found, tried, strict=True)]
         again = [[row(found[index], done) for index, done in phase.items()] for phase in (checked, fresh)]
         write_json(folder / TABLE, {"policies": rows, "check": again[0], "confirmation": again[1]})
         write_policies(folder / FILE, policies(self.policy, self.task, [found[best]]))
-        stable = [done for done in tried[1:] if not falls(done)]
+        stable = [done for done in tried[1:] if self._stable(done)]
         return {
             "best": found[best].name,
             "best_generation": found[best].generation or 0,
@@ -71,7 +72,7 @@ class Evaluate:
             "baseline": summary(fresh[0]),
             "returned": summary(fresh[best]),
             "gain": gain(fresh[best], fresh[0]),
-            "failed_check": [found[index].name for index, done in checked.items() if falls(done)],
+            "failed_check": [found[index].name for index, done in checked.items() if not self._stable(done)],
             "stable_policies": len(stable),
             "improving_policies": sum(mean(done) > mean(tried[0]) for done in stable),
             "policies": len(found) - 1,
@@ -82,18 +83,23 @@ class Evaluate:
         self, found: Sequence[PolicyRecord], tried: Sequence[list[Episode]], progress: Any
     ) -> Iterator[tuple[int, list[Episode]]]:
         """Yield the checks of stable policies that beat the baseline, fastest first, up to the first without a fall."""
-        better = [index for index, done in enumerate(tried) if not falls(done) and mean(done) > mean(tried[0])]
+        better = [index for index, done in enumerate(tried) if self._stable(done) and mean(done) > mean(tried[0])]
         for index in sorted(better, key=lambda index: -mean(tried[index])):
             done = self._measured(found[index], _CHECK, self.check, progress)
             yield index, done
-            if not falls(done):
+            if self._stable(done):
                 return
 
+    def _stable(self, done: Sequence[Episode]) -> bool:
+        return falls(done) <= self.tolerated * len(done)
+
     def _measured(self, theta: PolicyRecord, purpose: str, count: int, progress: Any) -> list[Episode]:
-        """Run the episodes of one purpose; those of a report all, others up to and with the first fall."""
+        """Run the episodes of one purpose; but for a report, none after a fall that is not tolerated."""
         scenario = Scenario(self.world, self.task, self.policy, REAL, NoGrounding())
         parameters = vector(self.policy, theta)
         jobs = [Job(parameters, derived_seed(self.seed, self.kind, purpose, theta.name, n)) for n in range(count)]
         done = episodes(scenario, jobs, workers=self.workers, progress=progress)
+        if purpose == _REPORT or self.tolerated:
+            return done
         first_fall = next((number for number, episode in enumerate(done) if episode.fell), count)
-        return done if purpose == _REPORT else done[: first_fall + 1]
+        return done[: first_fall + 1]

@@ -45,6 +45,21 @@ def grounding_parents(grounding: Any, path: str = "grounding") -> Mapping[str, P
     }
 
 
+def settled(scenario: Scenario, found: Mapping[str, Any]) -> Scenario:
+    """Return a scenario ready to act with what a search settled of its grounding (its metrics), without a check."""
+    grounding = scenario.grounding
+    if isinstance(grounding, DiagnosedEffects):
+        world = switched_on(scenario.world, grounding.load(read_diagnosis))
+        return settled(replace(scenario, world=world, grounding=grounding.inner), found)
+    if isinstance(grounding, ActionTransformation):
+        chosen = replace(grounding, alpha=found["alpha"], x=tuple(found["x"]))
+        return replace(scenario, grounding=chosen.load(read_forward_model, read_inverse_model))
+    if isinstance(grounding, RandomisedEffects):
+        world = randomised(scenario.world, grounding, found["width"])
+        return replace(scenario, world=world, grounding=NoGrounding())
+    return scenario
+
+
 @dataclass(frozen=True)
 class Gate:
     """What a grounding has to pass on its way into a search.

@@ -36,7 +36,7 @@ class Unit(NamedTuple):
 def unit_of(artifact: Artifact) -> Unit:
     """Return the unit of the task that an artifact's settings name; the bare value if the task is not gsl's."""
     config = artifact.config
-    task = config.get("task") or config.get("iterate", {}).get("task") or {}
+    task = config.get("task") or (config.get("study") or config).get("iterate", {}).get("task") or {}
     name = task.get("_target_", "") if isinstance(task, Mapping) else ""
     if not str(name).startswith("gsl.tasks."):
         return Unit()
@@ -119,6 +119,10 @@ def _compare(metrics: Metrics, unit: Unit) -> str:
     return f"{metrics['trials']} trials of {', '.join(methods)}"
 
 
+def _values(metrics: Metrics, unit: Unit) -> str:
+    return f"{metrics['policies']} policies, {falls(metrics['falls'])}"
+
+
 def _survey(metrics: Metrics, unit: Unit) -> str:
     return ", ".join(f"{name}: π0 {unit.shown(one['pi0'])}, rank {one['rank']:.2f}" for name, one in metrics.items())
 
@@ -133,5 +137,7 @@ _TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
     "evaluate": _evaluate,
     "iterate": _iterate,
     "compare": _compare,
+    "reproduce": _compare,
     "survey": _survey,
+    "values": _values,
 }

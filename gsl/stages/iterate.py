@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.core.setting import component, setting
-from gsl.grounding.effects import DiagnosedEffects, innermost, switched_on
+from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
@@ -19,17 +17,18 @@ from gsl.policies.policy import Policy
 from gsl.report.render import walk_strip
 from gsl.stages.chain import Budget, Chain
 from gsl.stages.choices import FILE, policies, record
-from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.diagnosis_plan import DiagnosisPlan, flown
+from gsl.stages.grounding_gate import settled
 from gsl.stages.iteration_report import COLUMNS, Rounds, write_curve, write_table, write_trace
 from gsl.stages.population import Workers
+from gsl.stages.rollout import Scenario
 from gsl.stages.train_forward import HELDOUT
 from gsl.stages.training import of_policy
+from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
-from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.storage.policies import write_policies
 from gsl.storage.trajectories import read
-from gsl.tasks.task import Task
+from gsl.tasks.task import SIM, Task
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.world import World
 
@@ -69,11 +68,12 @@ class Iterate:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run the iterations, write the policy they end with, the table and the plots."""
-        home, rounds = folder.parent, Rounds(self.task)
+        home, rounds, first = folder.parent, Rounds(self.task), self.grounding
         with console.live_table(f"grounded simulation learning [{self.task.unit}]", COLUMNS) as table:
             grounding = self._diagnosed(home, rounds, console)
             for number in range(1, self.iterations + 1):
-                evaluation = self._iteration(home, number, grounding, rounds, console)
+                evaluation, ready = self._iteration(home, number, grounding, rounds, console)
+                first = ready if number == 1 else first
                 for row in rounds.add(evaluation, self._collected_real):
                     table.row(*row)
                 if not rounds.rising:
@@ -90,7 +90,7 @@ class Iterate:
         write_table(folder, rounds)
         write_curve(folder, rounds)
         if self.learned:
-            self._trace(folder, home, grounding)
+            self._trace(folder, home, first)
         return rounds.metrics()
 
     @property
@@ -120,13 +120,15 @@ class Iterate:
     def _collected_real(self) -> int:
         return (self.budget.real_episodes + self.budget.real_neighbours) if self.learned else 0
 
-    def _iteration(self, home: Path, number: int, grounding: Grounding, rounds: Rounds, console: Any) -> Artifact:
-        """Return the evaluation that ends one iteration."""
+    def _iteration(
+        self, home: Path, number: int, grounding: Grounding, rounds: Rounds, console: Any
+    ) -> tuple[Artifact, Grounding]:
+        """Return the evaluation that ends one iteration, and the grounding with its models."""
         place, seed = home / f"iteration_{number:02d}", self.seed + 1000 * (number - 1)
         previous = None if rounds.best is None else str(rounds.best.folder)
         ready = self.chain.ready(place, grounding, previous, seed, console)
         found = self.chain.search(place / "optimize", ready, previous, seed, console)
-        return self.chain.measure(place / "evaluate", found, seed, console)
+        return self.chain.measure(place / "evaluate", found, seed, console), ready
 
     def _diagnosed(self, home: Path, rounds: Rounds, console: Any) -> Grounding:
         """Return the grounding with its diagnosis: an excitation knows no policy, so that one serves all iterations."""
@@ -141,20 +143,13 @@ class Iterate:
         found = self.chain.search(place / "optimize_none", NoGrounding(), None, self.seed, console)
         return self.chain.measure(place / "evaluate_none", found, self.seed, console)
 
-    def _trace(self, folder: Path, home: Path, grounding: Grounding) -> None:
+    def _trace(self, folder: Path, home: Path, ready: Grounding) -> None:
         """Draw a real walk that no model has seen, and what the first iteration's grounding makes of it."""
-        place, inner = home / FIRST, innermost(grounding)
-        settled = json.loads((place / "optimize" / "metrics.json").read_text(encoding="utf-8"))
-        assert isinstance(inner, ActionTransformation), "only learned groundings are traced"
-        forward, inverse = str(place / "train_forward"), str(place / "train_inverse")
-        settings = replace(
-            inner, alpha=settled["alpha"], x=tuple(settled["x"]), forward_model=forward, inverse_model=inverse
-        )
+        place = home / FIRST
+        search = Artifact(place / "optimize", manifest.read(place / "optimize"))
+        scenario = settled(Scenario(self.sim, self.task, self.policy, SIM, ready), search.metrics)
         heldout = read(place / "train_forward" / HELDOUT)
         walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
-        sim = self.sim
-        if isinstance(grounding, DiagnosedEffects):
-            sim = switched_on(sim, grounding.load(read_diagnosis))
-        assert isinstance(sim, BulletWorld), "the check of the grounding has replayed in it"
-        write_trace(folder, sim, settings.load(read_forward_model, read_inverse_model), walk)
-        walk_strip(sim.plant.robot, walk, folder / "walk.png")
+        assert isinstance(scenario.world, BulletWorld), "the check of the grounding has replayed in it"
+        write_trace(folder, scenario.world, scenario.grounding, walk)
+        walk_strip(scenario.world.plant.robot, walk, folder / "walk.png")

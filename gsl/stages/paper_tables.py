@@ -1,0 +1,185 @@
+"""The paper's tables 2, 3 and 4, its linear walk and its figure 5: its figures, and ours beside them.
+
+Figures of the paper are those of its text and tables; figure 5 has none that can be read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from gsl.core.setting import component
+from gsl.core.statistics import Interval, mean_interval, wilson
+from gsl.report.markdown import table
+from gsl.stages.comparison import Summary, orders, summaries
+from gsl.stages.comparison_table import told
+from gsl.stages.trial import Trial
+from gsl.tasks.task import Task
+
+TABLE_2 = {"none": ("11.1", "7 of 10", "1.3"), "ane": ("18.9", "5 of 10", "6.6"), "gat": ("22.5", "1 of 10", "2.7")}
+TABLE_3 = {1: ("26.3 and 26.9", "34.6 and 37.8"), 2: ("28.0", "43.3")}  # cm/s, %; SimSpark and Gazebo as simulators
+TABLE_4 = {("gat", 1): ("15.7 ± 3.0", "6 of 10"), ("sgat", 1): ("16.9 ± 0.7", "0 of 10"),
+           ("gat", 2): ("18.5 ± 3.6", "10 of 10"), ("sgat", 2): ("18.0 ± 2.2", "1 of 10")}  # fmt: skip
+LINEAR_WALK = {"none": ("1.3", "3 of 5", "1"), "gat": ("4.95", "5 of 5", "3")}
+NOTHING = ("", "", "")
+
+
+@component
+class Table2:
+    """Improvement over π0 in real, trials without a stable improvement, best generation; and what we add to it.
+
+    Action noise is told for every width; the best of them by real figures knows what no user knows beforehand.
+    """
+
+    def markdown(self, trials: Sequence[Trial], task: Task) -> str:
+        """Return the table, the test of the order, and the single trials."""
+        found = summaries(trials)
+        oracles = {_best_noise(found, world) for world in dict.fromkeys(one.world for one in found)}
+        titles = (
+            *("real world", "grounding", "improvement [%]", "95 % interval", "trials without", "best generation"),
+            *("stable winners", f"π0 and returned [{task.unit}]", "falls", "rank", "real episodes"),
+            *("paper: improvement [%]", "paper: without", "paper: best generation"),
+        )
+        rows = [
+            (one.world, one.method + (" (best by real)" if (one.world, one.method) in oracles else ""))
+            + (*_improvement(one), f"{one.without} of {one.trials}", f"{one.generation:.1f}")
+            + (f"{one.stable} of {one.winners}", _speeds(trials, one, task), str(one.falls))
+            + ("" if one.rank is None else f"{one.rank.mean:.2f}", f"{one.real_episodes:.0f}")
+            + TABLE_2.get("ane" if one.method == "ane_02" else one.method, NOTHING)
+            for one in found
+        ]
+        parts = [table(titles, rows), "Order of methods by their stable winners, Wilcoxon's signed rank over trials:\n"]
+        tested = [
+            (world, f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
+            for world in dict.fromkeys(one.world for one in found)
+            for order in orders(trials, found[0].simulator, world)
+        ]
+        parts.append(table(("real world", "difference", "stable winners a trial", "p, Holm-corrected"), tested))
+        return "\n".join([*parts, _single(trials)])
+
+
+@component
+class Table3:
+    """Speed after each iteration, with either simulator; an iteration that gains nothing for sure stops the chain."""
+
+    def markdown(self, trials: Sequence[Trial], task: Task) -> str:
+        """Return the table."""
+        titles = (
+            *("simulator", "grounding", "iteration", f"in real [{task.unit}]", "95 % interval", "improvement [%]"),
+            *("95 % interval", "falls", "trials that stop here", "real episodes"),
+            *(f"paper [{task.unit}]", "paper: improvement [%]"),
+        )
+        rows = []
+        for one in summaries(trials):
+            own = [trial for trial in trials if trial.cell == one[:4]]
+            stops = sum(trial.surely <= 0.0 for trial in own)
+            paper = TABLE_3.get(one.iteration, NOTHING[:2]) if one.method == "gat" else NOTHING[:2]
+            rows.append(
+                (one.simulator, one.method, str(one.iteration), *_value(one.value, task), *_improvement(one))
+                + (str(one.falls), f"{stops} of {one.trials}", f"{one.real_episodes:.0f}", *paper)
+            )
+        start = mean_interval([trial.start for trial in trials if trial.iteration == 1])
+        below = f"π0 in real: {task.shown * start.mean:.1f} {task.unit} (paper: 19.5)."
+        return "\n".join([table(titles, rows), below, "", _single(trials)])
+
+
+@component
+class Table4:
+    """Speed and falls on uneven ground after each grounding step."""
+
+    def markdown(self, trials: Sequence[Trial], task: Task) -> str:
+        """Return the table."""
+        titles = (
+            *("grounding", "step", f"in real, a fall worth 0 [{task.unit}]", "95 % interval", "falls"),
+            *("95 % interval [%]", "real episodes", "paper: speed [cm/s]", "paper: falls"),
+        )
+        rows = []
+        for one in summaries(trials):
+            episodes = sum(trial.episodes for trial in trials if trial.cell == one[:4])
+            share = wilson(one.falls, episodes)
+            rows.append(
+                (one.method, str(one.iteration), *_value(one.value, task), f"{one.falls} of {episodes}")
+                + (f"{100 * share.lower:.0f} to {100 * share.upper:.0f}", f"{one.real_episodes:.0f}")
+                + TABLE_4.get((one.method, one.iteration), NOTHING[:2])
+            )
+        start = mean_interval([trial.start for trial in trials if trial.iteration == 1])
+        below = f"π0 in real, a fall worth 0: {task.shown * start.mean:.1f} {task.unit} (paper: 14.7, always falls)."
+        return "\n".join([table(titles, rows), below, ""])
+
+
+@component
+class LinearWalkTable:
+    """Distance in real, and how many trials improve at all."""
+
+    def markdown(self, trials: Sequence[Trial], task: Task) -> str:
+        """Return the table."""
+        titles = (
+            *("real world", "grounding", f"distance in real [{task.unit}]", "95 % interval", "trials that improve"),
+            *("best generation", "falls", "real episodes", "paper [cm]", "paper: improve", "paper: best generation"),
+        )
+        rows = [
+            (one.world, one.method, *_value(one.value, task), f"{one.trials - one.without} of {one.trials}")
+            + (
+                f"{one.generation:.1f}",
+                str(one.falls),
+                f"{one.real_episodes:.0f}",
+                *LINEAR_WALK.get(one.method, NOTHING),
+            )
+            for one in summaries(trials)
+        ]
+        return table(titles, rows)
+
+
+@component
+class Figure5:
+    """Final distance of the arms to their goal."""
+
+    def markdown(self, trials: Sequence[Trial], task: Task) -> str:
+        """Return the figure's values as a table."""
+        rows = []
+        for one in summaries(trials):
+            distances = [_distance(trial.outcome) for trial in trials if trial.cell == one[:4]]
+            found = mean_interval(distances)
+            rows.append((one.world, one.method, f"{found.mean:.2f}", told(found), f"{np.max(distances):.2f}"))
+        return table(("real world", "grounding", "final distance [°]", "95 % interval", "worst trial [°]"), rows)
+
+
+def _distance(outcome: Mapping[str, float]) -> float:
+    return next(value for name, value in outcome.items() if name.startswith("distance"))
+
+
+def _best_noise(found: Sequence[Summary], world: str) -> tuple[str, str]:
+    noisy = [one for one in found if one.world == world and one.method.startswith("ane") and one.improvement]
+    best = max(noisy, key=lambda one: one.improvement.mean if one.improvement else 0.0, default=None)
+    return world, best.method if best else ""
+
+
+def _improvement(one: Summary) -> tuple[str, str]:
+    return ("", "") if one.improvement is None else (f"{one.improvement.mean:.1f}", told(one.improvement))
+
+
+def _value(interval: Interval, task: Task) -> tuple[str, str]:
+    mean, low, high = (task.shown * value for value in interval)
+    return f"{mean:.1f}", f"{low:.1f} to {high:.1f}"
+
+
+def _speeds(trials: Sequence[Trial], one: Summary, task: Task) -> str:
+    own = [trial for trial in trials if trial.cell == one[:4]]
+    start, after = (task.shown * float(np.mean([getattr(trial, name) for trial in own])) for name in ("start", "value"))
+    return f"{start:.1f}, {after:.1f}"
+
+
+def _single(trials: Sequence[Trial]) -> str:
+    cells = dict.fromkeys(trial.cell for trial in trials)
+    rows = [
+        (" ".join(filter(None, (cell.simulator, cell.world))), cell.method, str(cell.iteration))
+        + (", ".join(_one(trial) for trial in trials if trial.cell == cell),)
+        for cell in cells
+    ]
+    head = "Improvement of each trial [%]; * without a stable improvement:\n"
+    return "\n".join([head, table(("worlds", "grounding", "iteration", "trials"), rows)])
+
+
+def _one(trial: Trial) -> str:
+    return "-" if trial.improvement is None else f"{trial.improvement:.1f}{'*' if trial.without else ''}"

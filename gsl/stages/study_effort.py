@@ -1,0 +1,55 @@
+"""How long a study will take, from a few rollouts of π0 in each of its worlds."""
+
+from __future__ import annotations
+
+import time
+
+from gsl.grounding.effects import innermost
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.none import NoGrounding
+from gsl.stages.compare import Compare
+from gsl.stages.rollout import Scenario, rollout
+from gsl.tasks.task import REAL, SIM
+from gsl.worlds.world import World
+
+TRIED = 2  # rollouts of π0 in each world, after one that compiles
+LEARNED = 1.4  # how much longer a rollout takes with a learned grounding
+APART = 60.0  # of a learned grounding: fits and checks [s]
+
+
+def seconds(study: Compare) -> float:
+    """Return an estimate of a study's duration from nothing [s], good to a factor of two or so."""
+    from joblib import cpu_count
+
+    iterate, budget = study.iterate, study.iterate.budget
+    workers = iterate.workers if iterate.workers > 0 else int(cpu_count())
+    sims = study.simulators or {"": iterate.sim}
+    real = sum(_rollout(study, world, REAL) for world in study.worlds.values()) / len(study.worlds)
+    sim = sum(_rollout(study, world, SIM) for world in sims.values()) / len(sims)
+    searched = iterate.optimizer.generations * iterate.optimizer.candidates * budget.rollouts
+    measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
+    total = 0.0
+    for method in study.methods.values():
+        learned = isinstance(innermost(method), ActionTransformation)
+        collected = budget.real_episodes + budget.real_neighbours, budget.sim_episodes + budget.sim_neighbours
+        rollouts = searched * sim * (LEARNED if learned else 1.0) + measured * real
+        rollouts += (collected[0] * real + collected[1] * sim) if learned else 0.0
+        total += rollouts / workers + (APART if learned else 0.0)
+    return total * study.trials * iterate.iterations * len(study.worlds) * len(sims)
+
+
+def told(duration: float) -> str:
+    """Return a duration for people."""
+    minutes = duration / 60.0
+    return f"about {minutes:.0f} minutes" if minutes < 90.0 else f"about {minutes / 60.0:.1f} hours"
+
+
+def _rollout(study: Compare, world: World, role: str) -> float:
+    scenario = Scenario(world, study.iterate.task, study.iterate.policy, role, NoGrounding())
+    env, parameters = scenario.make(), study.iterate.policy.initial
+    rollout(scenario, env, parameters, 0)
+    begin = time.process_time()
+    for seed in range(TRIED):
+        rollout(scenario, env, parameters, seed)
+    env.close()
+    return (time.process_time() - begin) / TRIED

@@ -1,0 +1,121 @@
+"""A trial: one method, once, in one pair of worlds, and what it came to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+
+class Cell(NamedTuple):
+    """What is compared: a method in a pair of worlds, after some iterations."""
+
+    simulator: str
+    world: str
+    method: str
+    iteration: int
+
+
+class Trial(NamedTuple):
+    """One method, once, in one real world, after one iteration.
+
+    Attributes:
+        number: Trials of one number have the same seeds.
+        start: Value of π0 in real, in the unit of the task.
+        value: Of the policy that this iteration returned, on fresh real episodes, falls counting as in the task.
+        improvement: The one over the other [%]; None where π0's own interval holds 0.
+        surely: Lower end of the 95 % interval of what this iteration gained, in the unit of the task.
+        returned: Name of the returned policy.
+        generation: That found it, 0 for the policy that the iteration started from.
+        falls, episodes: Of the returned policy in fresh episodes.
+        stable: Winners of generations that fell in no episode of the choice, or not too often.
+        improving: Those of them that were faster than the start.
+        winners: All winners of generations.
+        alpha: How far the grounding went, None where there is none.
+        refused: Whether the grounding's check would have refused it.
+        rank: Correlation of the simulator with real over a fixed set of policies, None where nobody asked.
+        real_episodes: Of models, choice, check and report, of this iteration and those before.
+        outcome: What the task reports of the returned policy, by name with unit.
+    """
+
+    simulator: str
+    world: str
+    method: str
+    iteration: int
+    number: int
+    start: float
+    value: float
+    improvement: float | None
+    surely: float
+    returned: str
+    generation: int
+    falls: int
+    episodes: int
+    stable: int
+    improving: int
+    winners: int
+    alpha: float | None
+    refused: bool
+    rank: float | None
+    real_episodes: int
+    outcome: Mapping[str, float]
+
+    @classmethod
+    def of(
+        cls,
+        cell: Cell,
+        number: int,
+        found: Mapping[str, Any],
+        measured: Mapping[str, Any],
+        *,
+        spent: int,
+        first: Mapping[str, Any] | None = None,
+        rank: float | None = None,
+    ) -> Trial:
+        """Read the metrics of a search and of its evaluation.
+
+        Args:
+            cell: What was tried.
+            number: Of the trial.
+            found: Metrics of the search.
+            measured: Metrics of the evaluation.
+            spent: Real episodes before this evaluation.
+            first: Metrics of the first iteration's evaluation, which has measured π0; none if this is the first.
+            rank: See the class.
+        """
+        start, after = (first or measured)["baseline"], measured["returned"]
+        return cls(
+            *cell,
+            number,
+            start=start["value"],
+            value=after["value"],
+            improvement=100.0 * (after["value"] / start["value"] - 1.0) if start["interval"][0] > 0.0 else None,
+            surely=measured["gain"]["interval"][0],
+            returned=measured["best"],
+            generation=measured["best_generation"],
+            falls=after["falls"],
+            episodes=after["episodes"],
+            stable=measured["stable_policies"],
+            improving=measured["improving_policies"],
+            winners=measured["policies"],
+            alpha=found.get("alpha"),
+            refused=not found.get("grounding_acceptable", True),
+            rank=rank,
+            real_episodes=spent + measured["real_episodes"],
+            outcome=after["outcome"],
+        )
+
+    @property
+    def cell(self) -> Cell:
+        """What was tried."""
+        return Cell(self.simulator, self.world, self.method, self.iteration)
+
+    @property
+    def told(self) -> str:
+        """The trial in a few words."""
+        gained = "" if self.improvement is None else f", {self.improvement:+.1f} %"
+        return f"{self.returned}{gained}, {self.stable} of {self.winners} winners stable"
+
+    @property
+    def without(self) -> bool:
+        """Whether the trial found no stable improvement: a fall in fresh episodes, or a gain that may be none."""
+        return self.falls > 0 or self.surely <= 0.0
