@@ -12,6 +12,7 @@ from gsl.errors import TrajectoryError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.models.config import HISTORIES, ModelConfig
 from gsl.models.ensemble import Ensemble
+from gsl.models.linear import fit_linear
 from gsl.stages.chain import as_needed
 from gsl.stages.train_forward import HELDOUT, TrainForward
 from gsl.stages.train_inverse import TrainInverse
@@ -153,3 +154,19 @@ def test_auto_takes_the_history_that_predicts_best_and_says_what_it_tried(real: 
         assert scores.keys() == {f"linear_{ticks}" for ticks in HISTORIES}
         assert scores[f"linear_{metrics['history']}"] == min(scores.values())
     assert read_forward_model(str(tmp_path / "f/forward_model.safetensors")).history.ticks in HISTORIES
+
+
+def test_a_joint_at_rest_does_not_become_a_regressor() -> None:
+    """What it does by microradians goes along with the others' motion in one world and not in another."""
+    rng = np.random.default_rng(0)
+    moving = 0.1 * rng.normal(size=(400, 1))
+    still = 1e-5 * moving + 1e-6 * rng.normal(size=(400, 1))
+    weight = fit_linear(np.hstack([moving, still]), moving, ridge=1e-2).layers[0][0][0]
+    assert weight[0] == pytest.approx(1.0, abs=0.02)
+    assert abs(weight[1]) < 1.0
+
+
+def test_noise_on_real_actions_is_part_of_what_was_done(tmp_path: Path) -> None:
+    write(tmp_path / "real.parquet", a_batch(SLOW, "real", noise=0.05))
+    metrics = TrainForward(data=str(tmp_path / "real.parquet"), model=LINEAR).run(tmp_path, QUIET)
+    assert metrics["heldout"]["off_pi0"]["r2"] > 0.9999

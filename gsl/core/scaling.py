@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+LEAST = 5e-3  # of the largest standard deviation, by which a column is divided at least: an encoder sees no less
+
 
 class Scaling(NamedTuple):
     """scaled = (values - mean) / sd, each of shape (n,)."""
@@ -25,6 +27,9 @@ class Scaling(NamedTuple):
 
 
 def scaling(values: np.ndarray) -> Scaling:
-    """Return the scaling of a sample, shape (N, n); a column that never changes is only shifted."""
+    """Return the scaling of a sample, shape (N, n).
+
+    A column that hardly changes stays small: what a joint at rest does must not become a regressor.
+    """
     sd = values.std(axis=0)
-    return Scaling(values.mean(axis=0), np.where(sd > 1e-9, sd, 1.0))
+    return Scaling(values.mean(axis=0), np.maximum(sd, LEAST * sd.max()) if sd.any() else np.ones_like(sd))

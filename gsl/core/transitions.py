@@ -33,7 +33,7 @@ def transitions(episodes: Sequence[Trajectory], history: History, horizon: int, 
         episodes: Of one robot.
         history: What a window holds.
         horizon: Ticks ahead; the actions that follow the present one are as they come.
-        carried_out: Whether `a` is the grounded action where there is one (a simulator's own model), or the agent's.
+        carried_out: Whether `a` is what was sent, noise and grounding included, or what the agent issued.
     """
     parts = [_of_one(episode, history, horizon, carried_out=carried_out) for episode in episodes]
     return Transitions(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -22,6 +22,8 @@ class Traces(NamedTuple):
         command: Desired position [rad].
         real, simulation: Position [rad].
         grounded: Position in the grounded simulator [rad], if there is one.
+        sent: What the grounding sends in place of the command [rad], if that is to be seen.
+        name: Of `grounded`, for people.
     """
 
     time: np.ndarray
@@ -29,6 +31,8 @@ class Traces(NamedTuple):
     real: np.ndarray
     simulation: np.ndarray
     grounded: np.ndarray | None = None
+    sent: np.ndarray | None = None
+    name: str = "grounded simulation"
 
 
 def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = None) -> None:
@@ -49,8 +53,10 @@ def joint_trace_figure(traces: Traces, joint: str, *, title: str | None = None) 
     lines.append((f"simulation,\n{distances[0]:.1f}° from real", traces.simulation, SIMULATION, 1.8, "-"))
     if traces.grounded is not None:
         distances.append(_rms_degrees(traces.grounded - traces.real))
-        label = f"grounded simulation,\n{distances[1]:.1f}° from real"
+        label = f"{traces.name},\n{distances[1]:.1f}° from real"
         lines.append((label, traces.grounded, GROUNDED, 1.8, "-"))
+    if traces.sent is not None:
+        lines.append(("grounded command", traces.sent, GROUNDED, 1.1, (0, (5, 3))))
     with look():
         whole = figure(4.6)
         axes = whole.subplots()

@@ -41,6 +41,7 @@ class Budget:
     sim_neighbours: Annotated[int, setting("simulated episodes of perturbed policies", ge=0)]
     spread: Annotated[float, setting("size of the perturbations, in units of a parameter's scale", ge=0)]
     sim_action_noise: Annotated[float, setting("noise on simulated actions", unit="rad", ge=0)]
+    real_action_noise: Annotated[float, setting("noise on real actions of neighbours and π0", unit="rad", ge=0)]
     rollouts: Annotated[int, setting("simulated episodes of each candidate", ge=1)]
     episodes: Annotated[int, setting("real episodes of each generation's best", ge=1)]
     check: Annotated[int, setting("real episodes the fastest stable policy has to walk without a fall", ge=1)]
@@ -101,7 +102,7 @@ class Chain:
                 episodes=episodes,
                 neighbours=neighbours,
                 spread=budget.spread,
-                action_noise=0.0 if role == REAL else budget.sim_action_noise,
+                action_noise=budget.real_action_noise if role == REAL else budget.sim_action_noise,
                 initial=previous,
                 workers=self.workers,
                 seed=seed,

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from gsl.core.layout import Layout
 from gsl.core.observation import observations
 from gsl.core.trajectory import Trajectory
-from gsl.core.transitions import usable
+from gsl.core.transitions import actions, usable
 from gsl.grounding.grounding import Grounding
 from gsl.worlds.bullet import BulletEnv
 from gsl.worlds.engine import Reading
@@ -59,7 +59,8 @@ def places(episodes: Sequence[Trajectory], layout: Layout, limit: int) -> list[P
     found = []
     for episode in episodes:
         seen = observations(episode, layout)
-        found += [Place(seen, episode.action, tick) for tick in range(PAST, usable(episode) - TICKS + 1, STRIDE)]
+        sent = actions(episode, carried_out=True)
+        found += [Place(seen, sent, tick) for tick in range(PAST, usable(episode) - TICKS + 1, STRIDE)]
     chosen = np.unique(np.linspace(0, len(found) - 1, min(limit, len(found))).round().astype(int)) if found else ()
     return [found[index] for index in chosen]
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from gsl.core.observation import observations
 from gsl.core.trajectory import Trajectory
+from gsl.core.transitions import actions
 from gsl.grounding.none import NoGrounding
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.learning_curve import Search, learning_curve, search
@@ -175,14 +176,15 @@ def write_trace(folder: Path, world: BulletWorld, grounding: Any, walk: Trajecto
     """
     env = world.make()
     tick = max(PAST, min(round(TAKEN_OVER / world.period), len(walk) // 2))
-    place = Place(observations(walk, world.layout), walk.action, tick)
+    sent = actions(walk, carried_out=True)
+    place = Place(observations(walk, world.layout), sent, tick)
     ticks = min(round(SHOWN / world.period), len(walk) - tick)
     rng = np.random.default_rng(0)
     simulated = [np.array(list(replay(env, way, place, rng, ticks))) for way in (NoGrounding(), grounding)]
     env.close()
     shown = slice(tick + 1, tick + 1 + ticks)
     joint = int(np.argmax(np.ptp(walk.position[shown], axis=0)))
-    command = walk.action[tick : tick + ticks, joint]
-    positions = (seen[:, joint] for seen in simulated)
-    traces = Traces(walk.time[shown], command, walk.position[shown, joint], *positions)
+    command = sent[tick : tick + ticks, joint]
+    bare, grounded = (seen[:, joint] for seen in simulated)
+    traces = Traces(walk.time[shown], command, walk.position[shown, joint], bare, grounded)
     joint_trace(folder / TRACE, traces, world.layout.joints[joint])

@@ -130,13 +130,13 @@ def _samples(config: ModelConfig, episodes: Sequence[Trajectory]) -> Samples:
 
 
 def _rows(config: ModelConfig, episodes: Sequence[Trajectory]) -> Transitions:
-    return transitions(episodes, config.of_body, config.horizon, carried_out=False)
+    return transitions(episodes, config.of_body, config.horizon, carried_out=True)
 
 
 def measures(model: Forward, episodes: Sequence[Trajectory]) -> dict[str, Any]:
     """Return the errors of a forward model on trajectories, beside those of "nothing changes" [degrees]."""
-    data = transitions(episodes, model.history, model.horizon, carried_out=False)
-    pieces = segments(episodes, model.history, carried_out=False)
+    data = transitions(episodes, model.history, model.horizon, carried_out=True)
+    pieces = segments(episodes, model.history, carried_out=True)
     errors = model.effects(data.windows) - data.change
     measured = {
         "trajectories": len(episodes),

@@ -1,0 +1,154 @@
+"""The paper's figures 6 and 7: one joint in real, in the simulator, and in the grounded simulator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from gsl.core.history import windows
+from gsl.core.observation import observations, sensed
+from gsl.core.setting import component, setting
+from gsl.core.trajectory import Trajectory
+from gsl.grounding.gat import ActionTransformation, LoadedTransformation
+from gsl.grounding.grounding import Grounding
+from gsl.grounding.none import NoGrounding
+from gsl.models.ensemble import Forward
+from gsl.report.joint_trace import Traces, joint_trace
+from gsl.report.markdown import table
+from gsl.stages.grounding_replay import PAST, Place, replay
+from gsl.stages.iterate import Iterate
+from gsl.stages.rollout import Scenario, rollout
+from gsl.stages.training import degrees
+from gsl.storage.models import read_forward_model, read_inverse_model
+from gsl.tasks.task import REAL
+from gsl.worlds.grounded import GroundedEnv
+from gsl.worlds.world import World
+
+TABLE = "table.md"
+TITLES = ("joint", "simulator", "RMS distance from real [°]")
+
+
+@component
+class Figure6:
+    """A constant command from the start posture: in the simulator the joint follows at once, in real it is late.
+
+    The grounding shown is that of the first iteration, its data and models built beside it.
+    """
+
+    kind: ClassVar[str] = "reproduce"
+
+    iterate: Annotated[Iterate, setting("what the grounding is trained for")]
+    joint: Annotated[str, setting("joint that is told to move")] = "LShoulderPitch"
+    change: Annotated[float, setting("command, from the start posture", unit="rad")] = -math.pi / 12
+    duration: Annotated[float, setting("what is shown", unit="s", gt=0)] = 1.0
+
+    def parents(self) -> Mapping[str, Path]:
+        """Everything is made here."""
+        return {}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Train the grounding, play the command in the three worlds, draw."""
+        iterate, loaded = self.iterate, trained(self.iterate, folder.parent, console)
+        layout = iterate.sim.layout
+        index, period = layout.joints.index(self.joint), layout.control_period
+        target = iterate.policy.posture(iterate.policy.initial, layout).copy()
+        start = target.copy()
+        target[index] += self.change
+        ticks = round(self.duration / period)
+        played = [
+            _played(world, grounding, start, target, ticks, index)
+            for world, grounding in ((iterate.real, NoGrounding()), (iterate.sim, NoGrounding()), (iterate.sim, loaded))
+        ]
+        (real, command), (bare, _), (grounded, sent) = played
+        time = period * np.arange(1 - PAST, ticks + 1)
+        joint_trace(folder / "figure_6.png", Traces(time, command, real, bare, grounded, sent), self.joint)
+        return _told(folder, self.joint, real, {"ungrounded": bare, "grounded": grounded})
+
+
+@component
+class Figure7:
+    """π0 in real, and its actions from one of its states: in the simulator, in the grounded one, and as f predicts."""
+
+    kind: ClassVar[str] = "reproduce"
+
+    iterate: Annotated[Iterate, setting("what the grounding is trained for")]
+    joint: Annotated[str, setting("joint that is shown")] = "RAnklePitch"
+    begin: Annotated[float, setting("when simulators take over from the real robot", unit="s", gt=0)] = 2.0
+    duration: Annotated[float, setting("what is shown", unit="s", gt=0)] = 1.0
+
+    def parents(self) -> Mapping[str, Path]:
+        """Everything is made here."""
+        return {}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Train the grounding, walk in real, replay in simulation, draw."""
+        iterate, loaded = self.iterate, trained(self.iterate, folder.parent, console)
+        walk = _walked(iterate)
+        layout = iterate.sim.layout
+        index, period = layout.joints.index(self.joint), layout.control_period
+        tick = max(PAST, round(self.begin / period))
+        ticks = min(round(self.duration / period), len(walk) - tick)
+        place = Place(observations(walk, layout), walk.action, tick)
+        env: Any = iterate.sim.make()
+        bare, grounded = (
+            np.array([seen[index] for seen in replay(env, way, place, np.random.default_rng(0), ticks)])
+            for way in (NoGrounding(), loaded)
+        )
+        env.close()
+        predicted = _predicted(loaded.forward, walk, tick, ticks)[:, index]
+        shown = slice(tick + 1, tick + 1 + ticks)
+        plain = Traces(walk.time[shown], walk.action[tick : tick + ticks, index], walk.position[shown, index], bare)
+        joint_trace(folder / "figure_7a.png", plain._replace(grounded=predicted, name="forward model"), self.joint)
+        joint_trace(folder / "figure_7b.png", plain._replace(grounded=grounded), self.joint)
+        found = {"ungrounded": bare, "forward model": predicted, "grounded": grounded}
+        return _told(folder, self.joint, plain.real, found)
+
+
+def trained(iterate: Iterate, home: Path, console: Any) -> LoadedTransformation:
+    """Return the grounding of an iteration's settings, alpha 1 for `auto`, trained below `home`."""
+    assert isinstance(iterate.grounding, ActionTransformation), "only a transformation of actions can be drawn"
+    chain = replace(iterate.chain, accept=True)
+    ready = chain.trained(home, iterate.grounding, None, iterate.seed, console)
+    return ready.load(read_forward_model, read_inverse_model)
+
+
+def _played(
+    world: World, grounding: Grounding, start: np.ndarray, target: np.ndarray, ticks: int, index: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a joint's positions and what was sent to it [rad], shape (PAST + ticks,) each; it rests for `PAST`."""
+    env, positions, sent = GroundedEnv(world.make(), grounding), [], []
+    env.reset(seed=0, options={"posture": start})
+    for tick in range(-PAST, ticks):
+        seen, _, _, _, info = env.step(start if tick < 0 else target)
+        positions.append(seen[index])
+        sent.append(info["grounded_action"][index])
+    env.close()
+    return np.array(positions), np.array(sent)
+
+
+def _walked(iterate: Iterate) -> Trajectory:
+    scenario = Scenario(iterate.real, iterate.task, iterate.policy, REAL, NoGrounding())
+    env = scenario.make()
+    walk = rollout(scenario, env, iterate.policy.initial, iterate.seed)
+    env.close()
+    return walk
+
+
+def _predicted(forward: Forward, walk: Trajectory, tick: int, ticks: int) -> np.ndarray:
+    """Return where f, fed with its own answers, sees the joints go [rad], shape (ticks, n_joints)."""
+    x, body = walk.position.copy(), sensed(walk, forward.history.sensors)
+    for now in range(tick, tick + ticks):
+        x[now + 1] = x[now] + forward.effects(windows(forward.history, x, walk.action, body, np.array([now])))[0]
+    return x[tick + 1 : tick + 1 + ticks]
+
+
+def _told(folder: Path, joint: str, real: np.ndarray, found: Mapping[str, np.ndarray]) -> Mapping[str, Any]:
+    errors = {name: degrees(trace - real) for name, trace in found.items()}
+    rows = [(joint, name, f"{error:.2f}") for name, error in errors.items()]
+    (folder / TABLE).write_text(table(TITLES, rows), encoding="utf-8")
+    return {"joint": joint, "distance_deg": errors}

@@ -1,0 +1,130 @@
+"""Every table and figure of the paper from one command each, at toy size; and how their figures are told."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from commands import done
+
+from gsl.stages.paper_tables import Figure5, LinearWalkTable, Table2, Table3, Table4
+from gsl.stages.study_effort import told
+from gsl.stages.trial import Trial
+from gsl.tasks.arm import Arm
+from gsl.tasks.distance import Distance
+from gsl.tasks.walk import Walk
+
+KEPT = {
+    "table2": ("none", "ane_02", "gat"),
+    "table3": ("gat",),
+    "table4": ("gat", "sgat"),
+    "linear-walk": ("none", "gat"),
+    "fig5": ("none", "gat"),
+}
+ALL = (
+    *("none", "ane_005", "ane_01", "ane_02", "ane_04", "randomised", "gat", "gat_005", "gat_gated", "sgat"),
+    *("identified", "effects", "effects_gat", "effects_sgat"),
+)
+OFFERED = {"table2": ALL, "table3": ("gat", "effects"), "table4": ("none", "ane_02", "gat", "sgat"),
+           "linear-walk": ("none", "ane_02", "gat"), "fig5": ("none", "ane_02", "gat")}  # fmt: skip
+FEW = ("preset=toy", "study.iterate.workers=1", "study.iterate.optimizer.candidates=4")
+
+
+@pytest.mark.parametrize("what", KEPT)
+def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
+    left_out = [f"~study.methods.{name}" for name in OFFERED[what] if name not in KEPT[what]]
+    left_out += ["~study.worlds.nao_weak"] if what == "table2" else []
+    left_out += ["~study.simulators.nao_weak", "study.iterate.iterations=2"] if what == "table3" else []
+    said = done("reproduce", what, *FEW, "study.iterate.task.duration=1.2", *left_out, folder=tmp_path)
+    assert "minutes from nothing" in said.err
+    folder = next((tmp_path / "runs").glob("*/reproduce"))
+    trials = json.loads((folder / "trials.json").read_text())
+    assert {one["method"] for one in trials} == set(KEPT[what])
+    iterations = {"table3": 2, "table4": 2}.get(what, 1)
+    assert {one["iteration"] for one in trials} == set(range(1, iterations + 1))
+    table = (folder / "table.md").read_text()
+    assert all(f"| {name} " in table for name in KEPT[what])
+    assert all((one["rank"] is not None) == (what == "table2") for one in trials)
+
+
+@pytest.mark.parametrize(
+    ("what", "figures"), [("fig6", ["figure_6.png"]), ("fig7", ["figure_7a.png", "figure_7b.png"])]
+)
+def test_a_figure_is_one_command(what: str, figures: list[str], tmp_path: Path) -> None:
+    said = done("reproduce", what, "preset=toy", "iterate.workers=1", folder=tmp_path)
+    folder = tmp_path / "runs" / what / "reproduce"
+    assert sorted(path.name for path in folder.glob("*.png")) == figures
+    assert "RMS distance from real" in said.out
+
+
+def a_trial(method: str, number: int, **more: Any) -> Trial:
+    fields: dict[str, Any] = {
+        "simulator": "",
+        "world": "w",
+        "iteration": 1,
+        "start": 0.2,
+        "value": 0.25,
+        "improvement": 25.0,
+        "surely": 0.01,
+        "returned": "generation_02",
+        "generation": 2,
+        "falls": 0,
+        "episodes": 10,
+        "stable": 4,
+        "improving": 3,
+        "winners": 5,
+        "alpha": None,
+        "refused": False,
+        "rank": 0.5,
+        "real_episodes": 40,
+        "outcome": {"distance [deg]": 0.5},
+    }
+    return Trial(**{**fields, "method": method, "number": number, **more})
+
+
+def test_table_2_marks_the_noise_that_only_real_figures_choose() -> None:
+    trials = [
+        a_trial(method, k, improvement=gain)
+        for method, gain in (("none", 1.0), ("ane_01", 9.0), ("ane_02", 5.0))
+        for k in (1, 2)
+    ]
+    text = Table2().markdown(trials, Walk())
+    assert "ane_01 (best by real)" in text and "ane_02 (best" not in text
+    assert "| 18.9 | 5 of 10 | 6.6 |" in next(line for line in text.splitlines() if line.startswith("| w | ane_02"))
+    assert "| w | ane_01 - none |" in text
+
+
+def test_table_3_counts_where_chains_stop() -> None:
+    trials = [
+        a_trial("gat", k, simulator="s", iteration=i, surely=gained)
+        for k in (1, 2)
+        for i, gained in ((1, 0.01), (2, 0.01), (3, -0.01))
+    ]
+    text = Table3().markdown(trials, Walk())
+    rows = [line for line in text.splitlines() if line.startswith("| s | gat")]
+    assert ["2 of 2" in row for row in rows[:3]] == [False, False, True]
+    assert "43.3" in rows[1]
+
+
+def test_table_4_counts_falls_over_episodes() -> None:
+    trials = [a_trial("sgat", k, falls=k) for k in (1, 2)]
+    row = next(line for line in Table4().markdown(trials, Walk()).splitlines() if line.startswith("| sgat"))
+    assert "| 3 of 20 |" in row and "0 of 10" in row
+
+
+def test_the_linear_walk_has_distances_where_percentages_mean_nothing() -> None:
+    trials = [a_trial("gat", k, start=0.0, value=0.05, improvement=None, surely=0.01 * (k - 1)) for k in (1, 2)]
+    row = next(line for line in LinearWalkTable().markdown(trials, Distance()).splitlines() if "gat" in line)
+    assert "| 5.0 |" in row and "| 1 of 2 |" in row and "4.95" in row
+
+
+def test_figure_5_is_told_in_degrees() -> None:
+    text = Figure5().markdown([a_trial("gat", k, outcome={"distance [deg]": 0.5 * k}) for k in (1, 2)], Arm())
+    assert "| 0.75 |" in text and "| 1.00 |" in text
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(600.0, "about 10 minutes"), (36000.0, "about 10.0 hours")])
+def test_durations_are_told_as_people_do(seconds: float, text: str) -> None:
+    assert told(seconds) == text
