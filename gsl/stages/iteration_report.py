@@ -139,9 +139,10 @@ class Rounds:
         return search(label, document, shown=self._task.shown, returned=evaluation.metrics["best"], start=start)
 
     def _added(self, label: str, metrics: Mapping[str, Any], cost: str, *, first: bool) -> list[tuple[str, ...]]:
-        simulated, share = metrics["returned_value_sim"], metrics["gain"]["share"]
+        simulated, gain = metrics["returned_value_sim"], metrics["gain"]
         expected = "" if simulated is None else f"{self._task.shown * simulated:.1f}"
-        gained = "" if share is None else f"{100 * share:+.1f} %"
+        absolute = f"{self._task.shown * gain['value']:+.1f} {self._task.unit}"
+        gained = absolute if gain["share"] is None else f"{100 * gain['share']:+.1f} %"
         zero: tuple[str, ...] = ("0", "π0", "", *self._measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
         rows.append((label, metrics["best"], expected, *self._measured(metrics["returned"]), gained, cost))
