@@ -58,6 +58,10 @@ class Table2:
         parts.append(table(("real world", "difference", "stable winners a trial", "p, Holm-corrected"), tested))
         return "\n".join([*parts, _single(trials)])
 
+    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+        """Return what a trial is worth."""
+        return worth(trials, task)
+
 
 @component
 class Table3:
@@ -83,6 +87,10 @@ class Table3:
         below = f"π0 in real: {task.shown * start.mean:.1f} {task.unit} (paper: 19.5)."
         return "\n".join([table(titles, rows), below, "", _single(trials)])
 
+    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+        """Return what a trial is worth."""
+        return worth(trials, task)
+
 
 @component
 class Table4:
@@ -107,6 +115,10 @@ class Table4:
         below = f"π0 in real, a fall worth 0: {task.shown * start.mean:.1f} {task.unit} (paper: 14.7, always falls)."
         return "\n".join([table(titles, rows), below, ""])
 
+    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+        """Return what a trial is worth."""
+        return worth(trials, task)
+
 
 @component
 class LinearWalkTable:
@@ -130,6 +142,10 @@ class LinearWalkTable:
         ]
         return table(titles, rows)
 
+    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+        """Return what a trial is worth."""
+        return worth(trials, task)
+
 
 @component
 class Figure5:
@@ -143,6 +159,22 @@ class Figure5:
             found = mean_interval(distances)
             rows.append((one.world, one.method, f"{found.mean:.2f}", told(found), f"{np.max(distances):.2f}"))
         return table(("real world", "grounding", "final distance [°]", "95 % interval", "worst trial [°]"), rows)
+
+    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+        """Return the final distances."""
+        return _distances(trials)
+
+
+def worth(trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+    """Return improvements where π0 is worth something in every trial, else values."""
+    improvements = [trial.improvement for trial in trials if trial.improvement is not None]
+    if len(improvements) == len(trials):
+        return "improvement over π0 in real [%]", improvements
+    return f"in real [{task.unit}]", [task.shown * trial.value for trial in trials]
+
+
+def _distances(trials: Sequence[Trial]) -> tuple[str, list[float]]:
+    return "final distance in real [°]", [_distance(trial.outcome) for trial in trials]
 
 
 def _distance(outcome: Mapping[str, float]) -> float:

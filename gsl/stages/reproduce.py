@@ -7,12 +7,18 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 
 from gsl.core.setting import component, setting
+from gsl.grounding.effects import DiagnosedEffects
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.grounding import Grounding
+from gsl.report.trial_dots import KNOWS, KNOWS_NOTHING, LEARNS, Dots, trial_dots
 from gsl.stages.compare import DATA, TABLE, Compare
 from gsl.stages.comparison import summaries
 from gsl.stages.study_effort import seconds, told
 from gsl.stages.trial import Trial
 from gsl.storage.documents import write_json
 from gsl.tasks.task import Task
+
+FIGURE = "trials.png"
 
 
 @runtime_checkable
@@ -21,6 +27,9 @@ class PaperTable(Protocol):
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table with the paper's figures beside ours."""
+
+    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+        """Return what is drawn of every trial, with its unit, and its values."""
 
 
 @component
@@ -41,5 +50,28 @@ class Reproduce:
         console.status(f"{told(seconds(self.study))} from nothing; a study that was stopped goes on where it was")
         trials = self.study.carried_out(folder.parent, console)
         write_json(folder / DATA, [trial._asdict() for trial in trials])
-        (folder / TABLE).write_text(self.table.markdown(trials, self.study.iterate.task), encoding="utf-8")
+        task = self.study.iterate.task
+        (folder / TABLE).write_text(self.table.markdown(trials, task), encoding="utf-8")
+        _draw(folder / FIGURE, trials, self.study.methods, *self.table.drawn(trials, task))
         return {"trials": len(trials), "summaries": [one._asdict() for one in summaries(trials)]}
+
+
+def _draw(
+    path: Path, trials: Sequence[Trial], methods: Mapping[str, Grounding], axis: str, values: Sequence[float]
+) -> None:
+    """Draw every trial, hollow where no stable improvement was found, a panel each pair of worlds."""
+    panels: dict[str, dict[str, Dots]] = {}
+    several = any(trial.iteration > 1 for trial in trials)
+    for cell in dict.fromkeys(trial.cell for trial in trials):
+        own = [(value, trial.without) for value, trial in zip(values, trials, strict=True) if trial.cell == cell]
+        shown, failed = zip(*own, strict=True)
+        panel = " ".join(filter(None, (cell.simulator, cell.world)))
+        name = f"{cell.method}, iteration {cell.iteration}" if several else cell.method
+        panels.setdefault(panel, {})[name] = Dots(shown, failed, _colour(methods[cell.method]))
+    trial_dots(path, panels, axis=axis, title="Every trial; hollow: no stable improvement")
+
+
+def _colour(grounding: Grounding) -> str:
+    if isinstance(grounding, DiagnosedEffects):
+        return KNOWS
+    return LEARNS if isinstance(grounding, ActionTransformation) else KNOWS_NOTHING

@@ -1,0 +1,69 @@
+"""Trials of methods side by side: every trial a dot, the mean a line, its 95 % interval a bar; one panel a world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from gsl.core.statistics import mean_interval
+from gsl.report.style import GROUNDED, INK, QUIET, REAL, SIMULATION, figure, headline, look, save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+KNOWS_NOTHING, LEARNS, KNOWS = SIMULATION, GROUNDED, REAL  # of the real robot: nothing, by actions, by parameters
+
+
+class Dots(NamedTuple):
+    """A method's trials: values, shape (n,), which of them failed, shape (n,), and its colour."""
+
+    values: Sequence[float]
+    failed: Sequence[bool]
+    colour: str = INK
+
+
+def trial_dots(path: Path, panels: Mapping[str, Mapping[str, Dots]], *, axis: str, title: str) -> None:
+    """Write the figure as a PNG file; arguments as those of `trial_dots_figure`."""
+    save(trial_dots_figure(panels, axis=axis, title=title), path)
+
+
+def trial_dots_figure(panels: Mapping[str, Mapping[str, Dots]], *, axis: str, title: str) -> Figure:
+    """Return the figure.
+
+    Args:
+        panels: Worlds by name, in each the methods by name, from above.
+        axis: What is shown, with its unit.
+        title: What there is to see.
+    """
+    most = max(len(methods) for methods in panels.values())
+    with look():
+        whole = figure(1.4 + 0.32 * most)
+        for axes, (world, methods) in zip(
+            whole.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0], panels.items(), strict=True
+        ):
+            _draw(axes, methods)
+            axes.set_title(world, loc="left", fontsize=10.5)
+            axes.set_xlabel(axis)
+        headline(whole, title)
+    return whole
+
+
+def _draw(axes: Axes, methods: Mapping[str, Dots]) -> None:
+    axes.axvline(0.0, color=QUIET, linewidth=1.0, zorder=0)
+    for row, one in enumerate(methods.values()):
+        values, failed = np.asarray(one.values, float), np.asarray(one.failed, bool)
+        found = mean_interval(values)
+        if np.isfinite(found.lower):
+            axes.plot([found.lower, found.upper], [row, row], color=one.colour, linewidth=6, alpha=0.25)
+        axes.plot([found.mean] * 2, [row - 0.3, row + 0.3], color=one.colour, linewidth=2.2)
+        for part, face in ((~failed, one.colour), (failed, "white")):
+            axes.plot(
+                values[part], np.full(part.sum(), row), "o", color=one.colour, markerfacecolor=face, markersize=4.5
+            )
+    axes.set_yticks(range(len(methods)), list(methods))
+    axes.set_ylim(len(methods) - 0.5, -0.5)
+    axes.tick_params(axis="y", length=0)
