@@ -11,6 +11,7 @@ from gsl.report.grounding_errors import grounding_errors, grounding_errors_figur
 from gsl.report.joint_trace import Traces, joint_trace, joint_trace_figure
 from gsl.report.learning_curve import Point, Search, learning_curve, learning_curve_figure, points, search
 from gsl.report.style import spread
+from gsl.report.trial_dots import Dots, trial_dots_figure
 
 PI0 = {"name": "pi0", "generation": None, "value_sim": None, "value": 0.19, "interval": [0.18, 0.20], "falls": 0}
 STABLE = {
@@ -108,6 +109,17 @@ def test_errors_are_bars_joint_by_joint() -> None:
     assert (
         figure.get_suptitle() == "Grounding takes the joint error from 3.54° to 1.00° of π0, from 2.00° to 3.00° off π0"
     )
+
+
+def test_every_trial_is_a_dot_and_a_failed_one_is_hollow() -> None:
+    panels = {"a world": {"none": Dots([3.0, -1.0], [False, True]), "gat": Dots([9.0, 8.0], [False, False])}}
+    (axes,) = trial_dots_figure(panels, axis="improvement [%]", title="t").axes
+    dots = [line for line in axes.lines if line.get_marker() == "o"]
+    drawn = sorted((float(x), int(y)) for line in dots for x, y in zip(*line.get_data(), strict=True))
+    assert drawn == [(-1.0, 0), (3.0, 0), (8.0, 1), (9.0, 1)]
+    hollow = [line.get_xdata()[0] for line in dots if len(line.get_xdata()) and line.get_markerfacecolor() == "white"]
+    assert hollow == [-1.0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["none", "gat"]
 
 
 def test_files_are_written_1600_pixels_wide_and_leave_nothing_behind(tmp_path: Path) -> None:
