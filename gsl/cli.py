@@ -102,6 +102,7 @@ stage("reproduce linear-walk", "A linear policy learns to walk, beside the paper
 stage("reproduce fig5", "The arms' final distance to their goal, as in the paper's figure 5.")
 stage("reproduce fig6", "A constant command in real, in simulation and grounded, as in the paper's figure 6.")
 stage("reproduce fig7", "An ankle of the linear walk, as in the paper's figure 7.")
+stage("reproduce budget", "Return and grounding error against the number of real trajectories.")
 stage("survey", "See how far real worlds are from the simulator.")
 stage("iterate", "The whole chain, again and again, until the real return stops improving.")
 

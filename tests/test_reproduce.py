@@ -59,6 +59,17 @@ def test_a_figure_is_one_command(what: str, figures: list[str], tmp_path: Path) 
     assert "RMS distance from real" in said.out
 
 
+def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
+    few = ("preset=toy", "iterate.workers=1", "iterate.optimizer.candidates=4", "iterate.task.duration=1.2")
+    said = done("reproduce", "budget", *few, "budgets=[4,6]", "~methods.sgat", folder=tmp_path)
+    folder = tmp_path / "runs/budget/reproduce"
+    points = json.loads((folder / "points.json").read_text())["points"]
+    assert [(one["method"], one["trajectories"]) for one in points] == [("gat", 4), ("gat", 6)]
+    assert all(one["error"] > 0.0 < one["bare"] for one in points)
+    assert (folder / "budget.png").stat().st_size > 10_000
+    assert "real trajectories" in said.out
+
+
 def a_trial(method: str, number: int, **more: Any) -> Trial:
     fields: dict[str, Any] = {
         "simulator": "",

@@ -1,0 +1,64 @@
+"""Return and grounding error against the number of real trajectories, each method a line with its 95 % interval."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from gsl.core.statistics import Interval
+from gsl.report.style import COMMAND, GROUNDED, REAL, SIMULATION, figure, headline, label_ends, look, save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = (GROUNDED, SIMULATION, REAL)
+
+
+class Line(NamedTuple):
+    """A figure at each budget."""
+
+    budgets: Sequence[int]
+    found: Sequence[Interval]
+
+
+def budget_curve(path: Path, panels: Mapping[str, Mapping[str, Line]], bases: Mapping[str, float], title: str) -> None:
+    """Write the figure as a PNG file; arguments as those of `budget_curve_figure`."""
+    save(budget_curve_figure(panels, bases, title), path)
+
+
+def budget_curve_figure(panels: Mapping[str, Mapping[str, Line]], bases: Mapping[str, float], title: str) -> Figure:
+    """Return the figure.
+
+    Args:
+        panels: What is shown, with its unit, and in each the methods.
+        bases: What it is without any real trajectory, by panel.
+        title: What there is to see.
+    """
+    with look():
+        whole = figure(3.6)
+        for axes, (name, lines) in zip(whole.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
+            _draw(axes, lines, bases.get(name))
+            axes.set_ylabel(name)
+            axes.set_xlabel("real trajectories")
+        headline(whole, title)
+    return whole
+
+
+def _draw(axes: Axes, lines: Mapping[str, Line], base: float | None) -> None:
+    ends = []
+    for colour, (method, line) in zip(COLOURS, lines.items(), strict=False):
+        means = [one.mean for one in line.found]
+        bounds = np.array([[one.lower, one.upper] for one in line.found]).T
+        axes.plot(line.budgets, means, "o-", color=colour, markersize=4)
+        if np.isfinite(bounds).all():
+            axes.fill_between(line.budgets, *bounds, color=colour, alpha=0.18, linewidth=0)
+        ends.append((means[-1], method, colour))
+    if base is not None:
+        axes.axhline(base, color=COMMAND, linewidth=1.0, linestyle=(0, (5, 3)))
+        ends.append((base, "none", COMMAND))
+    axes.margins(y=0.12)
+    label_ends(axes, float(max(line.budgets[-1] for line in lines.values())), ends, gap=0.1)

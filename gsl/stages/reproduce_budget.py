@@ -1,0 +1,109 @@
+"""How much real data a grounding needs: return and grounding error against the number of real trajectories."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+from gsl.core.setting import component, setting
+from gsl.core.statistics import mean_interval
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.none import NoGrounding
+from gsl.report.budget_curve import Line, budget_curve
+from gsl.report.markdown import table
+from gsl.stages.comparison_table import told
+from gsl.stages.grounding_check import BARE, GROUNDED, OFF, PI0
+from gsl.stages.grounding_gate import REPORT
+from gsl.stages.iterate import Iterate
+from gsl.storage.documents import write_json
+
+TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
+OWN = 3  # one of so many trajectories is of π0, the others of its neighbours
+
+
+class Point(NamedTuple):
+    """One method, once, with one budget.
+
+    Attributes:
+        trajectories: Real ones that the models learned from.
+        value: Of the returned policy, in the unit of the task.
+        error, bare: Of the grounded and of the plain simulator after 0.2 s, on held-out trajectories [deg].
+    """
+
+    method: str
+    trajectories: int
+    trial: int
+    value: float
+    error: float | None
+    bare: float | None
+
+
+@component
+class Budget:
+    """Trial k of every method and budget has the same seed; without grounding there is one search a trial."""
+
+    kind: ClassVar[str] = "reproduce"
+
+    iterate: Annotated[Iterate, setting("what a trial is; its grounding and real budget are replaced")]
+    methods: Annotated[Mapping[str, ActionTransformation], setting("learned groundings, by name")]
+    budgets: Annotated[tuple[int, ...], setting("real trajectories to learn from, the fewest first", min_length=1)]
+    trials: Annotated[int, setting("trials of each", ge=1)]
+
+    def parents(self) -> Mapping[str, Path]:
+        """Everything is made here."""
+        return {}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Run all trials, write the points, the table and the figure."""
+        home, points, bare = folder.parent, [], []
+        for number in range(1, self.trials + 1):
+            bare.append(self._ungrounded(home / "none" / f"trial_{number:02d}", number, console))
+            for count in self.budgets:
+                for method in self.methods:
+                    place = home / method / f"real_{count:03d}" / f"trial_{number:02d}"
+                    points.append(self._point(place, method, count, number, console))
+        write_json(folder / DATA, {"points": [one._asdict() for one in points], "none": bare})
+        self._told(folder, points, bare)
+        return {"points": len(points)}
+
+    def _point(self, place: Path, method: str, count: int, number: int, console: Any) -> Point:
+        own = max(1, count // OWN)
+        budget = replace(self.iterate.budget, real_episodes=own, real_neighbours=count - own)
+        chain, seed = replace(self.iterate.chain, budget=budget, accept=True), self.iterate.seed + number - 1
+        ready = chain.ready(place, self.methods[method], None, seed, console)
+        found = chain.search(place / "optimize", ready, None, seed, console)
+        measured = chain.measure(place / "evaluate", found, seed, console)
+        errors = json.loads((found.folder / REPORT).read_text(encoding="utf-8"))["errors"]
+        held = errors.get(OFF) or errors[PI0]
+        error, bare = (held[name]["10_ticks"]["joints_deg"] for name in (GROUNDED, BARE))
+        return Point(method, count, number, measured.metrics["returned"]["value"], error, bare)
+
+    def _ungrounded(self, place: Path, number: int, console: Any) -> float:
+        chain, seed = self.iterate.chain, self.iterate.seed + number - 1
+        found = chain.search(place / "optimize", NoGrounding(), None, seed, console)
+        return float(chain.measure(place / "evaluate", found, seed, console).metrics["returned"]["value"])
+
+    def _told(self, folder: Path, points: Sequence[Point], bare: Sequence[float]) -> None:
+        shown, unit = self.iterate.task.shown, self.iterate.task.unit
+        rows, values, errors = [], {}, {}
+        for method in self.methods:
+            cells = [[one for one in points if one.method == method and one.trajectories == n] for n in self.budgets]
+            means = [mean_interval([shown * one.value for one in cell]) for cell in cells]
+            wrong = [mean_interval([one.error for one in cell if one.error is not None]) for cell in cells]
+            values[method], errors[method] = Line(self.budgets, means), Line(self.budgets, wrong)
+            rows += [
+                (method, str(n), f"{value.mean:.1f}", told(value), f"{error.mean:.2f}", told(error))
+                for n, value, error in zip(self.budgets, means, wrong, strict=True)
+            ]
+        none = mean_interval([shown * value for value in bare])
+        rows.append(("none", "0", f"{none.mean:.1f}", told(none), "", ""))
+        titles = ("grounding", "real trajectories", f"in real [{unit}]", "95 % interval")
+        titles_of_errors = ("joints after 0.2 s, off π0 [°]", "95 % interval")
+        (folder / TABLE).write_text(table((*titles, *titles_of_errors), rows), encoding="utf-8")
+        plain = mean_interval([one.bare for one in points if one.bare is not None]).mean
+        panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
+        bases = dict(zip(panels, (none.mean, plain), strict=True))
+        budget_curve(folder / FIGURE, panels, bases, "What a grounding makes of more real data")
