@@ -58,7 +58,8 @@ def _draw(axes: Axes, lines: Mapping[str, Line], base: float | None) -> None:
             axes.fill_between(line.budgets, *bounds, color=colour, alpha=0.18, linewidth=0)
         ends.append((means[-1], method, colour))
     if base is not None:
-        axes.axhline(base, color=COMMAND, linewidth=1.0, linestyle=(0, (5, 3)))
+        first, last = (function(line.budgets[k] for line in lines.values()) for k, function in ((0, min), (-1, max)))
+        axes.hlines(base, first, last, color=COMMAND, linewidth=1.0, linestyle=(0, (5, 3)))
         ends.append((base, "none", COMMAND))
     axes.margins(y=0.12)
     label_ends(axes, float(max(line.budgets[-1] for line in lines.values())), ends, gap=0.1)
