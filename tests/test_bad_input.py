@@ -39,7 +39,7 @@ def _files(folder: Path) -> list[Path]:
     [
         ("collect episode=3", "episode: no such setting; did you mean episodes or preset.episodes?"),
         ("collect world.stp=0.1", "world.stp: no such setting; did you mean world.step"),
-        ("collect task=walc", "no task called walc; did you mean walk? There is arm, excite, walk"),
+        ("collect task=walc", "no task called walc; did you mean walk? There is arm, distance, excite, walk"),
         ("collect preset=", "no preset called (nothing); there is "),
         ("collect =3", "'=3': names no setting; write key=value"),
         ("collect episodes=four", "episodes = four: must be a whole number"),

@@ -10,7 +10,10 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 from gsl.core.setting import component, setting
 from gsl.core.statistics import mean_interval
+from gsl.errors import ConfigError
+from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.report.budget_curve import Line, budget_curve
 from gsl.report.markdown import table
@@ -48,7 +51,7 @@ class Budget:
     kind: ClassVar[str] = "reproduce"
 
     iterate: Annotated[Iterate, setting("what a trial is; its grounding and real budget are replaced")]
-    methods: Annotated[Mapping[str, ActionTransformation], setting("learned groundings, by name")]
+    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("learned groundings, by name")]
     budgets: Annotated[tuple[int, ...], setting("real trajectories to learn from, the fewest first", min_length=1)]
     trials: Annotated[int, setting("trials of each", ge=1)]
 
@@ -57,7 +60,14 @@ class Budget:
         return {}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
-        """Run all trials, write the points, the table and the figure."""
+        """Run all trials, write the points, the table and the figure.
+
+        Raises:
+            ConfigError: A grounding learns nothing from trajectories.
+        """
+        for name, method in self.methods.items():
+            if not isinstance(innermost(method), ActionTransformation):
+                raise ConfigError(f"methods.{name}", "learns nothing from real trajectories; take gat or sgat")
         home, points, bare = folder.parent, [], []
         for number in range(1, self.trials + 1):
             bare.append(self._ungrounded(home / "none" / f"trial_{number:02d}", number, console))
@@ -73,13 +83,11 @@ class Budget:
         own = max(1, count // OWN)
         budget = replace(self.iterate.budget, real_episodes=own, real_neighbours=count - own)
         chain, seed = replace(self.iterate.chain, budget=budget, accept=True), self.iterate.seed + number - 1
-        ready = chain.ready(place, self.methods[method], None, seed, console)
+        grounding = chain.diagnosed(place, self.methods[method], seed, console)
+        ready = chain.ready(place, grounding, None, seed, console)
         found = chain.search(place / "optimize", ready, None, seed, console)
         measured = chain.measure(place / "evaluate", found, seed, console)
-        errors = json.loads((found.folder / REPORT).read_text(encoding="utf-8"))["errors"]
-        held = errors.get(OFF) or errors[PI0]
-        error, bare = (held[name]["10_ticks"]["joints_deg"] for name in (GROUNDED, BARE))
-        return Point(method, count, number, measured.metrics["returned"]["value"], error, bare)
+        return Point(method, count, number, measured.metrics["returned"]["value"], *_errors(found.folder / REPORT))
 
     def _ungrounded(self, place: Path, number: int, console: Any) -> float:
         chain, seed = self.iterate.chain, self.iterate.seed + number - 1
@@ -107,3 +115,13 @@ class Budget:
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
         bases = dict(zip(panels, (none.mean, plain), strict=True))
         budget_curve(folder / FIGURE, panels, bases, "What a grounding makes of more real data")
+
+
+def _errors(report: Path) -> tuple[float | None, float | None]:
+    """Return the errors of the grounded and of the plain simulator [deg], off π0 where there are such trajectories."""
+    errors = json.loads(report.read_text(encoding="utf-8")).get("errors") if report.exists() else None
+    if errors is None:
+        return None, None
+    held = errors.get(OFF) or errors[PI0]
+    grounded, bare = (held[name]["10_ticks"]["joints_deg"] for name in (GROUNDED, BARE))
+    return grounded, bare
