@@ -65,8 +65,8 @@ class Budget:
         Raises:
             ConfigError: A grounding learns nothing from trajectories.
         """
-        for name, method in self.methods.items():
-            if not isinstance(innermost(method), ActionTransformation):
+        for name, grounding in self.methods.items():
+            if not isinstance(innermost(grounding), ActionTransformation):
                 raise ConfigError(f"methods.{name}", "learns nothing from real trajectories; take gat or sgat")
         home, points, bare = folder.parent, [], []
         for number in range(1, self.trials + 1):
