@@ -185,7 +185,7 @@ def main() -> None:
 def call(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code, with whatever went wrong told in a line."""
     words = [word for word in arguments if not word.startswith("-")]
-    command = " ".join(["gsl", *words[: 1 + (words[:1] in (["blind"], ["reproduce"]))]])
+    command = " ".join(["gsl", *words[: 1 + (bool(words) and words[0] in GROUPS)]])
     console = Console(json="--json" in arguments)
     try:
         code = int(app(args=list(arguments), prog_name="gsl", standalone_mode=False) or 0)

@@ -135,7 +135,7 @@ def test_a_gaussian_ensemble_is_trained_by_likelihood_and_knows_what_it_has_seen
     found = read_forward_model(str(tmp_path / "forward_model.safetensors"))
     assert isinstance(found, Ensemble)
     assert len(found.members) == 3
-    assert found.doubt(np.full(found.history.size(2), 50.0)).min() > 3.0
+    assert found.judged(np.full(found.history.size(2), 50.0))[1].min() > 3.0
 
 
 def test_a_grounding_is_trained_the_forward_model_that_it_needs() -> None:

@@ -149,10 +149,10 @@ class TransformationRun:
         position = self._senses.position(observation)
         real.see(position, self._senses.sensed(observation))
         window = real.complete(action)
-        wanted = grounding.forward.effect(window, self._rng if grounding.draws else None)
+        wanted, trust = self._wanted(window)
         sim.see(position, ())
         inverse = grounding.inverse.action(sim.complete(action), action, wanted)
-        sent = grounded(action, inverse, self._alpha * self._trust(window))
+        sent = grounded(action, inverse, self._alpha * trust)
         if grounding.noise:
             sent = sent + grounding.noise * self._rng.standard_normal(len(sent))
         # np.clip takes four times as long
@@ -161,9 +161,11 @@ class TransformationRun:
         sim.remember(sent)
         return sent
 
-    def _trust(self, window: np.ndarray) -> float | np.ndarray:
-        """How far to believe f, from 1 up to the gate to 0 at twice that, joint by joint."""
+    def _wanted(self, window: np.ndarray) -> tuple[np.ndarray, float | np.ndarray]:
+        """What f says, and how far to believe it: from 1 up to the gate to 0 at twice that, joint by joint."""
         gate, forward = self._grounding.gate, self._grounding.forward
+        rng = self._rng if self._grounding.draws else None
         if gate is None or not isinstance(forward, Ensemble):
-            return 1.0
-        return np.clip(2.0 - forward.doubt(window) / gate, 0.0, 1.0)
+            return forward.effect(window, rng), 1.0
+        wanted, doubt = forward.judged(window, rng)
+        return wanted, np.clip(2.0 - doubt / gate, 0.0, 1.0)

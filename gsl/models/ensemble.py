@@ -67,10 +67,11 @@ class Ensemble:
         found: np.ndarray = -(np.logaddexp.reduce(each, axis=0) - np.log(len(each))) / width
         return found
 
-    def doubt(self, window: np.ndarray) -> np.ndarray:
-        """Return the members' disagreement, 1 where it is as large as data explain, shape (n_joints,)."""
-        found: np.ndarray = np.std([member.effect(window) for member in self.members], axis=0) / self.usual
-        return found
+    def judged(self, window: np.ndarray, rng: np.random.Generator | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Return what `effect` does, and the members' disagreement, 1 where it is as large as data explain."""
+        each = [member.effect(window) for member in self.members]
+        change = np.mean(each, axis=0) if rng is None else self.effect(window, rng)
+        return change, np.std(each, axis=0) / self.usual
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint stores."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -38,7 +38,7 @@ def _fitted(training: Samples, validation: Samples, config: ModelConfig, head: H
     given, wanted = scaling(training[0]), scaling(training[1])
     known, unseen = ((_tensor(given.apply(x)), _tensor(wanted.apply(y))) for x, y in (training, validation))
     network = _network((training[0].shape[1], *config.hidden, head.width(training[1].shape[1])))
-    _descend(network, known, unseen, config, _LOSSES[head.likelihood](head))
+    _descend(network, known, unseen, config, _surprise(head) if head.draws else torch.nn.functional.mse_loss)
     affine = [layer for layer in network if isinstance(layer, torch.nn.Linear)]
     layers = [(_array(layer.weight), _array(layer.bias)) for layer in affine]
     return unscaled(layers, given, head.scaling(wanted))
@@ -66,13 +66,9 @@ def _descend(
     network.load_state_dict(weights or network.state_dict())
 
 
-def _squared(head: Head) -> Loss:
-    return torch.nn.functional.mse_loss
-
-
 def _surprise(head: Head) -> Loss:
     """The negative log likelihood of scaled targets, per output."""
-    k, logits = head.components, 0 if head.likelihood == "gaussian" else head.components
+    k, logits = head.components, head.logits
 
     def loss(raw: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
         means, logs = raw[:, logits:].reshape(len(raw), 2, k, -1).unbind(1)
@@ -83,9 +79,6 @@ def _surprise(head: Head) -> Loss:
         return -torch.logsumexp(each, dim=1).mean() / targets.shape[1]
 
     return loss
-
-
-_LOSSES: Mapping[str, Callable[[Head], Loss]] = {"point": _squared, "gaussian": _surprise, "mixture": _surprise}
 
 
 def _network(widths: tuple[int, ...]) -> torch.nn.Sequential:

@@ -34,6 +34,11 @@ class Head:
         """Whether there is something to draw."""
         return self.likelihood != "point"
 
+    @property
+    def logits(self) -> int:
+        """Number of raw outputs that weigh components."""
+        return self.components if self.likelihood == "mixture" else 0
+
     def width(self, m: int) -> int:
         """Return the number of raw outputs for m outputs."""
         if self.likelihood == "point":
@@ -51,13 +56,13 @@ class Head:
         if self.likelihood == "point":
             return outputs
         k, ones, zeros = self.components, np.ones(len(outputs.sd)), np.zeros(self.components)
-        logits = 0 if self.likelihood == "gaussian" else k
+        logits = self.logits
         mean = np.concatenate([zeros[:logits], np.tile(outputs.mean, k), np.tile(np.log(outputs.sd), k)])
         return Scaling(mean, np.concatenate([np.ones(logits), np.tile(outputs.sd, k), np.tile(ones, k)]))
 
     def parts(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return weights, shape (..., K), means and standard deviations, shape (..., K, m), of a distribution."""
-        k, logits = self.components, 0 if self.likelihood == "gaussian" else self.components
+        k, logits = self.components, self.logits
         rest = raw[..., logits:].reshape(*raw.shape[:-1], 2, k, -1)
         grown = np.exp(raw[..., :logits] - raw[..., :logits].max(axis=-1, keepdims=True, initial=-np.inf))
         weights = grown / grown.sum(axis=-1, keepdims=True) if logits else np.ones((*raw.shape[:-1], 1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -63,15 +64,13 @@ class Compare:
 
     def carried_out(self, home: Path, console: Any) -> list[Trial]:
         """Return all trials, built below `home`, told as they end."""
-        found = []
-        for number in range(1, self.trials + 1):
-            for method in self.methods:
-                for simulator, sim in (self.simulators or {"": self.iterate.sim}).items():
-                    for world in self.worlds:
-                        for trial in self._trial(home, sim, Cell(simulator, world, method, 1), number, console):
-                            found.append(trial)
-                            where = " ".join(filter(None, (simulator, world)))
-                            console.status(f"{where}, {method}, trial {number}: {trial.told}")
+        simulators, found = self.simulators or {"": self.iterate.sim}, []
+        cells = product(range(1, self.trials + 1), self.methods, simulators, self.worlds)
+        for number, method, simulator, world in cells:
+            where = " ".join(filter(None, (simulator, world)))
+            for trial in self._trial(home, simulators[simulator], Cell(simulator, world, method, 1), number, console):
+                found.append(trial)
+                console.status(f"{where}, {method}, trial {number}: {trial.told}")
         return found
 
     def _trial(self, home: Path, sim: World, cell: Cell, number: int, console: Any) -> Iterator[Trial]:

@@ -27,7 +27,7 @@ from gsl.stages.diagnosis_files import PAGE, REPORT, WORLD, report_of
 from gsl.stages.experiment_file import write_next_experiment
 from gsl.stages.logs import check_log, log_files, on_ground, read_logs
 from gsl.stages.policy_gap import Effort, policy_gap
-from gsl.stages.population import Workers
+from gsl.stages.population import Workers, threads
 from gsl.stages.real_returns import RealReturns, measured_parents, real_returns
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
@@ -104,16 +104,10 @@ class Diagnose:
 
     def _options(self) -> Options:
         clocks = self.clocks == "synchronised"
-        return Options(self.without, self.most, self.duels, self.nulls, self._threads, clocks, seed=self.seed)
-
-    @property
-    def _threads(self) -> int:
-        from joblib import cpu_count
-
-        return self.workers if self.workers > 0 else int(cpu_count())
+        return Options(self.without, self.most, self.duels, self.nulls, threads(self.workers), clocks, seed=self.seed)
 
     def _policy_gap(self, measured: RealReturns, found: Findings, console: Any) -> Mapping[str, Any]:
-        effort = Effort(self.episodes, self._threads, self.seed)
+        effort = Effort(self.episodes, threads(self.workers), self.seed)
         after = replace(self.sim, effects=self._effects(found))
         named = bool(found.answer.candidates)
         return policy_gap(measured, self.sim, after, named=named, effort=effort, console=console)

@@ -168,10 +168,11 @@ def largest_stable(scenarios: Mapping[float, Scenario], parameters: np.ndarray, 
         parameters: Of π0, shape (n_parameters,).
         seed: Of all randomness.
     """
-    for far, scenario in scenarios.items():
-        if not any(fell for _, fell in pi0_in(scenario, parameters, seed, patient=False)):
-            return far
-    return far
+    *tried, last = scenarios
+    stands = (
+        far for far in tried if not any(fell for _, fell in pi0_in(scenarios[far], parameters, seed, patient=False))
+    )
+    return next(stands, last)
 
 
 def _reach(env: Any, grounding: Any, episodes: Sequence[Trajectory], seed: int) -> Reachability | None:

@@ -24,7 +24,7 @@ from gsl.diagnosis.world_file import joined
 from gsl.errors import GslError
 from gsl.stages.diagnosis_files import REPORT
 from gsl.stages.logs import check_log, log_files, on_ground, read_logs
-from gsl.stages.population import Workers
+from gsl.stages.population import Workers, threads
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
 
@@ -61,7 +61,7 @@ class Identify:
         found = experiment(batch, robot)
         if not len(found.train) or not len(found.held_out):
             raise GslError(f"{self.real}: too little to fit and to check: two motions of some seconds are the least")
-        options = Options(self.without, threads=self._threads)
+        options = Options(self.without, threads=threads(self.workers))
         arena = arena_of(found, self.sim.plant, self.sim.step, options, lambda phase: checkpoint())
         with console.progress(self.evaluations, "fitting all parameters at once") as progress:
             fitted = identified(arena, evaluations=self.evaluations, seed=self.seed, tick=progress.advance)
@@ -82,12 +82,6 @@ class Identify:
         text = yaml.safe_dump(documents.plain(world), sort_keys=False, allow_unicode=True)
         (folder / WORLD).write_text(f"# {summary}\n{text}", encoding="utf-8")
         return {"effects": len(effects), "before": before, "after": after}
-
-    @property
-    def _threads(self) -> int:
-        from joblib import cpu_count
-
-        return self.workers if self.workers > 0 else int(cpu_count())
 
 
 def _gap(bench: Bench, effects: Effects) -> float:

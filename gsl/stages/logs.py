@@ -104,7 +104,7 @@ def _walks(sensors: object) -> bool:
 
 
 def _check_velocities(batch: Batch, name: str) -> None:
-    """Refuse velocities that are not the slope of the positions: another unit, another joint, or another sign."""
+    """Refuse velocities that are many times the slope of the positions: they are in another unit."""
     for k, joint in enumerate(batch.joints):
         slopes = np.concatenate([np.gradient(one.position[:, k], batch.control_period) for one in batch.episodes])
         told = np.concatenate([one.velocity[:, k] for one in batch.episodes])

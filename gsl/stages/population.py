@@ -37,6 +37,13 @@ Workers = Annotated[
 ]
 
 
+def threads(workers: int) -> int:
+    """Return how many processes or threads a setting of `workers` stands for."""
+    from joblib import cpu_count
+
+    return workers if workers > 0 else int(cpu_count())
+
+
 class Job(NamedTuple):
     """One rollout to do: parameters, shape (n_parameters,), and seed."""
 

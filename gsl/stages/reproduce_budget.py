@@ -83,7 +83,7 @@ class Budget:
         own = max(1, count // OWN)
         budget = replace(self.iterate.budget, real_episodes=own, real_neighbours=count - own)
         chain, seed = replace(self.iterate.chain, budget=budget, accept=True), self.iterate.seed + number - 1
-        grounding = chain.diagnosed(place, self.methods[method], seed, console)
+        grounding = chain.diagnosed(place.parents[2] / "diagnosis" / place.name, self.methods[method], seed, console)
         ready = chain.ready(place, grounding, None, seed, console)
         found = chain.search(place / "optimize", ready, None, seed, console)
         measured = chain.measure(place / "evaluate", found, seed, console)

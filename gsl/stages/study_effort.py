@@ -8,6 +8,7 @@ from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.stages.compare import Compare
+from gsl.stages.population import threads
 from gsl.stages.rollout import Scenario, rollout
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.world import World
@@ -19,10 +20,8 @@ APART = 60.0  # of a learned grounding: fits and checks [s]
 
 def seconds(study: Compare) -> float:
     """Return an estimate of a study's duration from nothing [s], good to a factor of two or so."""
-    from joblib import cpu_count
-
     iterate, budget = study.iterate, study.iterate.budget
-    workers = iterate.workers if iterate.workers > 0 else int(cpu_count())
+    workers = threads(iterate.workers)
     sims = study.simulators or {"": iterate.sim}
     real = sum(_rollout(study, world, REAL) for world in study.worlds.values()) / len(study.worlds)
     sim = sum(_rollout(study, world, SIM) for world in sims.values()) / len(sims)
