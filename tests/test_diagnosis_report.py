@@ -164,7 +164,7 @@ def test_a_cause_is_named_with_what_was_chosen_of_it() -> None:
 
 def test_what_a_learned_residual_leaves_is_a_share_of_squares() -> None:
     found = {"before": 3.0, "after": 1.0, "fraction": 1.0, "ceiling_fraction": 0.625}  # 9 - 0.625 (9 - 1) = 2²
-    assert "learned residual (ceiling) 2.00 ×, 62 %" in words(report_html({"shrinkage": found}))
+    assert "learned residual, no cause named 2.00 ×, 62 %" in words(report_html({"shrinkage": found}))
 
 
 def poisoned(document: Any, key: str = "") -> Any:

@@ -22,7 +22,7 @@ from gsl.diagnosis.select import Selection, Thresholds, selected
 from gsl.diagnosis.self_test import Trial, duels, null_gains
 from gsl.diagnosis.verdict import Verdict, judged
 from gsl.effects.effect import applied, built
-from gsl.errors import GslError
+from gsl.errors import InputError
 
 NOISE_COST = 0.96  # robust cost of a residual that is noise and nothing else
 GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best gain of chance it has to be
@@ -99,7 +99,9 @@ def diagnosed(
     """
     found = experiment(log, robot, walking=walking)
     if not len(found.train) or not len(found.held_out):
-        raise GslError("too little to fit and to check: two motions, or one trajectory, of some seconds are the least")
+        raise InputError(
+            "too little to fit and to check: two motions, or one trajectory, of some seconds are the least"
+        )
     if walking:
         simulator = Walking(plant, fitting_step(step, found.period), found.period, workers=options.threads)
         spread = found.pieces.chosen(np.arange(0, len(found.pieces), max(1, len(found.pieces) // RESTARTS)))
@@ -129,8 +131,10 @@ def diagnosed(
     tick("trying the library on the log")
     selection, wrong = _upheld(found, arena, none, thresholds, options)
     survivors = _survivors(selection)
-    tick("self-test: can the causes that are left be told apart")
-    trials = tuple(duels(found, arena, survivors, options, tick)) if options.duels and not walking else ()
+    trials: tuple[Trial, ...] = ()
+    if options.duels and not walking and survivors[0].candidates:
+        tick("self-test: can the causes that are left be told apart")
+        trials = tuple(duels(found, arena, survivors, options, tick))
     expected = _expected(selection, trials, shakes=shaking > 0.0) * (1.0 + found.noise.slack)
     verdict = judged(selection, expected, _margins(trials, survivors), doubt, walking=walking)
     return Findings(

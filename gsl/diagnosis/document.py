@@ -125,6 +125,7 @@ def _ranking(found: Findings) -> list[dict[str, Any]]:
                 "parameters": _written(one),
                 "gain": {"value": value, "low": low, "high": high},
                 "level": one.level,
+                "behind": one.cost - found.selection.chosen.cost,
             }
         )
     return rows
@@ -172,6 +173,8 @@ def _caveats(found: Findings) -> list[str]:
         said.append("There is one motion only: every second part of it was held out, which is weak evidence.")
     elif len(np.unique(exp.pieces.record[exp.held_out])) < FEW:
         said.append("Few trajectories are held out: intervals are over parts of them and may be too narrow.")
+    if not found.trials and found.verdict.causes and not exp.walking:
+        said.append("No self-test was made (duels=0): probabilities are those of the fit alone, and too sure.")
     if exp.comparison.shaking.any():
         names = ", ".join(name for name, shakes in zip(exp.channels, exp.comparison.shaking, strict=True) if shakes)
         said.append(f"These joints shake while their commands rest and are judged by the spectrum: {names}.")

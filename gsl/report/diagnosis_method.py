@@ -72,7 +72,7 @@ def self_test(document: Document) -> Html | None:
     ]
     gain = finite(found.get("null_gain"))
     null = (
-        f" Where nothing was wrong, chance still seemed to save up to {short(gain)} units of cost."
+        f" Where nothing was wrong, chance saved {short(gain)} in cost at most; an effect has to save 1.3 times that."
         if gain is not None
         else ""
     )

@@ -48,7 +48,9 @@ def policy_lines(document: Document) -> list[str]:
     lines = [f"{count} {many}: returns are {before} {unit} from real in the simulator, {after} in the {second} one."]
     if any(part(order, when) for when in ("before", "after")):
         before, after = (_told(part(order, when), lambda value: short(value, 2)) for when in ("before", "after"))
-        lines.append(f"Rank correlation with real: {before} in the simulator, {after} in the {second} one.")
+        line = f"Rank correlation with real: {before} in the simulator, {after} in the {second} one."
+        low = finite(part(order, "after").get("low"))
+        lines.append(line + ("" if low is None or low > 0.0 else " So few policies do not show an order."))
     return lines
 
 

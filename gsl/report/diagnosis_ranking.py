@@ -15,7 +15,6 @@ from gsl.report.diagnosis_words import (
     entries,
     finite,
     interval,
-    level,
     name,
     part,
     probability,
@@ -60,8 +59,8 @@ def ranking(document: Document) -> Html | None:
     measure = "the share of the gap that it explains" if shares else "the cost that it saves"
     note = (
         f"Each was fitted on some records and judged on others. Shown: {measure}, with its 95 % interval (left of the "
-        "line it makes things worse), and the cost that it leaves (1 × is noise alone). In colour: the verdict, the "
-        "fewest effects that explain it."
+        "line it makes things worse), and how much more it costs than the verdict, which is in colour: 20 and more is "
+        "a clear difference, a few are none."
     )
     rest = f"{len(found) - SHOWN} more did worse." if len(found) > SHOWN else None
     return section(
@@ -75,7 +74,9 @@ def ranking(document: Document) -> Html | None:
 def _dot(one: Document, form: Callable[[Any], str], *, chosen: bool) -> Dot:
     gain = part(one, "gain")
     bounds = between(gain, form)
-    told = [f"{form(gain.get('value'))}{f' ({bounds})' if bounds else ''}", f"cost {level(one.get('level'))}"]
+    told = [f"{form(gain.get('value'))}{f' ({bounds})' if bounds else ''}"]
+    behind = finite(one.get("behind"))
+    told += [] if behind is None or chosen else [f"costs {behind:+,.0f}"]
     told += [f"best: {probability(one['probability'])}"] if finite(one.get("probability")) is not None else []
     value, low, high = (finite(gain.get(key)) for key in ("value", "low", "high"))
     return Dot(_label(one), value, low, high, prose(", ".join(told)), "after" if chosen else "other")

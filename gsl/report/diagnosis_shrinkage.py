@@ -19,8 +19,8 @@ def shrinkage(document: Document) -> Html | None:
     drawn = bar_chart(_bars(found), mark=finite(found.get("floor")) or FLOOR)
     note = (
         "Gap / noise on held-out records; the dashed line is the noise, below which nothing can be seen. Calibration "
-        "is each joint's own small gains, friction and zero. The learned residual is a black box fitted to the "
-        "same records: what can be had without knowing a cause."
+        "is each joint's own small gains, friction and zero. The learned residual is a black box, the forward model of "
+        "GAT, fitted to the same records: short logs do not teach it much. Percentages are shares of the squared gap."
     )
     told = element("p", prose(shrinkage_sentence(document))) if drawn else None
     return section("How far the gap shrinks", told, drawn, note=note)
@@ -32,7 +32,7 @@ def _bars(found: Document) -> list[Bar]:
         ("simulator as it was", "before", found.get("before"), ""),
         ("calibration alone", "other", found.get("calibration"), ""),
         ("with the effects", "after", found.get("after"), ""),
-        ("learned residual (ceiling)", "quiet", ceiling, f", {share(found.get('ceiling_fraction'))}"),
+        ("learned residual, no cause named", "quiet", ceiling, f", {share(found.get('ceiling_fraction'))}"),
     )
     return [
         Bar(label, [(kind, finite(value))], f"{level(value)}{more}")

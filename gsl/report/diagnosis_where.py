@@ -109,7 +109,10 @@ def sides(document: Document) -> Html | None:
         for one in sorted(entries(document, "sides"), key=_milder)
     ]
     columns = ("pair", "left", "right", "chance alone", "so")
-    note = "Gap / noise of either side, and how often chance alone makes them differ so much."
+    note = (
+        "Gap / noise of either side, and how often chance alone makes them differ so much. A difference is no fault "
+        "yet: the two sides may have moved differently. A fault of one side shows among the causes."
+    )
     return section("Left against right", table(columns, rows) if rows else None, note=note)
 
 

@@ -178,7 +178,7 @@ def _draw_confirmed(axes: Axes, confirmed: Point, stable: Sequence[Point]) -> No
     lowest = min(bound for bound in [confirmed.real, confirmed.lower, *beside] if math.isfinite(bound))
     axes.vlines([place], [confirmed.lower], [confirmed.upper], color=INK, linewidth=1.8, zorder=5)
     axes.plot([place], [confirmed.real], "D", color=INK, markersize=6, label="measured again", zorder=6)
-    _say(axes, "measured again", place, lowest, -14, INK)
+    _say(axes, "measured again", place, lowest, -25, INK)
 
 
 def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -> None:

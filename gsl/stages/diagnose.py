@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -21,7 +21,7 @@ from gsl.diagnosis.document import document
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.verify import in_bullet
 from gsl.diagnosis.world_file import diagnosed_effects, joined
-from gsl.errors import GslError
+from gsl.errors import InputError
 from gsl.report.diagnosis import report_html
 from gsl.stages.diagnosis_files import PAGE, REPORT, WORLD, report_of
 from gsl.stages.experiment_file import write_next_experiment
@@ -31,6 +31,8 @@ from gsl.stages.population import Workers, threads
 from gsl.stages.real_returns import RealReturns, measured_parents, real_returns
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
+
+QUIET = 15.0  # of a phase that takes long [s]
 
 
 @component
@@ -53,7 +55,7 @@ class Diagnose:
         Literal["synchronised", "unsynchronised"],
         setting("whether commands and measurements share a clock; if not, latency is not claimed"),
     ] = "synchronised"
-    most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
+    most: Annotated[int, setting("effects at once, at most; parted over groups it counts once", ge=1, le=6)] = 4
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
     workers: Workers = -1
@@ -76,16 +78,18 @@ class Diagnose:
         measured = real_returns(self.policies, self.sim, trust=self.trust) if self.policies else None
         logs = {role: self._read(role) for role in ("real", "reference") if getattr(self, role)}
         if "reference" in logs and any(on_ground(log) for log in logs.values()):
-            raise GslError(
+            raise InputError(
                 "a reference calibrates logs in the air only; leave reference= out, or log the robot in the air"
             )
+        if warning := self._stranger(logs["real"]):
+            console.status(f"warning: {warning}")
         found = diagnosed(
             logs["real"],
             robot,
             self.sim.plant,
             self.sim.step,
             self._options(),
-            _telling(console),
+            _Telling(console),
             reference=logs.get("reference"),
             walking=on_ground(logs["real"]),
         )
@@ -101,6 +105,13 @@ class Diagnose:
         batch = read_logs(getattr(self, role))
         check_log(batch, lumped(self.sim.plant.robot), getattr(self, role))
         return batch
+
+    def _stranger(self, batch: Batch) -> str | None:
+        """Return a warning if the log says that it is of another robot, whose joints have the same names."""
+        said, ours = str(batch.metadata.get("robot") or ""), lumped(self.sim.plant.robot).name
+        if said.lower() in ("", ours.lower(), self.sim.robot.lower()):
+            return None
+        return f"The log says that it is of the robot {said}, the simulator is {ours}: only the joints' names agree."
 
     def _options(self) -> Options:
         clocks = self.clocks == "synchronised"
@@ -128,6 +139,7 @@ class Diagnose:
             seconds=seconds,
             command=self._command(),
         )
+        told["caveats"] += filter(None, [self._stranger(batch)])
         documents.write_json(folder / REPORT, told)
         (folder / PAGE).write_text(report_html(told), encoding="utf-8")
         (folder / WORLD).parent.mkdir()
@@ -177,6 +189,21 @@ class Diagnose:
         return f"# {summary}\n# The simulator {told} joint by joint.\n{text}"
 
 
-def _telling(console: Any) -> Callable[[str], None]:
-    """Return what says a phase on the console; without one it only looks whether the user has had enough."""
-    return lambda phase: console.status(phase) if phase else checkpoint()
+class _Telling:
+    """Says a phase when it begins, and now and then how long it has been at it; nothing goes on after a Ctrl-C."""
+
+    def __init__(self, console: Any) -> None:
+        self._console, self._phase, self._fits = console, "", 0
+        self._begun = self._said = time.monotonic()
+
+    def __call__(self, phase: str) -> None:
+        now = time.monotonic()
+        if phase:
+            self._console.status(phase)
+            self._phase, self._fits, self._begun, self._said = phase, 0, now, now
+            return
+        checkpoint()
+        self._fits += 1
+        if now - self._said > QUIET:
+            self._console.status(f"{self._phase}: {self._fits} fits in {now - self._begun:.0f} s")
+            self._said = now

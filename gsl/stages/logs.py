@@ -10,7 +10,7 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.experiment import SCORED, WARM_UP
-from gsl.errors import GslError, TrajectoryError
+from gsl.errors import InputError, TrajectoryError
 from gsl.stages.training import data_file
 from gsl.storage.trajectories import read
 
@@ -55,24 +55,26 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
     """Refuse a log that cannot be diagnosed.
 
     Raises:
-        GslError: with what is wrong and what to do.
+        InputError: with what is wrong and what to do.
     """
     if set(batch.joints) != set(robot.controlled):
         missing = [joint for joint in robot.controlled if joint not in batch.joints]
         other = [joint for joint in batch.joints if joint not in robot.controlled]
         told = f"lacks {missing[0]}" if missing else f"has {other[0]}, which the {robot.name} has not"
-        raise GslError(f"{name}: a log of another robot? It {told}; choose the simulator with sim=")
+        raise InputError(f"{name}: a log of another robot? It {told}; choose the simulator with sim=")
     needed = ("base.position.x", "base.orientation.w")
     if on_ground(batch) and not all(column in one.sensors for one in batch.episodes for column in needed):
-        raise GslError(f"{name}: a walk needs base.position and base.orientation columns; or log the robot in the air")
+        raise InputError(
+            f"{name}: a walk needs base.position and base.orientation columns; or log the robot in the air"
+        )
     _check_time(batch, name)
     longest = max(len(episode) for episode in batch.episodes) * batch.control_period
     if longest < WARM_UP + SCORED:
-        raise GslError(
+        raise InputError(
             f"{name}: too short, its longest trajectory lasts {longest:.2g} s; {WARM_UP + SCORED:g} s are needed"
         )
     if all(np.ptp(episode.action, axis=0).max() < MOVES for episode in batch.episodes):
-        raise GslError(
+        raise InputError(
             f"{name}: no command ever changes, so nothing shows; play a motion, see `gsl collect task=excite`"
         )
     _check_units(batch, robot, name)
@@ -86,7 +88,7 @@ def _check_time(batch: Batch, name: str) -> None:
         far = np.abs(steps - batch.control_period)
         if len(far) and far.max() > LATE * batch.control_period:
             row = int(np.argmax(far))
-            raise GslError(
+            raise InputError(
                 f"{name}: episode {number}, step {row}: {steps[row]:.4g} s to the next row, but a control period is "
                 f"{batch.control_period:g} s; cut the log at its holes, or resample it"
             )
@@ -110,7 +112,7 @@ def _check_velocities(batch: Batch, name: str) -> None:
         told = np.concatenate([one.velocity[:, k] for one in batch.episodes])
         size, own = float(np.sqrt(np.mean(slopes**2))), float(np.sqrt(np.mean(told**2)))
         if own > FASTER * max(size, SLOW):
-            raise GslError(
+            raise InputError(
                 f"{name}: velocity.{joint} is {own / max(size, SLOW):.3g} times the slope of position.{joint}; "
                 "velocities are in rad/s, are these degrees?"
             )
@@ -129,4 +131,4 @@ def _check_units(batch: Batch, robot: Robot, name: str) -> None:
     if beyond > BEYOND:
         hint = "are these degrees?" if abs(far) > 2.0 * np.pi else "is the zero or the sign another?"
         bounds = f"[{limits.lower:.2f}, {limits.upper:.2f}] rad"
-        raise GslError(f"{name}: {column} reaches {far:.3g}, beyond the joint's limits {bounds}; {hint}")
+        raise InputError(f"{name}: {column} reaches {far:.3g}, beyond the joint's limits {bounds}; {hint}")

@@ -91,7 +91,9 @@ def _table(path: Path) -> pa.Table:
 def _stored_metadata(path: Path, table: pa.Table) -> Any:
     stored = (table.schema.metadata or {}).get(METADATA_KEY)
     if stored is None:
-        raise TrajectoryError(path, "has no metadata under the key `gsl`; it is no trajectory file, import it first")
+        raise TrajectoryError(
+            path, "has no metadata under the key `gsl`; it is no trajectory file; write it as docs/files.md says"
+        )
     try:
         return json.loads(stored)
     except ValueError as error:

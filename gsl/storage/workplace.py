@@ -9,7 +9,7 @@ import shutil
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ def locked(out: Path) -> Iterator[None]:
     """
     lock = out.with_name(f".{out.name}.lock")
     with explained(out.parent):
+        made = [folder for folder in (out.parent, *out.parent.parents) if not folder.exists()]
         out.parent.mkdir(parents=True, exist_ok=True)
         descriptor = _taken(out, lock)
     try:
@@ -39,6 +40,9 @@ def locked(out: Path) -> Iterator[None]:
         recover(out)
         lock.unlink(missing_ok=True)
         os.close(descriptor)
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()  # of a command that was refused; what holds something stays
 
 
 def _taken(out: Path, lock: Path) -> int:
