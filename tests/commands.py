@@ -45,6 +45,21 @@ def done(*arguments: str, folder: Path) -> Said:
     return said
 
 
+def refused(*arguments: str, folder: Path, code: int = 2) -> str:
+    """Run a command that cannot work, into runs/refused, and return the one line it says in the end."""
+    before = _files(folder)
+    said = gsl(*arguments, folder=folder)
+    assert (said.code, said.out) == (code, ""), said
+    assert said.lines[-1].startswith(f"gsl {arguments[0]}: ")
+    assert [line for line in said.lines[:-1] if not line.startswith(("checking ", "fitting "))] == []
+    assert _files(folder) == before
+    return said.lines[-1].removeprefix(f"gsl {arguments[0]}: ")
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
 @contextlib.contextmanager
 def started(*arguments: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
     """Start a command line as a process that leads a session of its own; its workers end with the block."""

@@ -25,7 +25,10 @@ COMPOSING = ("composer", "config_errors", "known_settings", "multirun")
 ONLY = {
     "hydra": ("config.py", *(f"commandline/{name}.py" for name in COMPOSING)),
     "pybullet": ("worlds/engine.py", "worlds/camera.py"),
-    "torch": ("models/fitting.py",),
+    "torch": ("models/fitting.py", "optimizers/trpo.py"),
+    "sb3_contrib": ("optimizers/trpo.py",),
+    "stable_baselines3": ("optimizers/trpo.py",),
+    "mujoco": ("worlds/mujoco.py",),
     "cma": ("optimizers/cma_es.py",),
 }
 

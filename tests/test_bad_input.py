@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from commands import SMALL, gsl
+from commands import SMALL, gsl, refused
 from safetensors import safe_open
 from safetensors.numpy import save
 
@@ -19,27 +19,15 @@ LINEAR = ("train-forward", "model=linear")
 GAT = ("optimize", *SMALL, "grounding=gat", "grounding.inverse_model=chain", "accept=true")
 
 
-def refused(*arguments: str, folder: Path, code: int = 2) -> str:
-    """Run a command that cannot work, into runs/refused, and return the one line it says in the end."""
-    before = _files(folder)
-    said = gsl(*arguments, folder=folder)
-    assert (said.code, said.out) == (code, ""), said
-    assert said.lines[-1].startswith(f"gsl {arguments[0]}: ")
-    assert [line for line in said.lines[:-1] if not line.startswith(("checking ", "fitting "))] == []
-    assert _files(folder) == before
-    return said.lines[-1].removeprefix(f"gsl {arguments[0]}: ")
-
-
-def _files(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.rglob("*") if path.is_file())
-
-
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
         ("collect episode=3", "episode: no such setting; did you mean episodes or preset.episodes?"),
         ("collect world.stp=0.1", "world.stp: no such setting; did you mean world.step"),
-        ("collect task=walc", "no task called walc; did you mean walk? There is arm, distance, excite, walk"),
+        (
+            "collect task=walc",
+            "no task called walc; did you mean walk? There is arm, distance, excite, own_reward, walk",
+        ),
         ("collect preset=", "no preset called (nothing); there is "),
         ("collect =3", "'=3': names no setting; write key=value"),
         ("collect episodes=four", "episodes = four: must be a whole number"),

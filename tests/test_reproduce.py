@@ -90,7 +90,8 @@ def a_trial(method: str, number: int, **more: Any) -> Trial:
         "refused": False,
         "rank": 0.5,
         "real_episodes": 40,
-        "outcome": {"distance [deg]": 0.5},
+        "outcome": {},
+        "last": {"distance [deg]": 0.5, "mean distance [deg]": 2.0, "above [share]": 0.0},
     }
     return Trial(**{**fields, "method": method, "number": number, **more})
 
@@ -132,8 +133,9 @@ def test_the_linear_walk_has_distances_where_percentages_mean_nothing() -> None:
 
 
 def test_figure_5_is_told_in_degrees() -> None:
-    text = Figure5().markdown([a_trial("gat", k, outcome={"distance [deg]": 0.5 * k}) for k in (1, 2)], Arm())
-    assert "| 0.75 |" in text and "| 1.00 |" in text
+    last = {"distance [deg]": 0.5, "above [share]": 0.0}
+    text = Figure5().markdown([a_trial("gat", k, last={**last, "mean distance [deg]": 2.0 * k}) for k in (1, 2)], Arm())
+    assert "| 3.00 |" in text and "| 0.50 |" in text and "| 0 of 2 |" in text
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(600.0, "about 10 minutes"), (36000.0, "about 10.0 hours")])

@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gsl.core.draws import Draws
 from gsl.core.history import History
 from gsl.core.layout import Layout
 from gsl.core.scaling import scaling
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
+from gsl.models.calibration import calibrated
 from gsl.models.choice import fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Ensemble, ensemble
@@ -52,9 +54,9 @@ def test_widths_and_sizes_belong_together(head: Head) -> None:
 
 @pytest.mark.parametrize("head", [GAUSSIAN, MIXTURE], ids=lambda head: head.likelihood)
 def test_draws_have_the_moments_that_the_outputs_say(head: Head) -> None:
-    rng, raw = np.random.default_rng(0), np.random.default_rng(1).normal(size=head.width(N))
+    draws, raw = Draws(np.random.default_rng(0)), np.random.default_rng(1).normal(size=head.width(N))
     weights, means, sds = head.parts(raw)
-    drawn = np.array([head.drawn(raw, rng) for _ in range(20000)])
+    drawn = np.array([head.drawn(raw, draws) for _ in range(20000)])
     second = (weights[:, None] * (sds**2 + means**2)).sum(axis=0)
     np.testing.assert_allclose(drawn.mean(axis=0), head.expected(raw), atol=0.05)
     np.testing.assert_allclose((drawn**2).mean(axis=0), second, rtol=0.06)
@@ -108,10 +110,28 @@ def forked(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 def test_a_mixture_learns_what_goes_either_way() -> None:
     config, head = replace(QUICK, likelihood="mixture", components=2), Head("mixture", 2)
     network = fit_network(forked(2000, 0), forked(400, 1), config, seed=1, head=head)
-    rng, raw = np.random.default_rng(0), network.predict(np.zeros(1))
-    drawn = np.array([head.drawn(raw, rng)[0] for _ in range(2000)])
+    draws, raw = Draws(np.random.default_rng(0)), network.predict(np.zeros(1))
+    drawn = np.array([head.drawn(raw, draws)[0] for _ in range(2000)])
     assert (np.abs(np.abs(drawn) - 1.0) < 0.3).mean() > 0.98
     assert (drawn > 0.0).mean() == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize("head", [GAUSSIAN, MIXTURE], ids=lambda head: head.likelihood)
+def test_calibration_finds_how_wide_errors_are_and_how_long_they_last(head: Head) -> None:
+    rng, count, memory = np.random.default_rng(0), 3000, np.array([0.0, 0.6])
+    network, drawn = a_network(head), Draws(rng, memory)
+    inputs = rng.normal(size=(count, SIZE))
+    raw = network.predict_many(inputs)
+    weights, means, sds = head.parts(raw)
+    expected = head.expected(raw)
+    sd = np.sqrt((weights[..., None] * (sds**2 + (means - expected[:, None]) ** 2)).sum(axis=-2))
+    outputs = expected + [1.5, 0.8] * sd * np.array([drawn.normal(N) for _ in range(count)])
+    parts = [(inputs[k : k + 300], outputs[k : k + 300]) for k in range(0, count, 300)]
+    wider, found = calibrated(network, head, parts)
+    np.testing.assert_allclose(found, memory, atol=0.06)
+    np.testing.assert_array_equal(head.expected(wider.predict_many(inputs)), expected)
+    scale = head.parts(wider.predict_many(inputs))[2] / sds
+    np.testing.assert_allclose(scale, np.broadcast_to([1.5, 0.8], scale.shape), rtol=0.06)
 
 
 def test_a_linear_mixture_is_refused() -> None:
@@ -125,9 +145,9 @@ def test_a_stochastic_model_and_an_ensemble_come_back_from_their_files(tmp_path:
     for model in (one, ensemble((one, a_model(head, 1)), windows)):
         again = read_forward_model(str(write_model(tmp_path, model)))
         assert type(again) is type(model)
-        for rng in (None, np.random.default_rng(0)):
-            other = None if rng is None else np.random.default_rng(0)
-            np.testing.assert_array_equal(again.effect(windows[0], rng), model.effect(windows[0], other))
+        np.testing.assert_array_equal(again.effect(windows[0]), model.effect(windows[0]))
+        first, second = (one.effect(windows[0], Draws(np.random.default_rng(0))) for one in (again, model))
+        np.testing.assert_array_equal(first, second)
 
 
 def in_a_run(grounding: LoadedTransformation, far: float = 1.0) -> tuple[np.ndarray, np.ndarray]:

@@ -59,10 +59,14 @@ def test_within_a_degree_the_reward_grows_no_more() -> None:
 def test_the_episode_ends_when_one_arm_is_above_the_goal() -> None:
     run = Arm().start(LAYOUT, arm(0.0, 0.0), SIM)
     assert not run.step(arm(0.0, 0.0), arm(44.9, 44.9), False).ended
-    assert run.step(arm(0.0, 0.0), arm(10.0, 45.1), False).ended
+    above = run.step(arm(0.0, 0.0), arm(44.9, 45.1), False)
+    assert above.ended and above.reward == 0.0
 
 
 def test_the_distance_reported_is_the_last_one() -> None:
     position = np.array([arm(0.0, 0.0)[LAYOUT["position"]], arm(41.0, 42.0)[LAYOUT["position"]]])
     trajectory = Trajectory(np.array([0.0, 0.02]), position[:1], position, 0.0 * position)
-    assert Arm().outcome(LAYOUT, trajectory)["distance [deg]"] == pytest.approx(5.0)
+    found = Arm().outcome(LAYOUT, trajectory)
+    assert found["distance [deg]"] == pytest.approx(5.0)
+    assert found["mean distance [deg]"] == pytest.approx(0.5 * (5.0 + 45.0 * 2.0**0.5))
+    assert found["above [share]"] == 0.0

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from gsl.errors import ConfigError
+
 _SUFFIXES = {1: ("",), 2: (".left", ".right"), 3: (".x", ".y", ".z"), 4: (".x", ".y", ".z", ".w")}
 
 
@@ -13,14 +15,19 @@ class Layout:
     """Names, sizes and order of an observation's parts.
 
     Attributes:
-        joints: Names of the controlled joints: an action's entries, and those of `position` and `velocity`.
+        joints: Names of the controlled joints: an action's entries, and those of `position` and `velocity`. A world
+            whose state is not joints has the part `state` alone, and its actions' entries are named by number.
         sizes: Number of entries of each part, in order.
         control_period: Time between two actions [s].
+        cells: Number of states where the state is the number of one of them, else 0.
+        choices: Number of actions where an action is the number of one of them, else 0.
     """
 
     joints: tuple[str, ...]
     sizes: Mapping[str, int]
     control_period: float
+    cells: int = 0
+    choices: int = 0
 
     def __getitem__(self, part: str) -> slice:
         """Return where a part stands."""
@@ -30,6 +37,11 @@ class Layout:
                 return slice(start, start + size)
             start += size
         raise KeyError(part)
+
+    @property
+    def states(self) -> int:
+        """Number of entries of a state that is not joints; 0 for a robot."""
+        return self.sizes.get("state", 0)
 
     @property
     def columns(self) -> Mapping[str, tuple[str, ...]]:
@@ -44,3 +56,19 @@ class Layout:
 
 def _columns(part: str, size: int) -> tuple[str, ...]:
     return tuple(part + suffix for suffix in _SUFFIXES[size])
+
+
+def check_alike(sim: Layout, real: Layout) -> None:
+    """Refuse a real world with other joints, states or actions than the simulator.
+
+    Raises:
+        ConfigError: They differ.
+    """
+    for name, ours, theirs in (
+        ("states", sim.states, real.states),
+        ("discrete states", sim.cells, real.cells),
+        ("discrete actions", sim.choices, real.choices),
+        ("actions", len(sim.joints), len(real.joints)),
+    ):
+        if ours != theirs:
+            raise ConfigError("real", f"has {theirs} {name}, the simulator {ours}; a policy must fit both")

@@ -22,6 +22,7 @@ class Trajectory:
         reward: Reward of each action, shape (T,), if a task gave one.
         fell: Whether the robot lies on the ground, shape (T + 1,), if it can fall.
         sensors: Further columns of the contract by name, such as `gyro.x`, each of shape (T + 1,).
+        state: Of a world whose state is not joints, shape (T + 1, n_states); position and velocity are empty then.
     """
 
     time: np.ndarray
@@ -32,6 +33,7 @@ class Trajectory:
     reward: np.ndarray | None = None
     fell: np.ndarray | None = None
     sensors: Mapping[str, np.ndarray] = field(default_factory=dict)
+    state: np.ndarray | None = None
 
     def __len__(self) -> int:
         """Number of control steps T."""
@@ -54,7 +56,7 @@ class Batch:
 
     Attributes:
         episodes: The trajectories.
-        joints: Names of the action, position and velocity columns, in order.
+        joints: Names of the action, position and velocity columns, in order; by number where the state is not joints.
         control_period: Nominal time between two actions [s].
         metadata: Where the data come from: role, source, seed, world, policy and whatever else is known.
     """
@@ -63,6 +65,12 @@ class Batch:
     joints: tuple[str, ...]
     control_period: float
     metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def states(self) -> int:
+        """Number of entries of a state that is not joints; 0 for a robot."""
+        first = self.episodes[0].state
+        return 0 if first is None else int(first.shape[1])
 
     def __len__(self) -> int:
         """Number of episodes."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
+from gsl.errors import ConfigError
 
 
 @component
@@ -17,7 +18,13 @@ class ActionNoise:
     sd: Annotated[float, setting("standard deviation of the noise", unit="rad", ge=0, lower=0.005, upper=0.04)] = 0.02
 
     def start(self, layout: Layout, rng: np.random.Generator) -> ActionNoiseRun:
-        """Return the grounding at the beginning of an episode."""
+        """Return the grounding at the beginning of an episode.
+
+        Raises:
+            ConfigError: Actions are choices.
+        """
+        if layout.choices:
+            raise ConfigError("grounding", "its noise is for actions that are numbers; random_choice is for choices")
         return ActionNoiseRun(self.sd, rng)
 
 

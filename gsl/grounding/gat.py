@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
+from gsl.core.draws import Draws
 from gsl.core.grounding import grounded
 from gsl.core.history import Window
 from gsl.core.layout import Layout
@@ -21,9 +22,12 @@ from gsl.core.observation import Senses
 from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
+from gsl.grounding.states import StateTransformation, TableTransformation
+from gsl.models.counts import Counts
 from gsl.models.ensemble import Ensemble, Forward
 from gsl.models.head import Likelihood
 from gsl.models.inverse import InverseModel
+from gsl.models.states import StateForward
 
 REACH = 0.5  # [rad]; a servo told to go farther than this from the agent's target is at its torque limit anyway
 
@@ -53,7 +57,7 @@ class ActionTransformation:
         ),
     ] = None
 
-    def load(self, forward: Callable[[str], Forward], inverse: Callable[[str], InverseModel]) -> LoadedTransformation:
+    def load(self, forward: Callable[[str], Any], inverse: Callable[[str], Any]) -> AnyLoaded:
         """Return the grounding with its models, alpha 1 for `auto`.
 
         Args:
@@ -64,11 +68,18 @@ class ActionTransformation:
             ConfigError: The models are of different joints, look ahead differently far, or cannot do what is asked.
         """
         f, f_inv = forward(self.forward_model), inverse(self.inverse_model)
+        if getattr(f, "space", "joints") != getattr(f_inv, "space", "joints"):
+            raise ConfigError("inverse_model", "is of another kind of world than the forward model")
+        if isinstance(f, Counts):
+            return TableTransformation(f, f_inv, draws=self.predicts != "point")
         if self.predicts not in ("point", f.head.likelihood):
             problem = f"predicts a {f.head.likelihood}; train it with model.likelihood={self.predicts}"
             raise ConfigError("forward_model", problem)
         if self.gate is not None and not isinstance(f, Ensemble):
             raise ConfigError("gate", "needs an ensemble; train the forward model with model.members=5, say")
+        alpha = 1.0 if self.alpha == "auto" else self.alpha
+        if isinstance(f, StateForward):
+            return StateTransformation(f, f_inv, alpha, self.noise, self.predicts != "point")
         if f.joints != f_inv.joints:
             different = sorted(set(f.joints) ^ set(f_inv.joints)) or ["their order"]
             raise ConfigError(
@@ -83,7 +94,6 @@ class ActionTransformation:
         if unknown := [joint for joint in x if joint not in f.joints]:
             problem = f"the models have no joint of this name{did_you_mean(unknown[0], f.joints)}"
             raise ConfigError("x", problem, given=unknown[0])
-        alpha = 1.0 if self.alpha == "auto" else self.alpha
         return LoadedTransformation(f, f_inv, alpha, self.noise, x, self.predicts != "point", self.gate)
 
     def start(self, layout: Layout, rng: np.random.Generator) -> TransformationRun:
@@ -129,6 +139,9 @@ class LoadedTransformation:
         return TransformationRun(self, layout, rng)
 
 
+AnyLoaded = LoadedTransformation | StateTransformation | TableTransformation
+
+
 class TransformationRun:
     """The transformation in one episode.
 
@@ -137,6 +150,7 @@ class TransformationRun:
 
     def __init__(self, grounding: LoadedTransformation, layout: Layout, rng: np.random.Generator) -> None:
         self._grounding, self._rng = grounding, rng
+        self._draws = Draws(rng, grounding.forward.memory) if grounding.draws else None
         self._senses = Senses(layout, grounding.forward.history.sensors)
         n = len(layout.joints)
         x = layout.joints if grounding.x is None else grounding.x
@@ -164,8 +178,7 @@ class TransformationRun:
     def _wanted(self, window: np.ndarray) -> tuple[np.ndarray, float | np.ndarray]:
         """What f says, and how far to believe it: from 1 up to the gate to 0 at twice that, joint by joint."""
         gate, forward = self._grounding.gate, self._grounding.forward
-        rng = self._rng if self._grounding.draws else None
         if gate is None or not isinstance(forward, Ensemble):
-            return forward.effect(window, rng), 1.0
-        wanted, doubt = forward.judged(window, rng)
+            return forward.effect(window, self._draws), 1.0
+        wanted, doubt = forward.judged(window, self._draws)
         return wanted, np.clip(2.0 - doubt / gate, 0.0, 1.0)

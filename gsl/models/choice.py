@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from gsl.core.scaling import LEAST
 from gsl.models.config import ModelConfig
 from gsl.models.head import POINT, Head
 from gsl.models.linear import fit_linear, with_spread
@@ -23,16 +24,22 @@ class Choice(NamedTuple):
 
 
 def fit_network(
-    training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT
+    training: Samples,
+    validation: Samples,
+    config: ModelConfig,
+    *,
+    seed: int,
+    head: Head = POINT,
+    least: float = LEAST,
 ) -> Network:
     """Return a network of one family; the linear one, which needs no early stopping, learns from all samples."""
     if config.family == "linear":
         inputs, targets = (np.concatenate(both) for both in zip(training, validation, strict=True))
-        network = fit_linear(inputs, targets, ridge=config.ridge)
+        network = fit_linear(inputs, targets, ridge=config.ridge, least=least)
         return with_spread(network, inputs, targets) if head.draws else network
     from gsl.models.fitting import fit_mlp
 
-    return fit_mlp(training, validation, config, seed=seed, head=head)
+    return fit_mlp(training, validation, config, seed=seed, head=head, least=least)
 
 
 def best(config: ModelConfig, fit: Callable[[ModelConfig], M], score: Callable[[M], float]) -> tuple[M, Choice]:

@@ -34,6 +34,9 @@ class ModelConfig:
     horizon: Annotated[int, setting("ticks ahead it looks", ge=1, le=10)] = 1
     encoding: Annotated[Encoding, setting("angles as they are, or as sine and cosine")] = "plain"
     ridge: Annotated[float, setting("penalty on the weights of the linear model, scaled inputs", ge=1e-9)] = 1e-2
+    variables: Annotated[
+        tuple[int, ...] | Literal["all"], setting("state variables of interest of a gymnasium environment, by index")
+    ] = "all"
     likelihood: Annotated[
         Likelihood, setting("what a forward model says of the next state: a point, a Gaussian, a mixture of Gaussians")
     ] = "point"

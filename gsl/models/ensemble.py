@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.draws import Draws
 from gsl.core.history import History
 from gsl.models.forward import ForwardModel
 from gsl.models.head import Head
@@ -50,11 +51,16 @@ class Ensemble:
         """How its members' outputs are read."""
         return self.members[0].head
 
-    def effect(self, window: np.ndarray, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Return the expected change [rad], shape (n_joints,), or a draw of a member that `rng` chooses."""
-        if rng is None:
+    @property
+    def memory(self) -> np.ndarray:
+        """Of its members' errors, on average, see `ForwardModel`."""
+        return np.mean([member.memory for member in self.members], axis=0)
+
+    def effect(self, window: np.ndarray, draws: Draws | None = None) -> np.ndarray:
+        """Return the expected change [rad], shape (n_joints,), or a draw of a member that is drawn too."""
+        if draws is None:
             return np.mean([member.effect(window) for member in self.members], axis=0)
-        return self.members[int(rng.integers(len(self.members)))].effect(window, rng)
+        return self.members[draws.index(len(self.members))].effect(window, draws)
 
     def effects(self, windows: np.ndarray) -> np.ndarray:
         """Return the expected changes [rad], shape (N, n_joints), for many windows."""
@@ -67,10 +73,10 @@ class Ensemble:
         found: np.ndarray = -(np.logaddexp.reduce(each, axis=0) - np.log(len(each))) / width
         return found
 
-    def judged(self, window: np.ndarray, rng: np.random.Generator | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def judged(self, window: np.ndarray, draws: Draws | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return what `effect` does, and the members' disagreement, 1 where it is as large as data explain."""
         each = [member.effect(window) for member in self.members]
-        change = np.mean(each, axis=0) if rng is None else self.effect(window, rng)
+        change = np.mean(each, axis=0) if draws is None else self.effect(window, draws)
         return change, np.std(each, axis=0) / self.usual
 
     def arrays(self) -> dict[str, np.ndarray]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 
 from gsl.core.angles import Encoding, decode, encode
+from gsl.core.draws import Draws
 from gsl.core.history import History
 from gsl.models.head import Head
 from gsl.models.network import Network
@@ -25,6 +26,7 @@ class ForwardModel:
         encoding: Of its outputs.
         horizon: Ticks ahead.
         head: How its outputs are read.
+        memory: Correlation of its errors from one tick to the next, which draws keep, shape (n_outputs,).
     """
 
     kind: ClassVar[str] = "forward_model"
@@ -35,15 +37,16 @@ class ForwardModel:
     encoding: Encoding = "plain"
     horizon: int = 1
     head: Head = Head()
+    memory: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
     def __post_init__(self) -> None:
         """Hold network and windows together."""
         check_sizes(self.network, self.history, self.joints, self.encoding, self.head)
 
-    def effect(self, window: np.ndarray, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Return the expected change [rad], shape (n_joints,); with `rng`, one drawn from what may happen."""
+    def effect(self, window: np.ndarray, draws: Draws | None = None) -> np.ndarray:
+        """Return the expected change [rad], shape (n_joints,); with `draws`, one of what may happen."""
         raw = self.network.predict(window)
-        return decode(self.head.expected(raw) if rng is None else self.head.drawn(raw, rng), self.encoding)
+        return decode(self.head.expected(raw) if draws is None else self.head.drawn(raw, draws), self.encoding)
 
     def effects(self, windows: np.ndarray) -> np.ndarray:
         """Return the expected changes [rad], shape (N, n_joints), for many windows."""
@@ -59,7 +62,7 @@ class ForwardModel:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint stores."""
-        return self.network.arrays()
+        return {**self.network.arrays(), "memory": self.memory}
 
     def description(self) -> dict[str, Any]:
         """Return what a checkpoint says of the arrays."""
@@ -77,7 +80,9 @@ class ForwardModel:
         """Return the model that a checkpoint holds."""
         network, history = Network.from_arrays(arrays), history_from(about["history"])
         head = Head(about["likelihood"], about["components"])
-        return cls(network, history, tuple(about["joints"]), about["encoding"], about["horizon"], head)
+        return cls(
+            network, history, tuple(about["joints"]), about["encoding"], about["horizon"], head, arrays["memory"]
+        )
 
 
 def history_from(stored: Mapping[str, Any]) -> History:

@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from gsl.core.draws import Draws
 from gsl.core.scaling import Scaling
 
 Likelihood = Literal["point", "gaussian", "mixture"]
@@ -87,13 +88,13 @@ class Head:
         found: np.ndarray = -highest - np.log(np.exp(each - highest[:, None]).sum(axis=-1))
         return found
 
-    def drawn(self, raw: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    def drawn(self, raw: np.ndarray, draws: Draws) -> np.ndarray:
         """Return one draw, shape (m,), of raw outputs of shape (width,)."""
         if self.likelihood == "point":
             return raw
         weights, means, sds = self.parts(raw)
-        chosen = int(np.searchsorted(np.cumsum(weights)[:-1], rng.random())) if self.components > 1 else 0
-        drawn: np.ndarray = means[chosen] + sds[chosen] * rng.standard_normal(means.shape[1])
+        chosen = int(np.searchsorted(np.cumsum(weights)[:-1], draws.uniform())) if self.components > 1 else 0
+        drawn: np.ndarray = means[chosen] + sds[chosen] * draws.normal(means.shape[1])
         return drawn.astype(raw.dtype)
 
 

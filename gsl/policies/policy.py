@@ -33,10 +33,23 @@ class Policy(Protocol):
         """Size of a step in each parameter that is as bold as in any other."""
 
     def posture(self, parameters: np.ndarray, layout: Layout) -> np.ndarray:
-        """Return the joint positions where an episode starts [rad], shape (n_joints,)."""
+        """Return the joint positions where an episode starts [rad], shape (n_joints,); empty without joints."""
 
     def start(self, parameters: np.ndarray, layout: Layout) -> PolicyRun:
         """Return the policy at the beginning of an episode."""
+
+
+@runtime_checkable
+class Sized(Protocol):
+    """A policy with as many parameters as a world has states and actions."""
+
+    def sized(self, layout: Layout) -> Policy:
+        """Return the policy for a world."""
+
+
+def sized(policy: Policy, layout: Layout) -> Policy:
+    """Return a policy that knows its world, if it has to."""
+    return policy.sized(layout) if isinstance(policy, Sized) else policy
 
 
 def neighbour(policy: Policy, parameters: np.ndarray, spread: float, rng: np.random.Generator) -> np.ndarray:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from gsl.report.markdown import in_unit
 from gsl.report.style import COMMAND, INK, REAL, SIMULATION, figure, headline, label_ends, look, save
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str |
         for axes, one in zip(panels, searches, strict=True):
             _draw(axes, one)
             axes.tick_params(labelleft=True)
-        panels[0].set_ylabel(f"value [{unit}]")
+        panels[0].set_ylabel(in_unit("value", unit))
         headline(whole, title or _finding(searches))
     return whole
 

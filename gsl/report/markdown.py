@@ -8,3 +8,8 @@ from collections.abc import Sequence
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table, one line a row, with a line end after the last."""
     return "".join(f"| {' | '.join(line)} |\n" for line in (columns, ["---"] * len(columns), *rows))
+
+
+def in_unit(title: str, unit: str) -> str:
+    """Return a title with its unit in brackets, if it has one."""
+    return f"{title} [{unit}]" if unit else title

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gsl.report.diagnosis_text import summary_lines
+from gsl.report.markdown import in_unit
 from gsl.stages.diagnosis_files import report_of
 from gsl.stages.headline import Unit, falls, unit_of
 from gsl.stages.measured import cells, columns
@@ -38,7 +39,7 @@ def account(artifact: Artifact) -> list[Told]:
 def _collect(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     row = {"episodes": metrics["episodes"], "steps": f"{metrics['steps']:,}", "falls": metrics["falls"]}
     if metrics["value"] is not None:
-        row[f"value of π0 [{unit.name}]"] = unit.bare(metrics["value"])
+        row[in_unit("value of π0", unit.name)] = unit.bare(metrics["value"])
     return Told("trajectories", tuple(row), [tuple(map(str, row.values()))])
 
 
@@ -77,7 +78,7 @@ def _optimize(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
         for one in document["policies"]
         if one["generation"]
     ]
-    titles = ("generation", "policy", f"in simulation [{unit.name}]")
+    titles = ("generation", "policy", in_unit("in simulation", unit.name))
     problems = _problems(folder)
     return Told("best of each generation", titles, rows, f"the grounding: {problems}" if problems else None)
 
@@ -125,7 +126,7 @@ def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
         f"real data: {air}{learned} episodes to learn from, {measured} to measure, {spent} in all",
         f"plots: {folder.as_posix()}/ ({plots})",
     ]
-    return Told(f"grounded simulation learning [{unit.name}]", titles, rows, "\n".join(below))
+    return Told(in_unit("grounded simulation learning", unit.name), titles, rows, "\n".join(below))
 
 
 def _compare(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
@@ -142,7 +143,7 @@ def _reproduce(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 
 
 def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    return Told(f"worlds [{unit.name}]", *_markdown(folder / "table.md"))
+    return Told(in_unit("worlds", unit.name), *_markdown(folder / "table.md"))
 
 
 def _blind_reveal(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:

@@ -14,6 +14,7 @@ from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
+from gsl.optimizers.optimizer import Learner
 from gsl.policies.policy import Policy
 from gsl.stages.collect import Collect
 from gsl.stages.diagnosis_files import read_diagnosis
@@ -60,7 +61,7 @@ class Chain:
     forward_model: ModelConfig
     inverse_model: ModelConfig
     inverse_method: Literal["regression", "solve"]
-    optimizer: CmaEs
+    optimizer: CmaEs | Learner
     budget: Budget
     diagnosis: DiagnosisPlan
     accept: bool

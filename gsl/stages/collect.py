@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -11,9 +12,10 @@ import numpy as np
 from gsl.core.described import described
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
-from gsl.core.trajectory import Batch
+from gsl.core.trajectory import Batch, Trajectory
 from gsl.grounding.ane import ActionNoise
-from gsl.policies.policy import Policy, neighbour
+from gsl.grounding.random_choice import RandomChoice
+from gsl.policies.policy import Policy, neighbour, sized
 from gsl.policies.programme import Piece, Programmed
 from gsl.stages.choices import PolicyChoice
 from gsl.stages.population import Job, Workers, trajectories
@@ -42,10 +44,16 @@ class Collect:
     episodes: Annotated[int, setting("episodes of the policy itself", ge=1)]
     neighbours: Annotated[int, setting("episodes of perturbed policies", ge=0)] = 0
     spread: Annotated[float, setting("size of the perturbation, in units of a parameter's scale", ge=0)] = 0.07
-    action_noise: Annotated[float, setting("Gaussian noise on every action", unit="rad", ge=0)] = 0.0
+    action_noise: Annotated[
+        float, setting("Gaussian noise on every action; where actions are choices, the chance of another one", ge=0)
+    ] = 0.0
     initial: Annotated[str | None, setting("policies file or artifact of the policy; none for its start values")] = None
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
+
+    def __post_init__(self) -> None:
+        """Tell the policy its world."""
+        object.__setattr__(self, "policy", sized(self.policy, self.world.layout))
 
     def parents(self) -> Mapping[str, Path]:
         """Return the artifact that the parameters come from and the file that is played, if any."""
@@ -55,7 +63,8 @@ class Collect:
         """Write one parquet file."""
         layout = self.world.layout
         policy = playing(self.policy, layout)
-        scenario = Scenario(self.world, self.task, policy, self.role, ActionNoise(sd=self.action_noise))
+        noise = RandomChoice(self.action_noise) if layout.choices else ActionNoise(sd=self.action_noise)
+        scenario = Scenario(self.world, self.task, policy, self.role, noise)
         pieces = policy.programme if isinstance(policy, Programmed) else self._pieces()
         jobs = [
             Job(piece.parameters, derived_seed(self.seed, self.kind, self.role, index))
@@ -64,18 +73,19 @@ class Collect:
         with console.progress(len(jobs), f"collecting in the {self.role} world") as progress:
             episodes = trajectories(scenario, jobs, workers=self.workers, progress=progress)
         about = {
-            "robot": getattr(self.world, "robot", ""),
+            "robot": getattr(self.world, "robot", getattr(self.world, "env_id", "")),
             "role": self.role,
             "source": "gsl collect",
             "seed": self.seed,
             "world": described(self.world),
             "policy": described(self.policy),
             "action_noise": self.action_noise,
+            **({"cells": layout.cells, "choices": layout.choices} if layout.states else {}),
             "episodes": [
                 {"policy": piece.label, "parameters": piece.parameters.tolist(), **piece.about} for piece in pieces
             ],
         }
-        write(folder / FILE, Batch(tuple(episodes), layout.joints, layout.control_period, about))
+        write(folder / FILE, Batch(_alike(episodes), layout.joints, layout.control_period, about))
         steps, own = sum(map(len, episodes)), [one.value for one in episodes[: self.episodes]]
         return {
             "episodes": len(jobs),
@@ -93,3 +103,12 @@ class Collect:
         near = [neighbour(self.policy, parameters, self.spread, rng) for _ in range(self.neighbours)]
         itself = [Piece("pi0", parameters, {})] * self.episodes
         return (*itself, *(Piece(f"neighbour_{index + 1:02d}", theta, {}) for index, theta in enumerate(near)))
+
+
+def _alike(episodes: list[Trajectory]) -> tuple[Trajectory, ...]:
+    """Let all episodes say what was carried out, if one does."""
+    if all(one.grounded_action is None for one in episodes):
+        return tuple(episodes)
+    return tuple(
+        one if one.grounded_action is not None else replace(one, grounded_action=one.action) for one in episodes
+    )

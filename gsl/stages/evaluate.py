@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.grounding.none import NoGrounding
-from gsl.policies.policy import Policy
+from gsl.policies.policy import Policy, sized
 from gsl.stages.choices import FILE, policies, records, vector
 from gsl.stages.measured import falls, gain, mean, row, summary
 from gsl.stages.population import Episode, Job, Workers, episodes
@@ -47,6 +47,10 @@ class Evaluate:
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
+    def __post_init__(self) -> None:
+        """Tell the policy its world."""
+        object.__setattr__(self, "policy", sized(self.policy, self.world.layout))
+
     def parents(self) -> Mapping[str, Path]:
         """Return where the policies come from."""
         return {"policies": resolve(self.policies)}
@@ -71,6 +75,7 @@ class Evaluate:
             "returned_value_sim": found[best].value_sim,
             "baseline": summary(fresh[0]),
             "returned": summary(fresh[best]),
+            "last": summary(tried[-1]),
             "gain": gain(fresh[best], fresh[0]),
             "failed_check": [found[index].name for index, done in checked.items() if not self._stable(done)],
             "stable_policies": len(stable),
@@ -82,9 +87,12 @@ class Evaluate:
     def _checked(
         self, found: Sequence[PolicyRecord], tried: Sequence[list[Episode]], progress: Any
     ) -> Iterator[tuple[int, list[Episode]]]:
-        """Yield the checks of stable policies that beat the baseline, fastest first, up to the first without a fall."""
+        """Yield the checks of stable policies that beat the baseline, up to the first that stays stable.
+
+        The fastest comes first; where falls are tolerated, of those that fell least.
+        """
         better = [index for index, done in enumerate(tried) if self._stable(done) and mean(done) > mean(tried[0])]
-        for index in sorted(better, key=lambda index: -mean(tried[index])):
+        for index in sorted(better, key=lambda index: (falls(tried[index]), -mean(tried[index]))):
             done = self._measured(found[index], _CHECK, self.check, progress)
             yield index, done
             if self._stable(done):

@@ -19,11 +19,14 @@ from gsl.grounding.randomised import RandomisedEffects, randomised
 from gsl.report.grounding_errors import grounding_errors
 from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.effects_check import check_effects
-from gsl.stages.grounding_check import ALPHAS, REPLAYS, TITLES, check, largest_stable
+from gsl.stages.grounding_check import ALPHAS, REPLAYS, TITLES, allowed_falls, check, largest_stable
 from gsl.stages.grounding_joints import fewest
 from gsl.stages.grounding_replay import places
+from gsl.stages.grounding_states import TITLES as VALUE_TITLES
+from gsl.stages.grounding_states import uncharged, value_report
 from gsl.stages.rollout import Scenario
 from gsl.stages.train_forward import HELDOUT, VALIDATION
+from gsl.stages.training import of_policy
 from gsl.storage.documents import write_json
 from gsl.storage.models import model_file, read_forward_model, read_inverse_model
 from gsl.storage.references import resolve
@@ -52,7 +55,7 @@ def settled(scenario: Scenario, found: Mapping[str, Any]) -> Scenario:
         world = switched_on(scenario.world, grounding.load(read_diagnosis))
         return settled(replace(scenario, world=world, grounding=grounding.inner), found)
     if isinstance(grounding, ActionTransformation):
-        chosen = replace(grounding, alpha=found["alpha"], x=tuple(found["x"]))
+        chosen = replace(grounding, alpha=found["alpha"], x=tuple(found["x"])) if "x" in found else grounding
         return replace(scenario, grounding=chosen.load(read_forward_model, read_inverse_model))
     if isinstance(grounding, RandomisedEffects):
         world = randomised(scenario.world, grounding, found["width"])
@@ -119,17 +122,22 @@ class Gate:
         self.console.status("checking the grounded simulator against held-out real trajectories")
         loaded = settings.load(read_forward_model, read_inverse_model)
         folder = model_file(settings.forward_model, "forward_model").parent
+        if not isinstance(loaded, LoadedTransformation):
+            return self._of_states(replace(scenario, grounding=loaded), read(folder / HELDOUT))
         if settings.x == "auto":
             loaded = replace(loaded, x=self._chosen(scenario, loaded, read(folder / VALIDATION)))
         ready = replace(scenario, grounding=loaded)
+        heldout = read(folder / HELDOUT)
         if settings.alpha == "auto":
             tried = {alpha: replace(ready, grounding=replace(loaded, alpha=alpha)) for alpha in ALPHAS}
-            ready = tried[largest_stable(tried, self.parameters, derived_seed(self.seed, "alpha"))]
-        heldout = folder / HELDOUT
+            seed, allowed = derived_seed(self.seed, "alpha"), allowed_falls(heldout)
+            ready = tried[largest_stable(tried, self.parameters, seed, allowed=allowed)]
         try:
-            report = check(ready, self.parameters, read(heldout), derived_seed(self.seed, "check"))
+            report = check(ready, self.parameters, heldout, derived_seed(self.seed, "check"))
         except InputError as error:
-            raise error if isinstance(error, TrajectoryError) else TrajectoryError(heldout, str(error)) from error
+            if isinstance(error, TrajectoryError):
+                raise
+            raise TrajectoryError(folder / HELDOUT, str(error)) from error
         write_json(self.folder / REPORT, report.metrics())
         grounding_errors(self.folder / FIGURE, report.by_joint())
         self.console.table("grounded simulator against held-out real trajectories", TITLES, report.rows())
@@ -137,6 +145,18 @@ class Gate:
             self.console.status(report.reach.told)
         self._judge(report.problems, "Collect more data")
         return ready, {"alpha": report.alpha, "x": loaded.x, "grounding_acceptable": report.acceptable}
+
+    def _of_states(self, ready: Scenario, heldout: Batch) -> tuple[Scenario, Mapping[str, Any]]:
+        """Compare what π0 is worth with held-out real episodes."""
+        if uncharged(ready):
+            problem = "the reward may charge for the grounded action instead of the agent's"
+            self.console.status(f"warning: {problem}; say what it charges with world.control_cost")
+        real = of_policy(heldout, pi0=True) or heldout.episodes
+        report = value_report(ready, self.parameters, real, derived_seed(self.seed, "check"))
+        write_json(self.folder / REPORT, report.metrics())
+        self.console.table("π0 in the grounded simulator", VALUE_TITLES, report.rows())
+        self._judge(report.problems, "Collect more data")
+        return ready, {"grounding_acceptable": not report.problems}
 
     def _chosen(self, scenario: Scenario, loaded: LoadedTransformation, validation: Batch) -> tuple[str, ...]:
         """Return the joints to ground, and tell them."""

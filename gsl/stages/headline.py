@@ -79,6 +79,8 @@ def _identify(metrics: Metrics, unit: Unit) -> str:
 
 
 def _train_forward(metrics: Metrics, unit: Unit) -> str:
+    if metrics.get("space"):
+        return _of_states(metrics)
     names = {"pi0": "of π0", "off_pi0": "off π0"}
     errors = {
         names[group]: measured.get("free_run_deg", measured["one_step_deg"])
@@ -87,7 +89,18 @@ def _train_forward(metrics: Metrics, unit: Unit) -> str:
     return f"{metrics['family']}, held out: " + ", ".join(f"{error:.2f}° {group}" for group, error in errors.items())
 
 
+def _of_states(metrics: Metrics) -> str:
+    if metrics["space"] == "counts":
+        return f"{metrics['steps']:,} steps counted, {100 * metrics['visited']:.0f} % of all states and actions visited"
+    found = metrics["heldout"]
+    shown = {"r2": "of the variance", "action_r2": "of the variance", "recovered_choices": "of the choices"}
+    told = next(f"{100 * found[name]:.1f} % {what}" for name, what in shown.items() if name in found)
+    return f"{metrics['family']}, held out: {told}"
+
+
 def _train_inverse(metrics: Metrics, unit: Unit) -> str:
+    if metrics.get("space"):
+        return _of_states(metrics)
     return f"{metrics['family']}, held out: {metrics['heldout']['recovered_action_deg']:.2f}° of action"
 
 

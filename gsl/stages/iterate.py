@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
@@ -13,13 +14,16 @@ from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
-from gsl.policies.policy import Policy
+from gsl.optimizers.optimizer import Learner
+from gsl.policies.policy import Policy, sized
+from gsl.report.markdown import in_unit
 from gsl.report.render import walk_strip
 from gsl.stages.chain import Budget, Chain
 from gsl.stages.choices import FILE, policies, record
 from gsl.stages.diagnosis_plan import DiagnosisPlan, flown
 from gsl.stages.grounding_gate import settled
 from gsl.stages.iteration_report import COLUMNS, Rounds, write_curve, write_table, write_trace
+from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers
 from gsl.stages.rollout import Scenario
 from gsl.stages.train_forward import HELDOUT
@@ -53,14 +57,20 @@ class Iterate:
     inverse_model: Annotated[ModelConfig, setting("how the simulator's inverse is learned")]
     inverse_method: Annotated[Literal["regression", "solve"], setting("what the inverse is (train-inverse --help)")]
     grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
-    optimizer: Annotated[CmaEs, setting("what improves the parameters")]
+    optimizer: Annotated[CmaEs | Learner, setting("what improves the parameters")]
     budget: Annotated[Budget, setting("episodes of each part")]
     diagnosis: Annotated[DiagnosisPlan, setting("how grounding=effects finds the effects")]
     iterations: Annotated[int, setting("most iterations", ge=1)] = 1
+    pretrained: Annotated[bool, setting("improve π0 in the plain simulator before the first iteration")] = False
     beside: Annotated[bool, setting("show the result without grounding beside it")] = False
     accept: Annotated[bool, setting("go on with a grounding that fails its check")] = False
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
+
+    def __post_init__(self) -> None:
+        """Tell the policy its world; refuse two worlds that no policy could act in both of."""
+        object.__setattr__(self, "policy", sized(self.policy, self.sim.layout))
+        check_alike(self.sim.layout, self.real.layout)
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
@@ -69,10 +79,11 @@ class Iterate:
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run the iterations, write the policy they end with, the table and the plots."""
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
-        with console.live_table(f"grounded simulation learning [{self.task.unit}]", COLUMNS) as table:
+        with console.live_table(in_unit("grounded simulation learning", self.task.unit), COLUMNS) as table:
+            start = self._start(home, console)
             grounding = self._diagnosed(home, rounds, console)
             for number in range(1, self.iterations + 1):
-                evaluation, ready = self._iteration(home, number, grounding, rounds, console)
+                evaluation, ready = self._iteration(home, number, grounding, rounds.last or start, console)
                 first = ready if number == 1 else first
                 for row in rounds.add(evaluation, self._collected_real):
                     table.row(*row)
@@ -81,12 +92,13 @@ class Iterate:
             if self.beside:
                 for row in rounds.add_beside(self._ungrounded(home, console)):
                     table.row(*row)
-        if rounds.best is None:
+        returned = Path(rounds.last) / FILE if rounds.last else Path(start) if start else None
+        if returned is None:
             write_policies(
                 folder / FILE, policies(self.policy, self.task, [record(self.policy, "pi0", self.policy.initial)])
             )
         else:
-            (folder / FILE).write_bytes((rounds.best.folder / FILE).read_bytes())
+            (folder / FILE).write_bytes(returned.read_bytes())
         write_table(folder, rounds)
         write_curve(folder, rounds)
         if self.learned:
@@ -120,12 +132,18 @@ class Iterate:
     def _collected_real(self) -> int:
         return (self.budget.real_episodes + self.budget.real_neighbours) if self.learned else 0
 
+    def _start(self, home: Path, console: Any) -> str | None:
+        """Return the file of π0, none for the policy's start values."""
+        if not self.pretrained:
+            return None
+        found = self.chain.search(home / "pretrained", NoGrounding(), None, self.seed, console)
+        return str(found.folder / BEST)
+
     def _iteration(
-        self, home: Path, number: int, grounding: Grounding, rounds: Rounds, console: Any
+        self, home: Path, number: int, grounding: Grounding, previous: str | None, console: Any
     ) -> tuple[Artifact, Grounding]:
         """Return the evaluation that ends one iteration, and the grounding with its models."""
         place, seed = home / f"iteration_{number:02d}", self.seed + 1000 * (number - 1)
-        previous = None if rounds.best is None else str(rounds.best.folder)
         ready = self.chain.ready(place, grounding, previous, seed, console)
         found = self.chain.search(place / "optimize", ready, previous, seed, console)
         return self.chain.measure(place / "evaluate", found, seed, console), ready
@@ -140,7 +158,8 @@ class Iterate:
 
     def _ungrounded(self, home: Path, console: Any) -> Artifact:
         place = home / FIRST
-        found = self.chain.search(place / "optimize_none", NoGrounding(), None, self.seed, console)
+        start = self._start(home, console)
+        found = self.chain.search(place / "optimize_none", NoGrounding(), start, self.seed, console)
         return self.chain.measure(place / "evaluate_none", found, self.seed, console)
 
     def _trace(self, folder: Path, home: Path, ready: Grounding) -> None:
@@ -150,6 +169,7 @@ class Iterate:
         scenario = settled(Scenario(self.sim, self.task, self.policy, SIM, ready), search.metrics)
         heldout = read(place / "train_forward" / HELDOUT)
         walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
-        assert isinstance(scenario.world, BulletWorld), "the check of the grounding has replayed in it"
+        if not isinstance(scenario.world, BulletWorld):
+            return  # there are no joints to draw
         write_trace(folder, scenario.world, scenario.grounding, walk)
         walk_strip(scenario.world.plant.robot, walk, folder / "walk.png")

@@ -55,6 +55,11 @@ class Rounds:
         """The paper's stop rule, with the interval: is v(pi_i) - v(pi_i-1) surely above 0?"""
         return bool(self._done[-1].metrics["gain"]["interval"][0] > 0.0)
 
+    @property
+    def last(self) -> str | None:
+        """Where the policy is that the next iteration goes on from, none while π0 is the best."""
+        return None if self.best is None else str(self.best.folder)
+
     def diagnosed(self, flight: Flight) -> None:
         """Take in the diagnosis on which the iterations stand; what it cost goes into the first one's row."""
         self._flight = flight
@@ -80,7 +85,9 @@ class Rounds:
     @property
     def verdict(self) -> str:
         """The result in a sentence or two, with what it cost."""
-        cost = f"{self._spent} real episodes were spent."
+        air = self._flight.episodes if self._flight else 0
+        flown = f" and {air} motions in the air" if air else ""
+        cost = f"{self._spent - air} real episodes{flown} were spent."
         if self.best is None:
             return f"No improvement over π0 was found: π0 is returned. {cost}"
         after, before = self.best.metrics["returned"], self._done[0].metrics["baseline"]
@@ -89,8 +96,9 @@ class Rounds:
         falls = f"{after['falls']} falls in {after['episodes']} fresh episodes"
         factor, unit = (100.0 / before["value"], "% of π0") if before["interval"][0] > 0.0 else (shown, self._task.unit)
         low, high = (factor * bound for bound in self.best.metrics["gain"]["interval"])
-        last = f"gain of the last step {low:+.0f} to {high:+.0f} {unit} (95 %)"
-        return f"In real: π0 {values[0]:.1f}, returned {values[1]:.1f} {self._task.unit}, {last}, {falls}. {cost}"
+        last = " ".join(filter(None, [f"gain of the last step {low:+.0f} to {high:+.0f}", unit, "(95 %)"]))
+        returned = f"{values[1]:.1f} {self._task.unit}".rstrip()
+        return f"In real: π0 {values[0]:.1f}, returned {returned}, {last}, {falls}. {cost}"
 
     def metrics(self) -> Mapping[str, Any]:
         """Return the figures of all rounds."""

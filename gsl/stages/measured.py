@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gsl.core.statistics import difference_interval, mean_interval
+from gsl.report.markdown import in_unit
 from gsl.stages.population import Episode
 from gsl.storage.policies import PolicyRecord
 
@@ -51,7 +52,8 @@ def gain(after: Sequence[Episode], before: Sequence[Episode]) -> dict[str, Any]:
 
 def columns(first: Mapping[str, Any], unit: str) -> list[str]:
     """Return the titles of `cells`."""
-    return ["policy", f"in simulation [{unit}]", f"in real [{unit}]", "95 % interval", "falls", *first["outcome"]]
+    places = [in_unit(place, unit) for place in ("in simulation", "in real")]
+    return ["policy", *places, "95 % interval", "falls", *first["outcome"]]
 
 
 def cells(one: Mapping[str, Any], name: str, shown: float) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -11,10 +11,11 @@ import numpy as np
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
-from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.optimizers.cma_es import CmaEs
-from gsl.policies.policy import Policy
+from gsl.optimizers.optimizer import Learner
+from gsl.policies.policy import Policy, sized
 from gsl.stages.choices import FILE, PolicyChoice, policies, record, vector
 from gsl.stages.drift import drifts, read_region
 from gsl.stages.generations import FILE as PROGRESS
@@ -22,10 +23,13 @@ from gsl.stages.generations import Generation, GenerationLog
 from gsl.stages.grounding_gate import Gate, grounding_parents
 from gsl.stages.population import Job, Workers, episodes
 from gsl.stages.rollout import Scenario
+from gsl.stages.simulator import GroundedSimulator
 from gsl.storage.models import model_file
 from gsl.storage.policies import PolicyRecord, write_policies
 from gsl.tasks.task import SIM, Task
 from gsl.worlds.world import World
+
+BEST = "best_in_simulation.json"
 
 
 @component
@@ -39,28 +43,49 @@ class Optimize:
     task: Annotated[Task, setting("what is to be maximised")]
     policy: Annotated[Policy, setting("what is to be improved")]
     grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
-    optimizer: Annotated[CmaEs, setting("what improves the parameters")]
+    optimizer: Annotated[CmaEs | Learner, setting("what improves the parameters")]
     rollouts: Annotated[int, setting("episodes of each candidate", ge=1)]
     initial: Annotated[str | None, setting("policies file or artifact to start from; none for the start values")] = None
     accept: Annotated[bool, setting("go on with a grounding that fails its check")] = False
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
+    def __post_init__(self) -> None:
+        """Tell the policy its world."""
+        object.__setattr__(self, "policy", sized(self.policy, self.world.layout))
+
     def parents(self) -> Mapping[str, Path]:
         """Return the start policy and what the grounding is made of."""
         return {**PolicyChoice(self.policy, self.initial).parents("initial"), **grounding_parents(self.grounding)}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
-        """Write the generations' log and the policies: π0 first, then the best of each generation."""
+        """Write the policies: π0, then one of each generation; and which of these is worth most in simulation."""
         first = PolicyChoice(self.policy, self.initial).parameters()
         bare = Scenario(self.world, self.task, self.policy, SIM, self.grounding)
         scenario, checked = Gate(first, folder, console, self.accept, self.seed).passed(bare)
-        log = GenerationLog(folder)
-        search = self.optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
         found = [record(self.policy, "pi0" if self.initial is None else "start", first)]
-        total = self.optimizer.generations * self.optimizer.candidates * self.rollouts
+        if isinstance(self.optimizer, CmaEs):
+            found += self._searched(self.optimizer, scenario, first, GenerationLog(folder), console)
+        else:
+            found += self._learned(self.optimizer, scenario, first, console)
+        write_policies(folder / FILE, policies(self.policy, self.task, found))
+        best = max(found[1:], key=lambda one: one.value_sim or -np.inf)
+        write_policies(folder / BEST, policies(self.policy, self.task, [best]))
+        return {
+            "generations": len(found) - 1,
+            "best_value_sim": best.value_sim,
+            **checked,
+            **self._drift(scenario, found, console),
+        }
+
+    def _searched(
+        self, optimizer: CmaEs, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Any
+    ) -> Iterator[PolicyRecord]:
+        """Yield the best candidate of each generation of a search."""
+        search = optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
+        total = optimizer.generations * optimizer.candidates * self.rollouts
         with console.progress(total, "optimising in simulation") as progress:
-            for index in range(self.optimizer.generations):
+            for index in range(optimizer.generations):
                 candidates = search.ask()
                 generation = log.read(index)
                 if generation is None:
@@ -70,20 +95,23 @@ class Optimize:
                     progress.advance(len(candidates) * self.rollouts)
                 search.tell(generation.values)
                 best = int(np.argmax(generation.values))
-                found.append(self._record(index, candidates[best], generation.values[best]))
-        write_policies(folder / FILE, policies(self.policy, self.task, found))
-        best_value = max(p.value_sim or -np.inf for p in found)
-        return {
-            "generations": len(found) - 1,
-            "best_value_sim": best_value,
-            **checked,
-            **self._drift(scenario, found, console),
-        }
+                yield self._record(index, candidates[best], generation.values[best])
+
+    def _learned(
+        self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Any
+    ) -> Iterator[PolicyRecord]:
+        """Yield what a learner has come to after each generation."""
+        seed, simulator = derived_seed(self.seed, self.kind), GroundedSimulator(scenario, first)
+        steps = optimizer.learn(simulator, self.policy, first, seed, bold=self.initial is None)
+        with console.progress(optimizer.generations * self.rollouts, "learning in simulation") as progress:
+            for index, parameters in enumerate(steps):
+                value = self._evaluated(scenario, [parameters], index, progress).values[0]
+                yield self._record(index, parameters, value)
 
     def _drift(self, scenario: Scenario, found: Sequence[PolicyRecord], console: Any) -> Mapping[str, Any]:
         """Return and tell how far the policies have moved from what a learned grounding has seen."""
         inner = innermost(self.grounding)
-        if not isinstance(inner, ActionTransformation):
+        if not (isinstance(inner, ActionTransformation) and isinstance(scenario.grounding, LoadedTransformation)):
             return {}
         known = read_region(model_file(inner.forward_model, "forward_model").parent)
         shares = drifts(scenario, known, {one.name: vector(self.policy, one) for one in found}, self.seed)

@@ -25,6 +25,9 @@ LINEAR_WALK = {"none": ("1.3", "3 of 5", "1"), "gat": ("4.95", "5 of 5", "3")}
 NOTHING = ("", "", "")
 
 
+AT_THE_END, ON_AVERAGE = "distance [deg]", "mean distance [deg]"  # of the arms
+
+
 @component
 class Table2:
     """Improvement over π0 in real, trials without a stable improvement, best generation; and what we add to it.
@@ -149,20 +152,23 @@ class LinearWalkTable:
 
 @component
 class Figure5:
-    """Final distance of the arms to their goal."""
+    """Distance of the arms to their goal with the last generation's policy, which nothing real has chosen."""
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the figure's values as a table."""
         rows = []
         for one in summaries(trials):
-            distances = [_distance(trial.outcome) for trial in trials if trial.cell == one[:4]]
-            found = mean_interval(distances)
-            rows.append((one.world, one.method, f"{found.mean:.2f}", told(found), f"{np.max(distances):.2f}"))
-        return table(("real world", "grounding", "final distance [°]", "95 % interval", "worst trial [°]"), rows)
+            own = [trial.last for trial in trials if trial.cell == one[:4]]
+            on_average, at_the_end = (mean_interval([last[name] for last in own]) for name in (ON_AVERAGE, AT_THE_END))
+            cells = [cell for found in (on_average, at_the_end) for cell in (f"{found.mean:.2f}", told(found))]
+            above = sum(last["above [share]"] > 0.0 for last in own)
+            rows.append((one.world, one.method, *cells, f"{above} of {len(own)}"))
+        titles = ("mean distance [°]", "95 % interval", "final distance [°]", "95 % interval", "trials above the goal")
+        return table(("real world", "grounding", *titles), rows)
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
-        """Return the final distances."""
-        return _distances(trials)
+        """Return the mean distances."""
+        return "mean distance in real [°]", [trial.last[ON_AVERAGE] for trial in trials]
 
 
 def worth(trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:

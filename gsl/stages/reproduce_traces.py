@@ -114,7 +114,9 @@ def trained(iterate: Iterate, home: Path, console: Any) -> LoadedTransformation:
     assert isinstance(iterate.grounding, ActionTransformation), "only a transformation of actions can be drawn"
     chain = replace(iterate.chain, accept=True)
     ready = chain.trained(home, iterate.grounding, None, iterate.seed, console)
-    return ready.load(read_forward_model, read_inverse_model)
+    loaded = ready.load(read_forward_model, read_inverse_model)
+    assert isinstance(loaded, LoadedTransformation), "the world is a robot"
+    return loaded
 
 
 def _played(

@@ -17,6 +17,8 @@ from gsl.tasks.task import Task
 from gsl.worlds.grounded import GroundedEnv
 from gsl.worlds.world import World
 
+LONGEST = 100_000  # steps of an episode that nothing ends
+
 
 @dataclass(frozen=True)
 class Scenario:
@@ -38,7 +40,8 @@ class Scenario:
     @property
     def ticks(self) -> int:
         """Control steps of an episode that does not end early; an open-loop policy has its own number."""
-        return round(self.task.duration / self.world.layout.control_period)
+        planned = self.task.duration / self.world.layout.control_period
+        return round(min(planned, LONGEST))
 
     def make(self) -> gymnasium.Env:
         """Build the environment that `rollout` acts in."""
@@ -58,24 +61,25 @@ def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed
     observation, _ = env.reset(seed=seed, options={"posture": scenario.policy.posture(parameters, layout)})
     policy = scenario.policy.start(parameters, layout)
     task = scenario.task.start(layout, observation, scenario.role)
-    observations, actions, sent, rewards, fell = [observation], [], [], [], False
+    observations, actions, sent, rewards, ended = [observation], [], [], [], False
     for _ in range(policy.ticks if isinstance(policy, OpenLoopRun) else scenario.ticks):
         action = policy.act(observation)
-        before, (observation, _, fell, _, info) = observation, env.step(action)
-        judged = task.step(before, observation, fell)
+        before, (observation, own, ended, cut, info) = observation, env.step(action)
+        judged = task.step(before, observation, ended)
         observations.append(observation)
         actions.append(action)
         sent.append(info["grounded_action"])
-        rewards.append(judged.reward)
-        if fell or judged.ended:
+        rewards.append(own if judged.reward is None else judged.reward)
+        if ended or cut or judged.ended:
             break
-    trajectory = _recorded(layout, np.array(observations), np.array(actions), np.array(rewards), fell=fell)
+    record = _recorded_states if layout.states else _recorded
+    trajectory = record(layout, np.array(observations), np.array(actions), np.array(rewards), ended=ended)
     grounded = np.array(sent)
     return trajectory if np.array_equal(grounded, actions) else replace(trajectory, grounded_action=grounded)
 
 
 def _recorded(
-    layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, fell: bool
+    layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, ended: bool
 ) -> Trajectory:
     sensors = {
         column: states[:, layout[part].start + index]
@@ -83,7 +87,7 @@ def _recorded(
         for index, column in enumerate(columns)
     }
     down = np.zeros(len(states), dtype=bool)
-    down[-1] = fell
+    down[-1] = ended
     return Trajectory(
         time=layout.control_period * np.arange(len(states)),
         action=actions,
@@ -93,3 +97,12 @@ def _recorded(
         fell=down,
         sensors=sensors,
     )
+
+
+def _recorded_states(
+    layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, ended: bool
+) -> Trajectory:
+    nothing, over = np.zeros((len(states), 0)), np.zeros(len(states), dtype=bool)
+    over[-1] = ended
+    time = layout.control_period * np.arange(len(states))
+    return Trajectory(time, actions, nothing, nothing, reward=rewards, sensors={"terminated": over}, state=states)

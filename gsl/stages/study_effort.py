@@ -7,6 +7,7 @@ import time
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
+from gsl.optimizers.cma_es import CmaEs
 from gsl.stages.compare import Compare
 from gsl.stages.population import threads
 from gsl.stages.rollout import Scenario, rollout
@@ -21,6 +22,7 @@ APART = 60.0  # of a learned grounding: fits and checks [s]
 def seconds(study: Compare) -> float:
     """Return an estimate of a study's duration from nothing [s], good to a factor of two or so."""
     iterate, budget = study.iterate, study.iterate.budget
+    assert isinstance(iterate.optimizer, CmaEs), "studies of robots search"
     workers = threads(iterate.workers)
     sims = study.simulators or {"": iterate.sim}
     real = sum(_rollout(study, world, REAL) for world in study.worlds.values()) / len(study.worlds)

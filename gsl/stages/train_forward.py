@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -15,6 +16,7 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import Transitions, transitions, usable
 from gsl.errors import TrajectoryError
+from gsl.models.calibration import calibrated
 from gsl.models.choice import best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Forward, ensemble
@@ -22,7 +24,9 @@ from gsl.models.forward import ForwardModel
 from gsl.models.free_run import TICKS, predicted_error, segments, standstill_error
 from gsl.models.network import Samples
 from gsl.stages.drift import write_region
+from gsl.stages.train_states import forward_of_states
 from gsl.stages.training import (
+    FALLS,
     Parts,
     checked,
     data_file,
@@ -66,14 +70,19 @@ class TrainForward:
         """Write the model and the trajectories it has not seen."""
         path = data_file(self.data)
         data = parts(path, other=SIM, share=self.heldout, seed=self.seed)
-        self._check(path, data)
         console.status(f"fitting a forward model to {len(data.training)} trajectories")
+        if data.training.states:
+            write(folder / HELDOUT, data.heldout)
+            return forward_of_states(folder, data, self.model, self.seed)
+        self._check(path, data)
         judges = self._long(of_policy(data.validation, pi0=False)) or self._long(data.validation.episodes)
         model, choice = best(
             self.model, lambda config: self._fitted(config, data), lambda model: self._score(model, judges)
         )
         write_model(folder, model)
-        write(folder / HELDOUT, data.heldout)
+        own = [one for part in data for one in of_policy(part, pi0=True)]
+        falls = float(np.mean([one.ended_in_a_fall for one in own])) if own else 0.0
+        write(folder / HELDOUT, replace(data.heldout, metadata={**data.heldout.metadata, FALLS: falls}))
         write(folder / VALIDATION, data.validation)
         known, unseen = (_rows(choice.config, part.episodes).windows for part in (data.training, data.validation))
         write_region(folder, region(known, unseen))
@@ -119,9 +128,13 @@ class TrainForward:
 
 
 def _member(config: ModelConfig, episodes: Sequence[Trajectory], data: Parts, seed: int) -> ForwardModel:
+    head = config.head
     known, unseen = (_samples(config, part) for part in (episodes, data.validation.episodes))
-    network = fit_network(known, unseen, config, seed=seed, head=config.head)
-    return ForwardModel(network, config.of_body, data.training.joints, config.encoding, config.horizon, config.head)
+    network, memory = fit_network(known, unseen, config, seed=seed, head=head), np.zeros(unseen[1].shape[1])
+    if head.draws:
+        network, memory = calibrated(network, head, [_samples(config, [one]) for one in data.validation.episodes])
+    joints = data.training.joints
+    return ForwardModel(network, config.of_body, joints, config.encoding, config.horizon, head, memory)
 
 
 def _samples(config: ModelConfig, episodes: Sequence[Trajectory]) -> Samples:

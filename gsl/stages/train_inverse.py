@@ -19,6 +19,7 @@ from gsl.models.free_run import TICKS, recovered_error, segments
 from gsl.models.inverse import InverseModel, Regression, Solver
 from gsl.models.linear import fit_linear
 from gsl.models.network import Samples
+from gsl.stages.train_states import inverse_of_states
 from gsl.stages.training import Parts, checked, data_file, degrees, degrees_by_joint, parts, summary
 from gsl.storage.models import write_model
 from gsl.tasks.task import REAL
@@ -55,9 +56,11 @@ class TrainInverse:
         """Write the model."""
         path = data_file(self.data)
         data = parts(path, other=REAL, share=self.heldout, seed=self.seed)
+        console.status(f"fitting an inverse model to {len(data.training)} trajectories")
+        if data.training.states:
+            return inverse_of_states(folder, data, self.model, self.seed)
         for part in data:
             checked(path, part.episodes, self.model.of_joints.span + TICKS + self.model.horizon)
-        console.status(f"fitting an inverse model to {len(data.training)} trajectories")
         fit = self._regression if self.method == "regression" else self._solver
         pieces = segments(data.heldout.episodes, self.model.of_joints, carried_out=True)
         model, choice = best(

@@ -21,6 +21,7 @@ from gsl.tasks.task import SIM
 
 DATA = "trajectories.parquet"
 PI0 = "pi0"
+FALLS = "pi0_falls"  # share of its real episodes, told beside the trajectories that are held out
 
 
 class Parts(NamedTuple):
@@ -68,7 +69,7 @@ def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
 def _check_joints(path: Path, batch: Batch) -> None:
     """Refuse joints that the robot of the file does not have, if it is one of ours."""
     name = batch.metadata["robot"]
-    motors = robot(name).motors if name in names() else batch.joints
+    motors = robot(name).motors if name in names() and not batch.states else batch.joints
     for joint in batch.joints:
         if joint not in motors:
             raise TrajectoryError(

@@ -35,6 +35,7 @@ class Trial(NamedTuple):
         rank: Correlation of the simulator with real over a fixed set of policies, None where nobody asked.
         real_episodes: Of models, choice, check and report, of this iteration and those before.
         outcome: What the task reports of the returned policy, by name with unit.
+        last: The same of the last generation's winner, which nothing real has chosen.
     """
 
     simulator: str
@@ -58,6 +59,7 @@ class Trial(NamedTuple):
     rank: float | None
     real_episodes: int
     outcome: Mapping[str, float]
+    last: Mapping[str, float]
 
     @classmethod
     def of(
@@ -102,6 +104,7 @@ class Trial(NamedTuple):
             rank=rank,
             real_episodes=spent + measured["real_episodes"],
             outcome=after["outcome"],
+            last=measured["last"]["outcome"],
         )
 
     @property

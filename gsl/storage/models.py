@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from gsl.errors import ArtifactError
+from gsl.models.counts import Counts
 from gsl.models.ensemble import Forward, forward_from
 from gsl.models.forward import ForwardModel
 from gsl.models.inverse import KIND as INVERSE
 from gsl.models.inverse import InverseModel, inverse_from
+from gsl.models.states import NearestChoice, StateForward, StateInverse, state_inverse_from
 from gsl.storage.checkpoints import read_checkpoint, write_checkpoint
 from gsl.storage.references import resolve
 
@@ -17,7 +19,11 @@ FILES = {FORWARD: "forward_model.safetensors", INVERSE: "inverse_model.safetenso
 MAKERS = {FORWARD: "train_forward", INVERSE: "train_inverse"}
 
 
-def write_model(folder: Path, model: Forward | InverseModel) -> Path:
+AnyForward = Forward | StateForward | Counts
+AnyInverse = InverseModel | StateInverse | NearestChoice | Counts
+
+
+def write_model(folder: Path, model: AnyForward | AnyInverse) -> Path:
     """Write a model into a folder under the name of its kind and return the file."""
     about = model.description()
     path = folder / FILES[about["kind"]]
@@ -31,7 +37,7 @@ def model_file(reference: str, kind: str) -> Path:
     return found / FILES[kind] if found.is_dir() else found
 
 
-def read_forward_model(reference: str) -> Forward:
+def read_forward_model(reference: str) -> AnyForward:
     """Read a forward model.
 
     Raises:
@@ -40,15 +46,19 @@ def read_forward_model(reference: str) -> Forward:
     path = model_file(reference, FORWARD)
     arrays, about = read_checkpoint(path, kind=FORWARD)
     with _understood(path):
-        return forward_from(arrays, about)
+        if about.get("space") == Counts.space:
+            return Counts.from_arrays(arrays, about)
+        return StateForward.from_arrays(arrays, about) if "space" in about else forward_from(arrays, about)
 
 
-def read_inverse_model(reference: str) -> InverseModel:
+def read_inverse_model(reference: str) -> AnyInverse:
     """Read an inverse model; errors as those of `read_forward_model`."""
     path = model_file(reference, INVERSE)
     arrays, about = read_checkpoint(path, kind=INVERSE)
     with _understood(path):
-        return inverse_from(arrays, about)
+        if about.get("space") == Counts.space:
+            return Counts.from_arrays(arrays, about)
+        return state_inverse_from(arrays, about) if "space" in about else inverse_from(arrays, about)
 
 
 class _understood:

@@ -18,10 +18,12 @@ from gsl.storage.trajectory_contract import (
     UNITS,
     blank_at_the_end,
     joint_columns,
+    state_columns,
 )
 
 ARRAYS = ("action", "grounded_action", "position", "velocity")
-OWN_FIELDS = ("schema_version", "joints", "control_period")
+OF_ACTIONS = ("action", "grounded_action")
+OWN_FIELDS = ("schema_version", "joints", "states", "control_period")
 
 
 def columns_of(path: Path, batch: Batch) -> dict[str, np.ndarray]:
@@ -45,12 +47,16 @@ def _episode_columns(path: Path, batch: Batch, index: int, one: Trajectory) -> d
         "step": np.arange(rows, dtype=np.int32),
         "time": one.time,
     }
-    for group in ARRAYS:
+    for group in OF_ACTIONS if batch.states else ARRAYS:
         if (values := getattr(one, group)) is not None:
             if np.ndim(values) != 2 or values.shape[1] != len(batch.joints):
                 problem = f"episode {index}: shape {np.shape(values)} for {len(batch.joints)} joints"
                 raise TrajectoryError(path, problem, column=group)
             columns.update(zip(joint_columns(group, batch.joints), np.asarray(values).T, strict=True))
+    if one.state is not None:
+        now, then = one.state.T, one.state[1:].T
+        columns.update(zip(state_columns("state", batch.states), now, strict=True))
+        columns.update(zip(state_columns("next_state", batch.states), then, strict=True))
     columns.update({name: one.sensors[name] for name in sorted(one.sensors)})
     columns.update({name: getattr(one, name) for name in ("reward", "fell") if getattr(one, name) is not None})
     return {name: _column(path, index, name, values, rows) for name, values in columns.items()}
@@ -70,13 +76,15 @@ def _column(path: Path, index: int, name: str, values: np.ndarray, rows: int) ->
 def metadata_of(batch: Batch, columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Return what the file says of itself: the batch's metadata, joints, control period [s] and units."""
     groups = {*columns, *(name.partition(".")[0] for name in columns), *(name.rpartition(".")[0] for name in columns)}
-    units = {**batch.metadata.get("units", {}), **{group: unit for group, unit in UNITS.items() if group in groups}}
+    known = {"time": UNITS["time"]} if batch.states else UNITS
+    units = {**batch.metadata.get("units", {}), **{group: unit for group, unit in known.items() if group in groups}}
     return {
         **dict.fromkeys(("source", "seed", "world", "policy")),
         **batch.metadata,
         "units": units,
         "schema_version": SCHEMA_VERSION,
         "joints": list(batch.joints),
+        **({"states": batch.states} if batch.states else {}),
         "control_period": batch.control_period,
     }
 
@@ -89,9 +97,10 @@ def batch_of(columns: Mapping[str, np.ndarray], metadata: Mapping[str, Any], bou
         metadata: What the file says of itself.
         bounds: Row at which each episode begins, and the number of rows, shape (n_episodes + 1,).
     """
-    joints = tuple(metadata["joints"])
-    arrays = _arrays(columns, joints)
+    joints, states = tuple(metadata["joints"]), metadata.get("states", 0)
+    arrays = _arrays(columns, joints, states)
     own = {*INTEGERS, *arrays, *(name for group in ARRAYS for name in joint_columns(group, joints))}
+    own.update((*state_columns("state", states), *state_columns("next_state", states)))
     sensors = {name: values for name, values in columns.items() if name not in own}
     episodes = tuple(
         Trajectory(
@@ -104,10 +113,14 @@ def batch_of(columns: Mapping[str, np.ndarray], metadata: Mapping[str, Any], bou
     return Batch(episodes, joints, float(metadata["control_period"]), rest)
 
 
-def _arrays(columns: Mapping[str, np.ndarray], joints: tuple[str, ...]) -> dict[str, np.ndarray]:
-    groups = {
+def _arrays(columns: Mapping[str, np.ndarray], joints: tuple[str, ...], states: int) -> dict[str, np.ndarray]:
+    groups: dict[str, np.ndarray] = {
         group: np.column_stack([columns[name] for name in joint_columns(group, joints)])
         for group in ARRAYS
         if joint_columns(group, joints)[0] in columns
     }
+    if states:
+        nothing = np.zeros((len(columns["time"]), 0))
+        groups |= {"position": nothing, "velocity": nothing}
+        groups["state"] = np.column_stack([columns[name] for name in state_columns("state", states)])
     return {**groups, **{name: columns[name] for name in ("time", "reward", "fell") if name in columns}}

@@ -32,8 +32,8 @@ UNITS: Mapping[str, str] = {
     "base.velocity": "m/s",
 }
 INTEGERS = ("episode", "step")
-BOOLEANS = ("enabled", "fell")
-BLANK_AT_THE_END = ("action", "grounded_action", "reward")
+BOOLEANS = ("enabled", "fell", "terminated")
+BLANK_AT_THE_END = ("action", "grounded_action", "reward", "next_state")
 JOINT_SENSORS = ("torque", "temperature")
 SENSORS = (
     *("voltage", "enabled", "foot_force.left", "foot_force.right"),
@@ -47,10 +47,16 @@ def joint_columns(group: str, joints: Iterable[str]) -> list[str]:
     return [f"{group}.{joint}" for joint in joints]
 
 
-def required_columns(joints: Iterable[str]) -> list[str]:
-    """Return the columns without which there is no trajectory."""
-    groups = ("action", "position", "velocity")
-    return [*INTEGERS, "time", *(name for group in groups for name in joint_columns(group, joints))]
+def state_columns(group: str, states: int) -> list[str]:
+    """Return the columns of `group`, one for each entry of a state that is not joints."""
+    return [f"{group}.{index}" for index in range(states)]
+
+
+def required_columns(joints: Iterable[str], states: int = 0) -> list[str]:
+    """Return the columns without which there is no trajectory; `states` is 0 where the state is joints."""
+    groups = ("action",) if states else ("action", "position", "velocity")
+    named = [name for group in groups for name in joint_columns(group, joints)]
+    return [*INTEGERS, "time", *named, *state_columns("state", states), *state_columns("next_state", states)]
 
 
 def blank_at_the_end(name: str) -> bool:
@@ -72,7 +78,10 @@ def check_metadata(path: Path, metadata: Any, robot_joints: tuple[str, ...] | No
     period = metadata["control_period"]
     if isinstance(period, bool) or not isinstance(period, (int, float)) or not (math.isfinite(period) and period > 0):
         raise TrajectoryError(path, f"control_period {period!r} must be a positive number of seconds")
-    _check_joints(path, metadata, robot_joints)
+    states = metadata.get("states", 0)
+    if isinstance(states, bool) or not isinstance(states, int) or states < 0:
+        raise TrajectoryError(path, f"states {states!r} must be the number of entries of the state")
+    _check_joints(path, metadata, None if states else robot_joints)
     _check_units(path, metadata["units"])
 
 
@@ -101,18 +110,21 @@ def _spelled(unit: str) -> str:
 
 def check_names(path: Path, names: list[str], metadata: Mapping[str, Any]) -> None:
     """Refuse missing, duplicated and unknown columns; a column named in `units` beside the contract's is known."""
-    joints, units = metadata["joints"], metadata["units"]
+    joints, units, states = metadata["joints"], metadata["units"], metadata.get("states", 0)
     for name in names:
         if names.count(name) > 1:
             raise TrajectoryError(path, f"there are {names.count(name)} columns of this name; keep one", column=name)
-    required = required_columns(joints)
+    required = required_columns(joints, states)
     if any(name.startswith("grounded_action.") for name in names):
         required += joint_columns("grounded_action", joints)
     for name in required:
         if name not in names:
             raise TrajectoryError(path, f"is missing{suggestion(name, set(names) - set(required))}", column=name)
-    known = {*required, *SENSORS, "reward", "fell"}
-    known.update(name for group in JOINT_SENSORS for name in joint_columns(group, joints))
+    known = {*required, "reward"}
+    if states:
+        known.add("terminated")
+    else:
+        known.update((*SENSORS, "fell", *(name for group in JOINT_SENSORS for name in joint_columns(group, joints))))
     for name in names:
         if name not in known and not _declared(name, units):
             advice = f"is unknown{suggestion(name, known)}; a column of your own needs a unit under `units`"

@@ -19,7 +19,11 @@ HANGING = 0.5 * math.pi  # shoulder pitch of an arm that hangs down [rad]
 
 @component
 class Arm:
-    """Reward 1 / |x - x*|² x in degrees of lift, capped within `cap` of the goal; an arm above 45 degrees ends it."""
+    """Reward 1 / |x - x*|², x in degrees of lift, capped within `cap` of the goal.
+
+    An arm above the goal ends the episode, and that step is worth nothing: else a jump across the goal pays as much as
+    most ways of stopping below it, and a search stays there.
+    """
 
     unit: ClassVar[str] = "sum of rewards"
     shown: ClassVar[float] = 1.0
@@ -34,9 +38,11 @@ class Arm:
         return ArmRun(self, [first + layout.joints.index(name) for name in JOINTS])
 
     def outcome(self, layout: Layout, trajectory: Trajectory) -> Mapping[str, float]:
-        """Return the final distance to the goal, the last one held after an early end."""
-        shoulders = [layout.joints.index(name) for name in JOINTS]
-        return {"distance [deg]": math.degrees(self.distance(trajectory.position[-1, shoulders]))}
+        """Return the distance to the goal, at the end and on average, and whether an arm went above it."""
+        shoulders = trajectory.position[:, [layout.joints.index(name) for name in JOINTS]]
+        far = [math.degrees(self.distance(one)) for one in shoulders]
+        above = bool((HANGING - shoulders[-1] > self.goal).any())
+        return {"distance [deg]": far[-1], "mean distance [deg]": float(np.mean(far)), "above [share]": float(above)}
 
     def distance(self, shoulders: np.ndarray) -> float:
         """Return |x - x*| of two shoulder pitches [rad]."""
@@ -52,5 +58,6 @@ class ArmRun:
     def step(self, before: np.ndarray, after: np.ndarray, fell: bool) -> Step:
         """Reward closeness after the step."""
         shoulders = after[self._entries]
+        above = bool((HANGING - shoulders > self._task.goal).any())
         closest = max(self._task.distance(shoulders), self._task.cap)
-        return Step(1.0 / math.degrees(closest) ** 2, ended=bool((HANGING - shoulders > self._task.goal).any()))
+        return Step(0.0 if above else 1.0 / math.degrees(closest) ** 2, ended=above)

@@ -15,9 +15,9 @@ SIM: Literal["sim"] = "sim"
 
 
 class Step(NamedTuple):
-    """What a task says of one control step."""
+    """What a task says of one control step; no reward stands for the one that the world itself gives."""
 
-    reward: float
+    reward: float | None
     ended: bool
 
 
@@ -33,7 +33,7 @@ class Task(Protocol):
     """What we want of a body.
 
     Attributes:
-        duration: Planned length of an episode [s].
+        duration: Planned length of an episode [s]; infinite where the world ends it.
         unit: Of a value as people are shown it.
         shown: What a value is multiplied by to be in that unit.
     """

@@ -25,6 +25,7 @@ class GroundedEnv(gymnasium.Wrapper):
         super().__init__(env)
         self.layout: Layout = env.get_wrapper_attr("layout")
         self._grounding, self._rng = grounding, np.random.default_rng()
+        self._charged = getattr(env, "charged", None)  # where a reward charges for actions
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -40,4 +41,6 @@ class GroundedEnv(gymnasium.Wrapper):
         """Send the grounded action."""
         sent = self._run.transform(self._seen, action)
         self._seen, reward, ended, cut, info = self.env.step(sent)
+        if self._charged and sent is not action:
+            reward = self._charged.corrected(float(reward), action, sent, info)
         return self._seen, float(reward), ended, cut, {**info, "grounded_action": sent}

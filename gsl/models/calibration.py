@@ -1,0 +1,47 @@
+"""Calibration of a stochastic model on trajectories that it was not fitted to: how wide it errs, and for how long.
+
+A likelihood fitted to few trajectories is too sure of itself, and its errors hang together in time, since what pushes a
+robot off lasts longer than a tick. Standard deviations are scaled so that errors in their units have variance 1
+(Kuleshov, Fenner, Ermon 2018 in general); the correlation of an error with the one a tick before is what draws keep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gsl.models.head import Head
+from gsl.models.network import Network, Samples
+
+SCALE = 0.5, 3.0  # least and largest factor of a standard deviation
+MEMORY = 0.9  # largest
+
+
+def calibrated(network: Network, head: Head, episodes: Sequence[Samples]) -> tuple[Network, np.ndarray]:
+    """Return the network with standard deviations scaled, and the memory of its draws, shape (m,).
+
+    Args:
+        network: Of a head that draws.
+        head: How its outputs are read.
+        episodes: Inputs, shape (T, n), and outputs, shape (T, m), of trajectories it was not fitted to.
+    """
+    errors = [_standardised(network, head, *one) for one in episodes]
+    together = np.concatenate(errors)
+    scale = np.clip(np.sqrt(np.mean(together**2, axis=0)), *SCALE)
+    steps = [(one[:-1] * one[1:]) for one in errors if len(one) > 1]
+    memory = np.mean(np.concatenate(steps), axis=0) / np.mean(together**2, axis=0) if steps else np.zeros_like(scale)
+    *hidden, (weight, bias) = [(weight, bias) for weight, bias in network.layers]
+    wider = np.tile(np.log(scale), head.components)  # the last outputs are logarithms of standard deviations
+    added = np.concatenate([np.zeros(len(bias) - len(wider)), wider])
+    return Network([*hidden, (weight, bias + added)]), np.clip(memory, 0.0, MEMORY)
+
+
+def _standardised(network: Network, head: Head, inputs: np.ndarray, outputs: np.ndarray) -> np.ndarray:
+    """Return errors in units of the standard deviation that the model has for them, shape (T, m)."""
+    raw = network.predict_many(inputs)
+    weights, means, sds = head.parts(raw)
+    expected = head.expected(raw)
+    variance = (weights[..., None] * (sds**2 + (means - expected[:, None]) ** 2)).sum(axis=-2)
+    found: np.ndarray = (outputs - expected) / np.sqrt(variance)
+    return found

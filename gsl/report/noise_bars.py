@@ -1,0 +1,62 @@
+"""Return at each noise of the real world: bars with standard errors, and a line for what training there gives.
+
+As the paper's figures 12 and 13: striped bars used no real data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from gsl.report.style import COMMAND, GROUNDED, QUIET, REAL, SIMULATION, figure, headline, look, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+STYLES = {"none": (COMMAND, "///"), "ane": (QUIET, "///"), "gat": (SIMULATION, ""), "sgat": (GROUNDED, "")}
+
+
+class Bars(NamedTuple):
+    """Means and standard errors of each method at each noise."""
+
+    noises: Sequence[float]
+    values: Mapping[str, Sequence[tuple[float, float]]]
+
+
+def noise_bars(path: Path, panels: Mapping[str, Bars], reference: str) -> None:
+    """Write the figure as a PNG file; arguments as those of `noise_bars_figure`."""
+    save(noise_bars_figure(panels, reference), path)
+
+
+def noise_bars_figure(panels: Mapping[str, Bars], reference: str) -> Figure:
+    """Return the figure.
+
+    Args:
+        panels: By real world.
+        reference: The method that is drawn as a line.
+    """
+    with look():
+        whole = figure(3.8)
+        for axes, (name, bars) in zip(whole.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
+            methods = [method for method in bars.values if method != reference]
+            places, width = np.arange(len(bars.noises)), 0.8 / max(1, len(methods))
+            for k, method in enumerate(methods):
+                means, errors = np.array(bars.values[method]).T
+                colour, hatch = STYLES.get(method.split("_")[0], (QUIET, ""))
+                x = places + (k - 0.5 * (len(methods) - 1)) * width
+                axes.bar(
+                    x, means, 0.92 * width, yerr=errors, color=colour, hatch=hatch, edgecolor="white", label=method
+                )
+            for place, (mean, _) in zip(places, bars.values.get(reference, ()), strict=False):
+                label = reference if place == 0 else None
+                axes.hlines(mean, place - 0.45, place + 0.45, color=REAL, linestyle="--", linewidth=1.4, label=label)
+            axes.set_xticks(places, [f"{noise:g}" for noise in bars.noises])
+            axes.set_xlabel("standard deviation of the real world's action noise")
+            axes.set_ylabel("return in real")
+            axes.set_title(name, loc="left", fontsize=10.5)
+        axes.legend(frameon=False, fontsize=9, loc="upper right")
+        headline(whole, "Return in a noisy real world")
+    return whole

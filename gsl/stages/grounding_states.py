@@ -1,0 +1,92 @@
+"""The check of a grounding in a gymnasium environment, which nobody can set into a measured state: what is π0 worth?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gsl.core.seeds import derived_seed
+from gsl.core.statistics import difference_interval, mean_interval
+from gsl.core.trajectory import Trajectory
+from gsl.grounding.none import NoGrounding
+from gsl.stages.rollout import Scenario, rollout
+from gsl.worlds.control_cost import KEY
+
+EPISODES = 10  # of π0 in either simulator
+TITLES = ("where", "value of π0", "95 % interval", "steps")
+
+
+@dataclass(frozen=True)
+class ValueReport:
+    """Values and lengths of π0's episodes, by where: real (held out), grounded, ungrounded."""
+
+    values: dict[str, np.ndarray]
+    steps: dict[str, np.ndarray]
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why nothing should be optimised in this grounding, in words: π0 is surely farther from real than without."""
+        real = self.values["real"]
+        off = {name: difference_interval(self.values[name], real) for name in ("grounded", "ungrounded")}
+        least = max(0.0, off["grounded"].lower, -off["grounded"].upper)
+        most = max(abs(off["ungrounded"].lower), abs(off["ungrounded"].upper))
+        if len(real) < 2 or least <= most:
+            return ()
+        told = {name: f"{self.values[name].mean():.1f}" for name in self.values}
+        return (f"π0 is worth {told['grounded']}, {told['ungrounded']} without grounding, {told['real']} in real",)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return a table for people; its titles are `TITLES`."""
+        return [self._row(name) for name in self.values]
+
+    def metrics(self) -> dict[str, Any]:
+        """Return everything as a JSON document."""
+        told = {
+            name: {"values": values.tolist(), "steps": self.steps[name].tolist()}
+            for name, values in self.values.items()
+        }
+        return {"pi0": told, "acceptable": not self.problems, "problems": self.problems}
+
+    def _row(self, name: str) -> tuple[str, ...]:
+        values = self.values[name]
+        interval = mean_interval(values)
+        bounds = f"{interval.lower:.1f} to {interval.upper:.1f}" if len(values) > 1 else "-"
+        return name, f"{values.mean():.1f}", bounds, f"{self.steps[name].mean():.0f}"
+
+
+def value_report(scenario: Scenario, parameters: np.ndarray, real: Sequence[Trajectory], seed: int) -> ValueReport:
+    """Compare π0's episodes.
+
+    Args:
+        scenario: The simulator with a grounding ready to act.
+        parameters: Of π0, shape (n_parameters,).
+        real: Its held-out episodes.
+        seed: Of the simulated ones.
+    """
+    ways = {"grounded": scenario, "ungrounded": replace(scenario, grounding=NoGrounding())}
+    episodes = {"real": list(real), **{name: _episodes(way, parameters, seed) for name, way in ways.items()}}
+    values = {name: np.array([one.value for one in done]) for name, done in episodes.items()}
+    steps = {name: np.array([float(len(one)) for one in done]) for name, done in episodes.items()}
+    return ValueReport(values, steps)
+
+
+def uncharged(scenario: Scenario) -> bool:
+    """Whether nobody knows what the reward charges for an action, so that the grounded action is charged."""
+    world: Any = scenario.world
+    if world.layout.choices or getattr(world, "control_cost", None) is not None:
+        return False
+    env = world.make()
+    env.reset(seed=0)
+    info = env.step(np.zeros(len(world.layout.joints)))[-1]
+    env.close()
+    return KEY not in info
+
+
+def _episodes(scenario: Scenario, parameters: np.ndarray, seed: int) -> list[Trajectory]:
+    env = scenario.make()
+    done = [rollout(scenario, env, parameters, derived_seed(seed, index)) for index in range(EPISODES)]
+    env.close()
+    return done

@@ -1,0 +1,158 @@
+"""The paper's figures 12 and 13: environments whose real world is noisy, and maybe heavier, with TRPO as optimiser."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from gsl.console import Console
+from gsl.core.setting import component, setting
+from gsl.core.statistics import mean_interval
+from gsl.grounding.effects import innermost
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.grounding import Grounding
+from gsl.grounding.none import NoGrounding
+from gsl.optimizers.trpo import Trpo
+from gsl.report.markdown import table as markdown
+from gsl.report.noise_bars import Bars, noise_bars
+from gsl.stages.chain import Chain
+from gsl.stages.iterate import Iterate
+from gsl.stages.optimize import BEST
+from gsl.stages.population import Workers, in_parallel
+from gsl.storage.documents import write_json
+from gsl.worlds.gymnasium import GymnasiumWorld
+
+TABLE, DATA, FIGURE = "table.md", "points.json", "figure.png"
+REAL = "trained on real"
+
+
+class Point(NamedTuple):
+    """One method, once, in one real world.
+
+    Attributes:
+        value: Mean return of its policy in the real world.
+        real_steps: In the real world, that it learned from.
+    """
+
+    world: str
+    noise: float
+    method: str
+    trial: int
+    value: float
+    real_steps: int
+
+
+@component
+class NoiseStudy:
+    """Every trial begins with a policy that TRPO learned in the plain simulator, and goes on from it with each method.
+
+    The same number of further steps for each; without grounding and with action noise they are the same search for all
+    real worlds. The reference learns in the real world itself.
+    """
+
+    kind: ClassVar[str] = "reproduce"
+
+    iterate: Annotated[Iterate, setting("what a trial is; its real world and grounding are replaced")]
+    worlds: Annotated[Mapping[str, GymnasiumWorld], setting("the real worlds, by name; their noise is replaced")]
+    noises: Annotated[tuple[float, ...], setting("standard deviations of the real worlds' noise", min_length=1)]
+    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name")]
+    further: Annotated[Trpo, setting("how it goes on from π0")]
+    trials: Annotated[int, setting("trials of each method", ge=1)]
+    workers: Workers = -1
+
+    def parents(self) -> Mapping[str, Path]:
+        """Everything is made here."""
+        return {}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Run all trials; write the points, the table and the figure."""
+        home = folder.parent
+        jobs = [(number, home) for number in range(1, self.trials + 1)]
+        with console.progress(len(jobs), "trials") as progress:
+            found = in_parallel(_trial, self, jobs, self.workers, progress)
+        points = [point for one in found for point in one]
+        write_json(folder / DATA, [one._asdict() for one in points])
+        (folder / TABLE).write_text(self._table(points), encoding="utf-8")
+        panels = {
+            world: Bars(self.noises, {method: self._means(points, world, method) for method in self._shown})
+            for world in self.worlds
+        }
+        noise_bars(folder / FIGURE, panels, REAL)
+        return {"points": len(points)}
+
+    @property
+    def _shown(self) -> tuple[str, ...]:
+        return (*self.methods, REAL)
+
+    def trial(self, number: int, home: Path) -> list[Point]:
+        """Return all points of a trial, built below `home`."""
+        seed, console = self.iterate.seed + number - 1, Console(json=True)
+        name, chain = f"trial_{number:02d}", replace(self.iterate.chain, workers=1, accept=True)
+        first = chain.search(home / "pretrained" / name, NoGrounding(), None, seed, console)
+        going_on = replace(chain, optimizer=self.further)
+        start, points = str(first.folder / BEST), []
+        for world, noise in ((world, noise) for world in self.worlds for noise in self.noises):
+            real = replace(self.worlds[world], action_noise=noise)
+            at = replace(going_on, real=real)
+            below = home / f"{world}_{noise:g}"
+            for method, grounding in self.methods.items():
+                learned = isinstance(innermost(grounding), ActionTransformation)
+                place = (below if learned else home / "sim") / method / name
+                ready = at.ready(place, grounding, start, seed, console)
+                policy = at.search(place / "optimize", ready, start, seed, console)
+                value = self._value(at, below / method / name / "evaluate", policy, seed, console)
+                points.append(Point(world, noise, method, number, value, _steps(place) if learned else 0))
+            on_real = replace(at, sim=real).search(
+                below / "real" / name / "optimize", NoGrounding(), start, seed, console
+            )
+            value = self._value(at, below / "real" / name / "evaluate", on_real, seed, console)
+            points.append(Point(world, noise, REAL, number, value, self.further.steps))
+        return points
+
+    def _value(self, chain: Chain, place: Path, policy: Any, seed: int, console: Any) -> float:
+        return float(chain.measure(place, policy, seed, console).metrics["last"]["value"])
+
+    def _means(self, points: Sequence[Point], world: str, method: str) -> list[tuple[float, float]]:
+        """Return mean and standard error at each noise."""
+        each = [[one.value for one in points if one[:3] == (world, noise, method)] for noise in self.noises]
+        return [
+            (float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0)
+            for values in each
+        ]
+
+    def _table(self, points: Sequence[Point]) -> str:
+        rows = []
+        for world in self.worlds:
+            for noise in self.noises:
+                of = {
+                    method: [one.value for one in points if one[:3] == (world, noise, method)] for method in self._shown
+                }
+                apart = mean_interval(np.subtract(of["sgat"], of["gat"])) if {"sgat", "gat"} <= of.keys() else None
+                told = [
+                    f"{mean:.0f} ± {error:.0f}"
+                    for method in self._shown
+                    for mean, error in [self._means(points, world, method)[self.noises.index(noise)]]
+                ]
+                between = f"{apart.mean:+.0f} ({apart.lower:+.0f} to {apart.upper:+.0f})" if apart else "-"
+                rows.append((world, f"{noise:g}", *told, between))
+        spent = max(one.real_steps for one in points if one.method != REAL)
+        below = (
+            f"\nMean ± standard error over {self.trials} trials; learned groundings saw at most {spent:,} real steps"
+        )
+        below += f", the reference learned from {self.further.steps:,}.\n"
+        return markdown(("real world", "noise", *self._shown, "sgat - gat (95 %)"), rows) + below
+
+
+def _steps(place: Path) -> int:
+    return int(json.loads((place / "collect_real" / "metrics.json").read_text(encoding="utf-8"))["steps"])
+
+
+def _trial(frozen: bytes, job: tuple[int, Path]) -> list[Point]:
+    study: NoiseStudy = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
+    return study.trial(*job)

@@ -1,0 +1,154 @@
+"""Both models of worlds whose state is a vector or one of few: what the training stages do with logs of such worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gsl.core.trajectory import Batch
+from gsl.errors import ConfigError
+from gsl.models.choice import best, fit_network
+from gsl.models.config import ModelConfig
+from gsl.models.counts import Counts, counted
+from gsl.models.head import POINT, Head
+from gsl.models.network import Samples
+from gsl.models.states import NearestChoice, StateForward, StateInverse, encoded
+from gsl.stages.training import Parts, explained, summary
+from gsl.storage.models import write_model
+
+EXACT = 1e-9  # of the largest standard deviation: states have units of their own, and none is too small to matter
+
+
+class Steps(NamedTuple):
+    """One row a step.
+
+    Attributes:
+        states: Shape (N, n_states).
+        actions: Carried out, shape (N, n_actions).
+        changes: Of the variables of interest, shape (N, n_variables).
+    """
+
+    states: np.ndarray
+    actions: np.ndarray
+    changes: np.ndarray
+
+
+def forward_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int) -> Mapping[str, Any]:
+    """Write a forward model of the real world, and return its errors on held-out trajectories."""
+    if few(data.training):
+        return _counts(folder, data, "forward_model")
+    model, choice = best(config, partial(_forward, data=data, seed=seed), partial(_score, data=data))
+    write_model(folder, model)
+    rows = _steps(data.heldout, model.variables)
+    errors = model.changes(rows.states, rows.actions) - rows.changes
+    measured = {"steps": len(errors), "r2": explained(errors / model.scale, rows.changes / model.scale)}
+    if model.head.draws:
+        measured["nll"] = _nll(model, rows)
+    by_variable = {
+        str(variable): explained(errors[:, [k]], rows.changes[:, [k]]) for k, variable in enumerate(model.variables)
+    }
+    told = {"space": StateForward.space, "trajectories": len(data.training) + len(data.validation)}
+    return {**summary(choice), **told, "heldout": {**measured, "r2_by_variable": by_variable}}
+
+
+def inverse_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int) -> Mapping[str, Any]:
+    """Write an inverse model of the simulator, and return how well it recovers held-out actions."""
+    if few(data.training):
+        return _counts(folder, data, "inverse_model")
+    choices, make = data.training.metadata.get("choices", 0), _nearest if _choices(data) else _inverse
+    model, choice = best(config, partial(make, data=data, seed=seed), partial(_recovery, data=data.validation))
+    write_model(folder, model)
+    told = {"space": StateForward.space, "method": model.method, "trajectories": len(data.training)}
+    name = "recovered_choices" if choices else "action_r2"
+    return {**summary(choice), **told, "heldout": {name: 1.0 - _recovery(model, data.heldout)}}
+
+
+def few(batch: Batch) -> bool:
+    """Whether states and actions of a batch are few enough to be counted."""
+    return bool(batch.metadata.get("cells") and batch.metadata.get("choices"))
+
+
+def _counts(folder: Path, data: Parts, kind: str) -> Mapping[str, Any]:
+    """Count all transitions, those that others hold out too: nothing is fitted."""
+    sizes = data.training.metadata["cells"], data.training.metadata["choices"]
+    seen = sum(counted(part.episodes, *sizes) for part in data)
+    assert isinstance(seen, np.ndarray)
+    write_model(folder, Counts(seen, kind))
+    visited = float((seen.sum(axis=2) > 0).mean())
+    return {"space": Counts.space, "trajectories": sum(map(len, data)), "steps": int(seen.sum()), "visited": visited}
+
+
+def _choices(data: Parts) -> int:
+    return int(data.training.metadata.get("choices", 0))
+
+
+def _variables(config: ModelConfig, batch: Batch) -> tuple[int, ...]:
+    if config.variables == "all":
+        return tuple(range(batch.states))
+    for variable in config.variables:
+        if not 0 <= variable < batch.states:
+            problem = f"the state has entries 0 to {batch.states - 1}"
+            raise ConfigError("model.variables", problem, given=str(variable))
+    return config.variables
+
+
+def _steps(batch: Batch, variables: tuple[int, ...]) -> Steps:
+    states = [one.state for one in batch.episodes if one.state is not None]
+    sent = [one.action if one.grounded_action is None else one.grounded_action for one in batch.episodes]
+    changes = [np.diff(state, axis=0)[:, variables] for state in states]
+    return Steps(np.concatenate([state[:-1] for state in states]), np.concatenate(sent), np.concatenate(changes))
+
+
+def _forward(config: ModelConfig, data: Parts, seed: int, head: Head | None = None) -> StateForward:
+    choices, variables = _choices(data), _variables(config, data.training)
+    known, unseen = (_steps(part, variables) for part in (data.training, data.validation))
+    head = config.head if head is None else head
+    training, validation = (
+        (np.hstack([part.states, encoded(part.actions, choices)]), part.changes) for part in (known, unseen)
+    )
+    network = fit_network(training, validation, config, seed=seed, head=head, least=EXACT)
+    scale = np.maximum(known.changes.std(axis=0), 1e-12)
+    actions = choices or known.actions.shape[1]
+    return StateForward(network, head, data.training.states, actions, choices, variables, scale)
+
+
+def _inverse(config: ModelConfig, data: Parts, seed: int) -> StateInverse:
+    variables = _variables(config, data.training)
+    known, unseen = (_turned(_steps(part, variables)) for part in (data.training, data.validation))
+    network = fit_network(known, unseen, config, seed=seed, least=EXACT)
+    return StateInverse(network, data.training.states, known[1].shape[1], variables)
+
+
+def _nearest(config: ModelConfig, data: Parts, seed: int) -> NearestChoice:
+    return NearestChoice(_forward(config, data, seed, POINT))
+
+
+def _turned(steps: Steps) -> Samples:
+    return np.hstack([steps.states, steps.changes]), steps.actions
+
+
+def _score(model: StateForward, data: Parts) -> float:
+    rows = _steps(data.validation, model.variables)
+    if model.head.draws:
+        return _nll(model, rows)
+    return float(np.mean(np.square((model.changes(rows.states, rows.actions) - rows.changes) / model.scale)))
+
+
+def _nll(model: StateForward, rows: Steps) -> float:
+    """The negative log likelihood of a variable's change, in units of its usual size [nats]."""
+    raw = model.network.predict_many(np.hstack([rows.states, model.encoded(rows.actions)]))
+    each = model.head.surprise(raw, rows.changes) / rows.changes.shape[1]
+    return float(each.mean() - np.log(model.scale).mean())
+
+
+def _recovery(model: StateInverse | NearestChoice, data: Batch) -> float:
+    """The share of actions that is not recovered: of choices the wrong ones, else of the variance."""
+    rows = _steps(data, model.variables)
+    found = model.actions_for(rows.states, rows.changes)
+    if isinstance(model, NearestChoice):
+        return float(np.mean(found != rows.actions))
+    return 1.0 - explained(found - rows.actions, rows.actions)

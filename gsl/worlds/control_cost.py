@@ -1,0 +1,59 @@
+"""Control cost: what a reward charges for an action, which is the agent's, never the one a grounding made of it.
+
+MuJoCo's environments tell it in `info["reward_ctrl"]` as -w |a|²; from one step w is known, and so what the agent's own
+action would have cost. Others can name a function; for the rest nothing can be corrected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from gsl.core.setting import component, setting
+
+KEY = "reward_ctrl"
+
+
+@runtime_checkable
+class ControlCost(Protocol):
+    """What an action costs."""
+
+    def cost(self, action: np.ndarray) -> float:
+        """Return what the reward lacks because of an action, shape (n_actions,), from -1 to 1."""
+
+
+@component
+class Quadratic:
+    """weight · |a|²."""
+
+    weight: Annotated[float, setting("price of a full action of one actuator", ge=0)]
+
+    def cost(self, action: np.ndarray) -> float:
+        """Return the cost."""
+        return self.weight * float(np.square(action).sum())
+
+
+class Charged:
+    """Takes the price of a transformed action out of rewards, and puts that of the agent's action in."""
+
+    def __init__(self, given: ControlCost | None) -> None:
+        self._cost = given
+
+    def corrected(self, reward: float, agent: np.ndarray, sent: np.ndarray, info: Mapping[str, Any]) -> float:
+        """Return the reward with the agent's action charged.
+
+        Args:
+            reward: Of the environment.
+            agent: The agent's action, shape (n_actions,).
+            sent: What the grounding made of it.
+            info: Of the environment's step, with what was carried out.
+        """
+        cost = self._cost
+        if cost is None:
+            squares = float(np.square(info["carried_out"]).sum())
+            if KEY not in info or squares <= 0.0:
+                return reward
+            cost = Quadratic(max(0.0, -float(info[KEY]) / squares))
+        return reward + cost.cost(np.clip(sent, -1.0, 1.0)) - cost.cost(np.clip(agent, -1.0, 1.0))

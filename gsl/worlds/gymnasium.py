@@ -1,0 +1,203 @@
+"""Any gymnasium environment as a world: its observation is the state, its reward stays its own.
+
+Actions of a `Box` are given from -1 to 1 and scaled to the environment's range; where states and actions are discrete,
+both are vectors of one number.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import field
+from functools import cached_property
+from typing import Annotated, Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box, Discrete
+
+from gsl.core.layout import Layout
+from gsl.core.setting import component, setting
+from gsl.core.table import Table
+from gsl.errors import ConfigError, GslError
+from gsl.worlds.control_cost import Charged, ControlCost
+from gsl.worlds.mujoco import change_masses
+
+
+@component
+class GymnasiumWorld:
+    """A world's configuration; `make` builds the environment."""
+
+    env_id: Annotated[str, setting("id of a registered environment, or package.module:Class of one's own")]
+    kwargs: Annotated[Mapping[str, Any], setting("arguments of the environment")] = field(default_factory=dict)
+    mass: Annotated[Mapping[str, float], setting("factors of the masses of a MuJoCo model's bodies, or of `all`")] = (
+        field(default_factory=dict)
+    )
+    action_noise: Annotated[
+        float, setting("standard deviation of the noise on every action, in halves of its range", ge=0)
+    ] = 0.0
+    control_cost: Annotated[
+        ControlCost | None,
+        setting("what the reward charges for an action; none for what the environment's info tells"),
+    ] = None
+
+    @cached_property
+    def layout(self) -> Layout:
+        """What an observation holds; building the environment tells."""
+        env = self.make()
+        env.close()
+        return env.layout
+
+    @property
+    def table(self) -> Table:
+        """Transitions and rewards of an environment that tells them in `P`, as gymnasium's toy texts do.
+
+        Raises:
+            ConfigError: It does not.
+        """
+        env = self.make()
+        inside = env.unwrapped_env
+        if not (env.layout.cells and env.layout.choices and hasattr(inside, "P")):
+            problem = "has no table of transitions P; policy iteration needs one, as gymnasium's toy texts have"
+            raise ConfigError("env_id", problem, given=self.env_id)
+        start = getattr(inside, "initial_state_distrib", None)
+        if start is None:
+            start = np.eye(env.layout.cells)[int(env.reset(seed=0)[0][0])]
+        env.close()
+        return Table.of(inside.P, np.asarray(start, dtype=float))
+
+    def make(self) -> StateEnv:
+        """Build the environment."""
+        return StateEnv(self)
+
+
+class StateEnv(gymnasium.Env):
+    """An environment whose observations and actions are vectors; `info["carried_out"]` is the action, noise and all."""
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  gymnasium's own name and type
+
+    def __init__(self, world: GymnasiumWorld) -> None:
+        self.world = world
+        env = _made(world.env_id, world.kwargs)
+        if world.mass:
+            change_masses(env, world.mass)
+        states, size = _state_size(world, env.observation_space), _action_size(world, env.action_space)
+        cells, choices = _count(env.observation_space), _count(env.action_space)
+        if choices:
+            self._first = int(env.action_space.start)  # type: ignore[attr-defined]
+            self.action_space = Box(0.0, choices - 1.0, (1,), dtype=np.float64)
+        else:
+            env = gymnasium.wrappers.RescaleAction(env, np.float32(-1.0), np.float32(1.0))
+            self.action_space = Box(-1.0, 1.0, (size,), dtype=np.float64)
+        self._env, self.charged = env, Charged(world.control_cost)
+        self.observation_space = Box(-np.inf, np.inf, (states,), dtype=np.float64)
+        names = tuple(map(str, range(size)))
+        self.layout = Layout(names, {"state": states}, _period(env), cells, choices)
+
+    @property
+    def unwrapped_env(self) -> Any:
+        """The user's environment itself."""
+        return self._env.unwrapped
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Start anew; the environment gets the seed, and no options."""
+        super().reset(seed=seed)
+        observation, info = self._env.reset(seed=seed)
+        return self._state(observation), info
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Act: an action beyond its range counts as its end.
+
+        Raises:
+            GslError: The action or what comes of it is no finite number.
+        """
+        sent: Any = np.asarray(action, dtype=float)
+        if not np.isfinite(sent).all():
+            raise GslError(f"{self.world.env_id}: the action {sent.tolist()} is not finite: a policy must give numbers")
+        if self.layout.choices:
+            sent = round(float(sent[0])) + self._first
+        else:
+            sent = np.clip(sent + self.world.action_noise * self.np_random.standard_normal(len(sent)), -1.0, 1.0)
+        observation, reward, ended, cut, info = self._env.step(sent)
+        reward = float(reward)
+        if not np.isfinite(reward):
+            raise GslError(f"{self.world.env_id}: the reward is {reward}; its dynamics or its reward are broken")
+        return self._state(observation), reward, bool(ended), bool(cut), {**info, "carried_out": sent}
+
+    def close(self) -> None:
+        """Free what the environment holds."""
+        self._env.close()
+
+    def _state(self, observation: Any) -> np.ndarray:
+        state = np.atleast_1d(np.asarray(observation, dtype=float)).ravel()
+        if not np.isfinite(state).all():
+            place = int(np.argmin(np.isfinite(state)))
+            problem = f"state.{place} is {state[place]}; its dynamics are broken, or its time step is too long"
+            raise GslError(f"{self.world.env_id}: {problem}")
+        return state
+
+
+def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
+    """Return a registered environment, or an instance of an importable class.
+
+    Raises:
+        ConfigError: It does not exist, cannot be imported, or refuses its arguments.
+    """
+    place, separator, attribute = name.partition(":")
+    try:
+        if separator and attribute.isidentifier():
+            kind = getattr(importlib.import_module(place), attribute)
+            env = kind(**kwargs)
+        else:
+            env = gymnasium.make(name, disable_env_checker=True, **kwargs)
+    except (ImportError, gymnasium.error.DependencyNotInstalled) as error:
+        raise ConfigError("env_id", f"{_line(error)}; MuJoCo's are in gsl[mujoco]", given=name) from error
+    except (AttributeError, gymnasium.error.Error) as error:
+        raise ConfigError("env_id", f"there is no such environment: {_line(error)}", given=name) from error
+    except (TypeError, ValueError) as error:
+        raise ConfigError("kwargs", f"{name} refuses them: {_line(error)}", given=str(dict(kwargs))) from error
+    if not isinstance(env, gymnasium.Env):
+        raise ConfigError("env_id", "is no gymnasium.Env", given=name)
+    return env
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split()).rstrip(".")
+
+
+def _state_size(world: GymnasiumWorld, space: gymnasium.Space[Any]) -> int:
+    if isinstance(space, Discrete):
+        return 1
+    if isinstance(space, Box) and len(space.shape) == 1:
+        return int(space.shape[0])
+    what = f"{type(space).__name__} of shape {space.shape}" if space.shape else type(space).__name__
+    problem = f"observes a {what}; gsl needs a vector: wrap it (images are beyond GAT, the paper's section 10.3)"
+    raise ConfigError("env_id", problem, given=world.env_id)
+
+
+def _count(space: gymnasium.Space[Any]) -> int:
+    return int(space.n) if isinstance(space, Discrete) else 0
+
+
+def _action_size(world: GymnasiumWorld, space: gymnasium.Space[Any]) -> int:
+    if isinstance(space, Discrete):
+        return 1
+    if not isinstance(space, Box) or len(space.shape) != 1:
+        problem = f"its actions are a {type(space).__name__}; gsl needs a Box of one dimension or a Discrete"
+        raise ConfigError("env_id", problem, given=world.env_id)
+    if not space.is_bounded():
+        problem = "its actions have no bounds; wrap it with gymnasium.wrappers.TransformAction or give the space some"
+        raise ConfigError("env_id", problem, given=world.env_id)
+    return int(space.shape[0])
+
+
+def _period(env: gymnasium.Env) -> float:
+    """Return the time between two actions [s], 1 where nobody says."""
+    inside = env.unwrapped
+    for value in (getattr(inside, "dt", None), getattr(inside, "tau", None)):
+        if isinstance(value, float) and value > 0.0:
+            return value
+    rate = inside.metadata.get("render_fps")
+    return 1.0 / rate if rate else 1.0

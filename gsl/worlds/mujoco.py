@@ -1,0 +1,39 @@
+"""Heavier and lighter bodies of a MuJoCo environment: what the paper's section 8.2 calls the real one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gsl.core.validation import did_you_mean
+from gsl.errors import ConfigError
+
+ALL = "all"
+
+
+def change_masses(env: Any, factors: Mapping[str, float]) -> None:
+    """Multiply masses, and inertias with them.
+
+    Args:
+        env: A gymnasium environment of MuJoCo's.
+        factors: By name of the body, or of `all`.
+
+    Raises:
+        ConfigError: It is no MuJoCo environment, has no such body, or a factor is not above 0.
+    """
+    inside = env.unwrapped
+    if not (hasattr(inside, "model") and hasattr(inside.model, "body_mass")):
+        raise ConfigError("mass", "is for MuJoCo environments; this one has no model.body_mass")
+    import mujoco
+
+    model = inside.model
+    names = [model.body(index).name for index in range(1, model.nbody)]
+    for name, factor in factors.items():
+        if name != ALL and name not in names:
+            raise ConfigError(f"mass.{name}", f"there is no such body{did_you_mean(name, names, listed=True)}")
+        if not factor > 0.0:
+            raise ConfigError(f"mass.{name}", "must be above 0", given=f"{factor}")
+        for body in names if name == ALL else [name]:
+            model.body(body).mass *= factor
+            model.body(body).inertia *= factor
+    mujoco.mj_setConst(model, inside.data)

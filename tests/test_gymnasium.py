@@ -1,0 +1,280 @@
+"""Any gymnasium environment as a world: spaces, rewards, grounding, TRPO, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from commands import done, refused
+
+from gsl.core.layout import check_alike
+from gsl.core.seeds import derived_seed
+from gsl.core.trajectory import Batch
+from gsl.errors import ConfigError, GslError
+from gsl.grounding.ane import ActionNoise
+from gsl.grounding.none import NoGrounding
+from gsl.grounding.random_choice import RandomChoice
+from gsl.grounding.states import StateTransformation
+from gsl.models.config import ModelConfig
+from gsl.models.states import NearestChoice, StateForward, StateInverse
+from gsl.optimizers.trpo import Trpo
+from gsl.policies.mlp import Mlp
+from gsl.policies.policy import sized
+from gsl.stages.rollout import Scenario, rollout
+from gsl.stages.simulator import GroundedSimulator
+from gsl.stages.train_states import forward_of_states, inverse_of_states
+from gsl.stages.training import Parts
+from gsl.storage.models import read_forward_model, read_inverse_model
+from gsl.storage.trajectories import read, write
+from gsl.tasks.own_reward import OwnReward
+from gsl.worlds.control_cost import Quadratic
+from gsl.worlds.gymnasium import GymnasiumWorld
+
+CART = GymnasiumWorld(env_id="examples.cart:Cart")
+POLE = GymnasiumWorld(env_id="CartPole-v1")
+SLOPE = replace(CART, kwargs={"slope": 2.0})
+
+
+class Strange(gymnasium.Env):
+    """An environment that can be wrong in every way."""
+
+    def __init__(self, observes: Any = (2,), acts: float = 1.0, value: float = 0.0, reward: float = 0.0) -> None:
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, tuple(observes))
+        self.action_space = gymnasium.spaces.Box(-acts, acts, (1,))
+        self.value, self.reward = value, reward
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, dict[str, Any]]:
+        return np.zeros(self.observation_space.shape), {}  # type: ignore[arg-type]
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        state = np.zeros(self.observation_space.shape)  # type: ignore[arg-type]
+        state[1] = self.value
+        return state, self.reward, False, False, {}
+
+
+def a_policy(world: GymnasiumWorld, hidden: tuple[int, ...] = ()) -> Any:
+    return sized(Mlp(hidden=hidden), world.layout)
+
+
+def episodes(world: GymnasiumWorld, count: int, sd: float = 0.0, role: str = "sim") -> Batch:
+    policy = a_policy(world)
+    noise = RandomChoice(sd) if world.layout.choices else ActionNoise(sd=sd)
+    scenario = Scenario(world, OwnReward(), policy, role, noise)
+    env = scenario.make()
+    found = tuple(rollout(scenario, env, policy.initial, derived_seed(1, role, k)) for k in range(count))
+    layout = world.layout
+    about = {"robot": world.env_id, "role": role, "cells": layout.cells, "choices": layout.choices}
+    return Batch(found, layout.joints, layout.control_period, about)
+
+
+def test_actions_are_scaled_and_states_are_vectors() -> None:
+    world = GymnasiumWorld(env_id="Pendulum-v1")
+    assert (world.layout.states, world.layout.joints, world.layout.control_period) == (3, ("0",), 0.05)
+    env, inner = world.make(), gymnasium.make("Pendulum-v1")
+    env.reset(seed=3)
+    inner.reset(seed=3)
+    ours, theirs = env.step(np.array([0.5])), inner.step(np.array([1.0]))
+    np.testing.assert_allclose(ours[0], theirs[0], atol=1e-6)
+    assert ours[1] == pytest.approx(float(theirs[1]))
+    np.testing.assert_array_equal(env.step(np.array([7.0]))[4]["carried_out"], [1.0])
+
+
+def test_noise_is_drawn_from_the_seed_of_the_episode() -> None:
+    env = replace(CART, action_noise=0.3).make()
+    ways = []
+    for seed in (1, 1, 2):
+        env.reset(seed=seed)
+        ways.append(np.array([env.step(np.zeros(1))[0][1] for _ in range(20)]))
+    np.testing.assert_array_equal(ways[0], ways[1])
+    assert not np.array_equal(ways[0], ways[2])
+
+
+def test_a_batch_of_states_makes_the_trip_through_its_file(tmp_path: Path) -> None:
+    batch = episodes(CART, 3, 0.2)
+    write(tmp_path / "log.parquet", batch)
+    found = read(tmp_path / "log.parquet")
+    assert found.states == 2
+    for one, other in zip(found.episodes, batch.episodes, strict=True):
+        np.testing.assert_array_equal(one.state, other.state)
+        np.testing.assert_array_equal(one.grounded_action, other.grounded_action)
+        np.testing.assert_array_equal(one.sensors["terminated"], other.sensors["terminated"])
+    import pyarrow.parquet as pq
+
+    columns = pq.read_table(tmp_path / "log.parquet").to_pydict()
+    assert columns["next_state.1"][:5] == columns["state.1"][1:6]
+
+
+def test_the_reward_charges_for_the_action_of_the_agent() -> None:
+    """Grounded to a quarter of its size, an action costs as if it were whole."""
+
+    class Quarter:
+        def start(self, layout: Any, rng: Any) -> Any:
+            return self
+
+        def transform(self, observation: np.ndarray, action: np.ndarray) -> np.ndarray:
+            return 0.25 * action
+
+    rewards = {}
+    for name, world in {"told": CART, "given": replace(CART, control_cost=Quadratic(0.1))}.items():
+        scenario = Scenario(world, OwnReward(), a_policy(world), "sim", Quarter())
+        env = scenario.make()
+        env.reset(seed=0)
+        state, rewards[name], *_ = env.step(np.array([0.8]))
+    assert rewards["told"] == pytest.approx(-abs(state[0]) - 0.1 * 0.8**2)
+    assert rewards["given"] == pytest.approx(rewards["told"])
+
+
+def models(tmp_path: Path, sim: GymnasiumWorld, real: GymnasiumWorld, likelihood: Any = "point") -> tuple[Any, Any]:
+    config = ModelConfig("mlp", hidden=(32,), epochs=40, likelihood=likelihood)
+    for name, world, learn, role in (
+        ("f", real, forward_of_states, "real"),
+        ("i", sim, inverse_of_states, "sim"),
+    ):
+        (tmp_path / name).mkdir()
+        parts = Parts(*(episodes(world, count, 0.6, role) for count in (24, 6, 6)))
+        metrics = learn(tmp_path / name, parts, replace(config, likelihood="point") if name == "i" else config, 1)
+        assert metrics["heldout"]
+    return read_forward_model(str(tmp_path / "f/forward_model.safetensors")), read_inverse_model(
+        str(tmp_path / "i/inverse_model.safetensors")
+    )
+
+
+def test_the_grounded_simulator_moves_like_the_real_world(tmp_path: Path) -> None:
+    f, f_inv = models(tmp_path, CART, SLOPE)
+    assert isinstance(f, StateForward) and isinstance(f_inv, StateInverse)
+    policy = a_policy(CART)
+    ways = {}
+    for name, world, grounding in (
+        ("real", SLOPE, NoGrounding()),
+        ("bare", CART, NoGrounding()),
+        ("grounded", CART, StateTransformation(f, f_inv)),
+    ):
+        scenario = Scenario(world, OwnReward(), policy, "sim", grounding)
+        trajectory = rollout(scenario, scenario.make(), np.array([-1.5, -1.0, 0.0]), 4)
+        assert trajectory.state is not None
+        ways[name] = trajectory.state[:60, 0]
+    off = {name: float(np.abs(ways[name] - ways["real"]).max()) for name in ("bare", "grounded")}
+    assert off["grounded"] < 0.4 * off["bare"]
+
+
+def test_a_stochastic_grounding_makes_the_noise_of_the_real_world(tmp_path: Path) -> None:
+    f, f_inv = models(tmp_path, CART, replace(CART, action_noise=0.3), "gaussian")
+    spread = []
+    for world, grounding in (
+        (replace(CART, action_noise=0.3), NoGrounding()),
+        (CART, StateTransformation(f, f_inv, draws=True)),
+        (CART, StateTransformation(f, f_inv)),
+    ):
+        scenario = Scenario(world, OwnReward(), a_policy(CART), "sim", grounding)
+        env = scenario.make()
+        ends = [rollout(scenario, env, np.array([-1.0, -1.0, 0.0]), k) for k in range(60)]
+        spread.append(np.std([one.state[60, 1] for one in ends if one.state is not None]))
+    real, stochastic, plain = spread
+    assert 0.6 * real < stochastic < 1.6 * real
+    assert plain < 0.3 * real
+
+
+def test_choices_are_grounded_by_the_nearest_effect(tmp_path: Path) -> None:
+    f, f_inv = models(tmp_path, POLE, POLE)
+    assert isinstance(f_inv, NearestChoice)
+    states = np.random.default_rng(0).normal(size=(200, 4)) * [0.1, 0.3, 0.05, 0.3]
+    actions = np.random.default_rng(1).integers(2, size=(200, 1)).astype(float)
+    found = f_inv.actions_for(states, f.changes(states, actions))
+    assert (found == actions).mean() > 0.95
+
+
+def test_trpo_learns_and_goes_on_from_what_it_learned() -> None:
+    pytest.importorskip("sb3_contrib")
+    policy = a_policy(CART, (16,))
+    simulator = GroundedSimulator(Scenario(CART, OwnReward(), policy, "sim", NoGrounding()), policy.initial)
+    trpo = Trpo(steps=8192, generations=2, rollout=1024)
+    first, second = trpo.learn(simulator, policy, policy.initial, 1, bold=True)
+    scenario = Scenario(CART, OwnReward(), policy, "sim", NoGrounding())
+
+    def value(parameters: np.ndarray) -> float:
+        env = scenario.make()
+        return float(np.mean([rollout(scenario, env, parameters, k).value for k in range(10)]))
+
+    assert value(second) > value(policy.initial) + 3.0
+    (again,) = Trpo(steps=1024, rollout=1024).learn(simulator, policy, second, 2, bold=False)
+    assert value(again) > value(policy.initial) + 3.0
+    np.testing.assert_array_equal(first, next(iter(trpo.learn(simulator, policy, policy.initial, 1, bold=True))))
+
+
+def test_the_example_of_the_docs_wins_by_its_grounding(tmp_path: Path) -> None:
+    few = ("budget.rollouts=6", "budget.episodes=5", "optimizer.candidates=10", "optimizer.generations=8", "workers=1")
+    worlds = ("sim.env_id=examples.cart:Cart", "real.env_id=examples.cart:Cart", "real.kwargs={slope: 2.0}")
+    search = ("optimizer=cma_es", "optimizer.sigma=0.5", "policy.hidden=[]")
+    done("iterate", "experiment=gymnasium", "name=cart", *search, *worlds, *few, "beside=true", folder=tmp_path)
+    metrics = json.loads((tmp_path / "runs/cart/iterate/metrics.json").read_text())
+    assert metrics["gain"]["interval"][0] > 0.0
+    assert metrics["returned"]["value"] > metrics["ungrounded"]["returned"]["value"]
+
+
+def test_heavier_bodies() -> None:
+    pytest.importorskip("mujoco")
+    light = GymnasiumWorld(env_id="InvertedPendulum-v5")
+    heavy = replace(light, mass={"pole": 10.0})
+    masses = [world.make().unwrapped_env.model.body("pole").mass[0] for world in (light, heavy)]
+    assert masses[1] == pytest.approx(10.0 * masses[0])
+    with pytest.raises(ConfigError, match=r"no such body; did you mean pole\?"):
+        replace(light, mass={"pale": 2.0}).make()
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"env_id": "CartPol-v1"}, "there is no such environment: Environment `CartPol` doesn't exist"),
+        ({"env_id": "examples.cart:Carriage"}, "there is no such environment"),
+        ({"env_id": "nowhere.at:All"}, "No module named 'nowhere'"),
+        ({"env_id": "test_gymnasium:Strange", "kwargs": {"observes": [8, 8, 3]}}, "observes a Box of shape (8, 8, 3)"),
+        ({"env_id": "test_gymnasium:Strange", "kwargs": {"acts": float("inf")}}, "its actions have no bounds"),
+        ({"env_id": "examples.cart:Cart", "kwargs": {"slop": 1.0}}, "examples.cart:Cart refuses them"),
+        ({"env_id": "examples.cart:Cart", "mass": {"all": 2.0}}, "mass: is for MuJoCo environments"),
+    ],
+)
+def test_an_environment_that_does_not_fit_is_one_line(changes: dict[str, Any], line: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        GymnasiumWorld(**changes).make()
+    assert line in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("wrong", "line"), [("value", r"state\.1 is nan"), ("reward", "the reward is nan")])
+def test_an_environment_that_breaks_is_one_line(wrong: str, line: str) -> None:
+    world = GymnasiumWorld(env_id="test_gymnasium:Strange", kwargs={wrong: float("nan")})
+    env = world.make()
+    env.reset(seed=0)
+    with pytest.raises(GslError, match=line):
+        env.step(np.zeros(1))
+
+
+def test_worlds_that_no_policy_fits_both_of_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="real: has 4 states, the simulator 2"):
+        check_alike(CART.layout, POLE.layout)
+    worlds = ("sim.env_id=examples.cart:Cart", "real.env_id=CartPole-v1")
+    assert "has 4 states" in refused("iterate", "experiment=gymnasium", *worlds, folder=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ("optimize world=gymnasium world.env_id=examples.cart:Cart task=own_reward grounding=none "
+         "policy=mlp optimizer=policy_iteration", "policy: policy iteration improves an action_table"),
+        ("optimize world=gymnasium world.env_id=examples.cart:Cart task=own_reward grounding=none "
+         "policy=action_table", "policy: needs a world whose states and actions are discrete"),
+        ("optimize world=gymnasium world.env_id=CartPole-v1 task=own_reward grounding=none policy=action_table",
+         "policy: needs a world whose states and actions are discrete"),
+        ("optimize policy=mlp grounding=none", "policy: acts on the state of a gymnasium environment"),
+        ("optimize world=gymnasium world.env_id=CartPole-v1 task=own_reward grounding=ane policy=mlp",
+         "grounding: its noise is for actions that are numbers"),
+        ("collect world=gymnasium task=own_reward policy=mlp", "world.env_id: has no value"),
+    ],
+)  # fmt: skip
+def test_what_does_not_go_together_is_refused(arguments: str, line: str, tmp_path: Path) -> None:
+    assert refused(*arguments.split(), folder=tmp_path).startswith(line)
