@@ -15,7 +15,7 @@ from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Solver
 from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.grounding_check import ALPHAS, BARE, GROUNDED, OFF, PI0, STILL, check, largest_stable
+from gsl.stages.grounding_check import ALPHAS, BARE, GROUNDED, OFF, PI0, STILL, allowed_falls, check, largest_stable
 from gsl.stages.grounding_replay import TICKS
 from gsl.stages.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
@@ -78,3 +78,9 @@ def test_trajectories_without_the_body_cannot_be_replayed() -> None:
 def test_trajectories_of_another_robot_are_refused() -> None:
     with pytest.raises(InputError, match="differ in joints: their order"):
         check(SCENARIO, POLICY.initial, replace(heldout(), joints=JOINTS[::-1]), 1)
+
+
+@pytest.mark.parametrize(("share", "allowed"), [(0.0, 0), (0.1, 2), (0.6, 4), (1.0, 4)])
+def test_pi0_may_fall_as_it_does_in_real(share: float, allowed: int) -> None:
+    heldout = Batch((), ("a",), 0.02, {"pi0_falls": share})
+    assert allowed_falls(heldout) == allowed

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch, Trajectory
@@ -24,6 +24,7 @@ GROUNDED, BARE, STILL = "grounded", "ungrounded", "no_change"
 REPLAYS = 60  # of each group of trajectories, at most
 ASKED = 40  # steps of which it is asked whether the simulator can do them
 EPISODES = 4  # of pi0 in the grounded simulator
+SURELY = 0.05  # chance of so many falls in the grounded simulator, if π0 fell there as often as in real
 ALPHAS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3)
 
 
@@ -122,9 +123,9 @@ TITLES = (
 
 
 def allowed_falls(heldout: Batch) -> int:
-    """Return how often π0 may fall in the grounded simulator: as often as in real, rounded up."""
+    """Return how often π0 may fall in the grounded simulator: not surely more often than in real."""
     share = float(heldout.metadata.get(FALLS, 0.0))
-    return math.ceil(share * EPISODES)
+    return max(k for k in range(EPISODES + 1) if stats.binom.sf(k - 1, EPISODES, share) >= SURELY)
 
 
 def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int) -> GroundingReport:
