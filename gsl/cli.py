@@ -105,6 +105,7 @@ stage("reproduce fig7", "An ankle of the linear walk, as in the paper's figure 7
 stage("reproduce fig11", "Cliff Walking against the noise of the real world, as in the paper's figure 11.")
 stage("reproduce fig12", "A heavy pendulum with noisy actions, as in the paper's figure 12 (gsl[mujoco,rl]).")
 stage("reproduce fig13", "A cheetah with noisy actions, as in the paper's figure 13 (gsl[mujoco,rl]).")
+stage("reproduce garat", "The heavier worlds of the GARAT suite (gsl[mujoco,rl]).")
 stage("reproduce budget", "Return and grounding error against the number of real trajectories.")
 stage("survey", "See how far real worlds are from the simulator.")
 stage("iterate", "The whole chain, again and again, until the real return stops improving.")

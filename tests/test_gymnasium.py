@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -278,3 +279,33 @@ def test_worlds_that_no_policy_fits_both_of_are_refused(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_what_does_not_go_together_is_refused(arguments: str, line: str, tmp_path: Path) -> None:
     assert refused(*arguments.split(), folder=tmp_path).startswith(line)
+
+
+def test_figure_12_is_one_command(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    pytest.importorskip("sb3_contrib")
+    few = ("trials=1", "noises=[0.3]", "workers=1", "iterate.budget.real_episodes=6", "iterate.budget.sim_episodes=8")
+    said = done("reproduce", "fig12", "preset=toy", *few, "iterate.budget.episodes=3", "~methods.ane", folder=tmp_path)
+    folder = tmp_path / "runs/fig12/reproduce"
+    points = json.loads((folder / "points.json").read_text())
+    assert [one["method"] for one in points] == ["none", "gat", "sgat", "trained on real"]
+    assert all(one["value"] > 1.0 for one in points)
+    assert 0 == points[0]["real_steps"] < points[1]["real_steps"]
+    assert (folder / "figure.png").stat().st_size > 10_000
+    assert "trained on real" in said.out
+
+
+def test_without_the_extra_a_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "sb3_contrib", None)
+    policy = a_policy(CART)
+    simulator = GroundedSimulator(Scenario(CART, OwnReward(), policy, "sim", NoGrounding()), policy.initial)
+    with pytest.raises(ConfigError, match=r"TRPO needs gsl\[rl\]: pip install 'gsl\[rl\]'"):
+        next(iter(Trpo(steps=10).learn(simulator, policy, policy.initial, 1, bold=True)))
+
+
+def test_without_mujoco_a_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith(("mujoco", "gymnasium.envs.mujoco"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(ConfigError, match=r"gsl\[mujoco\]"):
+        GymnasiumWorld(env_id="InvertedPendulum-v5").make()

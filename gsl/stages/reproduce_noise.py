@@ -1,11 +1,11 @@
-"""The paper's figures 12 and 13: environments whose real world is noisy, and maybe heavier, with TRPO as optimiser."""
+"""The paper's figures 12 and 13, and GARAT's suite: real worlds that are noisy or heavier, with TRPO as optimiser."""
 
 from __future__ import annotations
 
 import json
 import pickle
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -19,6 +19,7 @@ from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.trpo import Trpo
+from gsl.policies.policy import sized
 from gsl.report.markdown import table as markdown
 from gsl.report.noise_bars import Bars, noise_bars
 from gsl.stages.chain import Chain
@@ -27,6 +28,7 @@ from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, in_parallel
 from gsl.storage.documents import write_json
 from gsl.worlds.gymnasium import GymnasiumWorld
+from gsl.worlds.world import World
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "figure.png"
 REAL = "trained on real"
@@ -64,6 +66,9 @@ class NoiseStudy:
     methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name")]
     further: Annotated[Trpo, setting("how it goes on from π0")]
     trials: Annotated[int, setting("trials of each method", ge=1)]
+    sims: Annotated[Mapping[str, GymnasiumWorld], setting("simulators of worlds that have one of their own")] = field(
+        default_factory=dict
+    )
     workers: Workers = -1
 
     def parents(self) -> Mapping[str, Path]:
@@ -93,17 +98,16 @@ class NoiseStudy:
     def trial(self, number: int, home: Path) -> list[Point]:
         """Return all points of a trial, built below `home`."""
         seed, console = self.iterate.seed + number - 1, Console(json=True)
-        name, chain = f"trial_{number:02d}", replace(self.iterate.chain, workers=1, accept=True)
-        first = chain.search(home / "pretrained" / name, NoGrounding(), None, seed, console)
-        going_on = replace(chain, optimizer=self.further)
-        start, points = str(first.folder / BEST), []
+        name, points = f"trial_{number:02d}", []
         for world, noise in ((world, noise) for world in self.worlds for noise in self.noises):
-            real = replace(self.worlds[world], action_noise=noise)
-            at = replace(going_on, real=real)
-            below = home / f"{world}_{noise:g}"
+            real, sim = replace(self.worlds[world], action_noise=noise), self.sims.get(world)
+            chain = self._chain(sim or self.iterate.sim)
+            alone, below = home / (f"{world}_sim" if sim else "sim"), home / f"{world}_{noise:g}"
+            first = chain.search(alone / "pretrained" / name, NoGrounding(), None, seed, console)
+            at, start = replace(chain, real=real, optimizer=self.further), str(first.folder / BEST)
             for method, grounding in self.methods.items():
                 learned = isinstance(innermost(grounding), ActionTransformation)
-                place = (below if learned else home / "sim") / method / name
+                place = (below if learned else alone) / method / name
                 ready = at.ready(place, grounding, start, seed, console)
                 policy = at.search(place / "optimize", ready, start, seed, console)
                 value = self._value(at, below / method / name / "evaluate", policy, seed, console)
@@ -114,6 +118,11 @@ class NoiseStudy:
             value = self._value(at, below / "real" / name / "evaluate", on_real, seed, console)
             points.append(Point(world, noise, REAL, number, value, self.further.steps))
         return points
+
+    def _chain(self, sim: World) -> Chain:
+        """Return the links in a simulator, for whose sizes the policy is made anew."""
+        policy = sized(self.iterate.policy, sim.layout)
+        return replace(self.iterate.chain, sim=sim, policy=policy, workers=1, accept=True)
 
     def _value(self, chain: Chain, place: Path, policy: Any, seed: int, console: Any) -> float:
         return float(chain.measure(place, policy, seed, console).metrics["last"]["value"])
