@@ -1,7 +1,7 @@
-"""A cart is to stop at a mark: an environment of one's own, and a real rail that is not level, which its simulator lacks.
+"""A cart is to stop at a mark; the real rail is not level, which the simulator does not know.
 
-    gsl iterate experiment=gymnasium name=cart optimizer=cma_es optimizer.sigma=0.5 'policy.hidden=[]' \
-        sim.env_id=examples.cart:Cart real.env_id=examples.cart:Cart 'real.kwargs={slope: 2.0}'
+gsl iterate experiment=gymnasium name=cart optimizer=cma_es optimizer.sigma=0.5 'policy.hidden=[]' \
+    sim.env_id=examples.cart:Cart real.env_id=examples.cart:Cart 'real.kwargs={slope: 2.0}'
 """
 
 import gymnasium
@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Cart(gymnasium.Env):
-    """State: distance to the mark [m], speed [m/s]. Action: motor, from -1 to 1. Reward: minus distance, minus effort."""
+    """State: distance to the mark [m] and speed [m/s]; action: motor; reward: minus distance and effort."""
 
     def __init__(self, slope: float = 0.0) -> None:
         self.slope, self.dt = slope, 0.05  # [m/s²], [s]
