@@ -85,9 +85,9 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path: Path) -> None:
     ("words", "expected"),
     [
         (["gsl", "collect", "world", "=", "nao_w"], {"nao_weak", "nao_worn"}),
-        (["gsl", "collect", "world", "=", "w"], {"worn"}),
-        (["gsl", "collect", "world", "=", "i"], {"ideal"}),
-        (["gsl", "evaluate", "real", "=", "i"], {"ideal"}),
+        (["gsl", "collect", "world", "=", "wo"], {"worn"}),
+        (["gsl", "collect", "world", "=", "id"], {"ideal"}),
+        (["gsl", "evaluate", "real", "=", "id"], {"ideal"}),
         (["gsl", "collect", "epi"], {"episodes=", "episodes=3"}),
     ],
 )

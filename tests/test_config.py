@@ -75,10 +75,15 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
         (["sim=ideal"], "sim: no such setting"),
         (
             ["world=wrn"],
-            "no world called wrn; did you mean worn? There is ideal, "
-            "nao_drawn_a, nao_drawn_b, nao_harsh, nao_ideal, nao_uneven, nao_weak, nao_worn, plain, worn",
+            "no world called wrn; did you mean worn? There is cliff_walking, cliff_walking_noisy, gymnasium, "
+            "half_cheetah, half_cheetah_noisy, hopper, hopper_heavy, ideal, inverted_pendulum, "
+            "inverted_pendulum_heavy, inverted_pendulum_noisy, nao_drawn_a, nao_drawn_b, nao_harsh, nao_ideal, "
+            "nao_uneven, nao_weak, nao_worn, plain, walker2d, walker2d_heavy, worn",
         ),
-        (["experiment=lng"], "no experiment called lng; did you mean long? There is arm, linear_walk, long"),
+        (
+            ["experiment=lng"],
+            "no experiment called lng; did you mean long? There is arm, cliff_walking, gymnasium, linear_walk, long",
+        ),
         (["episodes=four"], "episodes = four: must be a whole number"),
         (["episodes=-1"], "episodes = -1: must be above 0"),
         (["episodes"], "episodes: has no value; write key=value"),
@@ -195,6 +200,12 @@ def test_help_shows_groups_settings_and_effects(capsys: pytest.CaptureFixture[st
     assert "backlash.width" in text
 
 
+OF_ENVIRONMENTS = {  # what is for gymnasium environments, and goes with no robot
+    "policy": ("mlp", "action_table"),
+    "optimizer": ("policy_iteration", "trpo"),
+    "grounding": ("random_choice",),
+    "trial": ("gymnasium",),
+}
 NEEDED = {"diagnose": ("real=logs",), "identify": ("real=logs",)}  # what has no default
 
 
@@ -210,7 +221,17 @@ def _choices() -> Iterator[tuple[str, ...]]:
         for number in range(max(map(len, found), default=0)):
             chosen = (typed[min(number, len(typed) - 1)] for typed in found)
             yield command.stem.replace("_", "-"), *chosen, *NEEDED.get(command.stem, ())
-    yield from [("iterate", f"experiment={option.stem}") for option in sorted((conf / "experiment").glob("*.yaml"))]
+    experiments = sorted(option.stem for option in (conf / "experiment").glob("*.yaml"))
+    cart = ("sim.env_id=examples.cart:Cart", "real.env_id=examples.cart:Cart")
+    for name in experiments:
+        yield "iterate", f"experiment={name}", *(cart if name == "gymnasium" else ())
+    for grounding in ("none", "ane", "gat", "sgat"):
+        yield "iterate", "experiment=gymnasium", f"grounding={grounding}", *cart
+    for world in sorted((conf / "world").glob("[!n]*.yaml")):
+        place = ("world.env_id=examples.cart:Cart",) if world.stem == "gymnasium" else ()
+        policy = "action_table" if world.stem.startswith("cliff") else "mlp"
+        for command in ("collect", "optimize"):
+            yield command, f"world={world.stem}", *place, "task=own_reward", f"policy={policy}"
 
 
 def _typed(group: str, conf: Path, command: str) -> list[str]:
@@ -218,7 +239,11 @@ def _typed(group: str, conf: Path, command: str) -> list[str]:
     found = (option.stem for option in sorted((conf / folder).glob("*.yaml")))
     if role.endswith("excitation"):  # the policy that a diagnosis plays
         return [f"{role}=excitation"]
-    return [f"{role or folder}={name}" for name in found if name != "excite" or command == "collect"]
+    if command in ("reproduce_fig11", "reproduce_fig12", "reproduce_fig13", "reproduce_garat"):
+        return []
+    mine = (name for name in found if name not in OF_ENVIRONMENTS.get(folder, ()))
+    robots = (name for name in mine if folder != "world" or name.startswith("nao"))
+    return [f"{role or folder}={name}" for name in robots if name != "excite" or command == "collect"]
 
 
 @pytest.mark.parametrize("line", list(_choices()), ids=" ".join)

@@ -16,7 +16,7 @@ from commands import done, refused
 from gsl.core.layout import check_alike
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
-from gsl.errors import ConfigError, GslError
+from gsl.errors import ConfigError, GslError, TrajectoryError
 from gsl.grounding.ane import ActionNoise
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.random_choice import RandomChoice
@@ -56,6 +56,18 @@ class Strange(gymnasium.Env):
         state = np.zeros(self.observation_space.shape)  # type: ignore[arg-type]
         state[1] = self.value
         return state, self.reward, False, False, {}
+
+
+class InPlace(Strange):
+    """Its state is one array that it changes, as an environment may."""
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[np.ndarray, dict[str, Any]]:
+        self.state = np.zeros(2)
+        return self.state, {}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        self.state += 1.0
+        return self.state, 0.0, False, False, {}
 
 
 def a_policy(world: GymnasiumWorld, hidden: tuple[int, ...] = ()) -> Any:
@@ -108,6 +120,44 @@ def test_a_batch_of_states_makes_the_trip_through_its_file(tmp_path: Path) -> No
 
     columns = pq.read_table(tmp_path / "log.parquet").to_pydict()
     assert columns["next_state.1"][:5] == columns["state.1"][1:6]
+
+
+def test_a_next_state_that_is_not_the_next_rows_is_refused(tmp_path: Path) -> None:
+    import pyarrow.parquet as pq
+
+    write(tmp_path / "log.parquet", episodes(CART, 2))
+    table = pq.read_table(tmp_path / "log.parquet")
+    column = table.column("next_state.0").to_numpy().copy()
+    column[3] += 1.0
+    pq.write_table(table.set_column(table.column_names.index("next_state.0"), "next_state.0", [column]), tmp_path / "l")
+    with pytest.raises(TrajectoryError, match=r"next_state\.0, row 3: is not the state of the next row"):
+        read(tmp_path / "l")
+
+
+def test_an_environment_may_change_its_state_in_place() -> None:
+    env = GymnasiumWorld(env_id="test_gymnasium:InPlace").make()
+    first, _ = env.reset(seed=0)
+    second = env.step(np.zeros(1))[0]
+    assert (first[0], second[0]) == (0.0, 1.0)
+
+
+def test_noise_on_actions_is_not_the_environments_own() -> None:
+    env = GymnasiumWorld(env_id="test_gymnasium:InPlace", action_noise=0.1).make()
+    env.reset(seed=5)
+    noise = env.step(np.zeros(1))[4]["carried_out"] / 0.1
+    assert noise[0] != pytest.approx(np.random.default_rng(5).standard_normal())
+
+
+def test_choices_of_a_noisy_world_are_replaced_now_and_then() -> None:
+    env = replace(POLE, action_noise=0.5).make()
+    env.reset(seed=1)
+    told = []
+    for _ in range(400):
+        _, _, ended, _, info = env.step(np.array([1.0]))
+        told.append(info["carried_out"][0])
+        if ended:
+            env.reset(seed=len(told))
+    assert 0.15 < np.mean(np.array(told) == 0.0) < 0.35
 
 
 def test_the_reward_charges_for_the_action_of_the_agent() -> None:
@@ -235,7 +285,10 @@ def test_heavier_bodies() -> None:
         ({"env_id": "nowhere.at:All"}, "No module named 'nowhere'"),
         ({"env_id": "test_gymnasium:Strange", "kwargs": {"observes": [8, 8, 3]}}, "observes a Box of shape (8, 8, 3)"),
         ({"env_id": "test_gymnasium:Strange", "kwargs": {"acts": float("inf")}}, "its actions have no bounds"),
-        ({"env_id": "examples.cart:Cart", "kwargs": {"slop": 1.0}}, "examples.cart:Cart refuses them"),
+        (
+            {"env_id": "examples.cart:Cart", "kwargs": {"slop": 1.0}},
+            "examples.cart:Cart cannot be made with them: TypeError",
+        ),
         ({"env_id": "examples.cart:Cart", "mass": {"all": 2.0}}, "mass: is for MuJoCo environments"),
     ],
 )

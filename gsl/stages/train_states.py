@@ -20,7 +20,7 @@ from gsl.models.states import NearestChoice, StateForward, StateInverse, encoded
 from gsl.stages.training import Parts, explained, summary
 from gsl.storage.models import write_model
 
-EXACT = 1e-9  # of the largest standard deviation: states have units of their own, and none is too small to matter
+EXACT = 1e-3  # of the largest standard deviation: states have units of their own, some of them small
 
 
 class Steps(NamedTuple):
@@ -99,6 +99,8 @@ def _variables(config: ModelConfig, batch: Batch) -> tuple[int, ...]:
 def _steps(batch: Batch, variables: tuple[int, ...]) -> Steps:
     states = [one.state for one in batch.episodes if one.state is not None]
     sent = [one.action if one.grounded_action is None else one.grounded_action for one in batch.episodes]
+    if not batch.metadata.get("choices"):
+        sent = [np.clip(one, -1.0, 1.0) for one in sent]  # as the environment carries them out
     changes = [np.diff(state, axis=0)[:, variables] for state in states]
     return Steps(np.concatenate([state[:-1] for state in states]), np.concatenate(sent), np.concatenate(changes))
 

@@ -156,6 +156,9 @@ def check_rows(path: Path, columns: Mapping[str, np.ndarray]) -> np.ndarray:
     _refuse(path, "time", within & (np.diff(columns["time"]) <= 0), problem, first=1)
     for name, values in columns.items():
         _check_values(path, name, values, last)
+        if name.startswith("next_state."):
+            after = np.append(columns[name.removeprefix("next_")][1:], np.nan)
+            _refuse(path, name, ~last & (values != after), "is not the state of the next row; split the episode there")
     return np.insert(np.flatnonzero(last) + 1, 0, 0)
 
 

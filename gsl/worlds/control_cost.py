@@ -1,7 +1,8 @@
 """Control cost: what a reward charges for an action, which is the agent's, never the one a grounding made of it.
 
-MuJoCo's environments tell it in `info["reward_ctrl"]` as -w |a|²; from one step w is known, and so what the agent's own
-action would have cost. Others can name a function; for the rest nothing can be corrected.
+MuJoCo's environments tell it in `info["reward_ctrl"]` as -w |a|², with ranges that are alike for all actuators and
+symmetric; from one step w is known, and so what the agent's own action would have cost. Others can name a function; for
+the rest nothing can be corrected.
 """
 
 from __future__ import annotations
@@ -39,21 +40,22 @@ class Charged:
     """Takes the price of a transformed action out of rewards, and puts that of the agent's action in."""
 
     def __init__(self, given: ControlCost | None) -> None:
-        self._cost = given
+        self._cost, self._weight = given, 0.0
 
-    def corrected(self, reward: float, agent: np.ndarray, sent: np.ndarray, info: Mapping[str, Any]) -> float:
+    def corrected(self, reward: float, agent: np.ndarray, info: Mapping[str, Any]) -> float:
         """Return the reward with the agent's action charged.
 
         Args:
             reward: Of the environment.
             agent: The agent's action, shape (n_actions,).
-            sent: What the grounding made of it.
             info: Of the environment's step, with what was carried out.
         """
         cost = self._cost
         if cost is None:
             squares = float(np.square(info["carried_out"]).sum())
-            if KEY not in info or squares <= 0.0:
+            if KEY not in info:
                 return reward
-            cost = Quadratic(max(0.0, -float(info[KEY]) / squares))
-        return reward + cost.cost(np.clip(sent, -1.0, 1.0)) - cost.cost(np.clip(agent, -1.0, 1.0))
+            if squares > 0.0:
+                self._weight = max(0.0, -float(info[KEY]) / squares)
+            cost = Quadratic(self._weight)
+        return reward + cost.cost(info["carried_out"]) - cost.cost(np.clip(agent, -1.0, 1.0))

@@ -7,9 +7,10 @@ both are vectors of one number.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Annotated, Any
 
 import gymnasium
@@ -23,6 +24,8 @@ from gsl.errors import ConfigError, GslError
 from gsl.worlds.control_cost import Charged, ControlCost
 from gsl.worlds.mujoco import change_masses
 
+_STREAM = 11  # sets the noise on actions apart from the environment's own randomness, whose seed is the same
+
 
 @component
 class GymnasiumWorld:
@@ -34,7 +37,8 @@ class GymnasiumWorld:
         field(default_factory=dict)
     )
     action_noise: Annotated[
-        float, setting("standard deviation of the noise on every action, in halves of its range", ge=0)
+        float,
+        setting("sd of noise on every action, in halves of its range; of choices, the chance of another one", ge=0),
     ] = 0.0
     control_cost: Annotated[
         ControlCost | None,
@@ -89,7 +93,9 @@ class StateEnv(gymnasium.Env):
         else:
             env = gymnasium.wrappers.RescaleAction(env, np.float32(-1.0), np.float32(1.0))
             self.action_space = Box(-1.0, 1.0, (size,), dtype=np.float64)
-        self._env, self.charged = env, Charged(world.control_cost)
+        self._lowest = float(env.observation_space.start) if cells else 0.0  # type: ignore[attr-defined]
+        self._env, self.charged = env, None if choices else Charged(world.control_cost)
+        self._rng = np.random.default_rng()
         self.observation_space = Box(-np.inf, np.inf, (states,), dtype=np.float64)
         names = tuple(map(str, range(size)))
         self.layout = Layout(names, {"state": states}, _period(env), cells, choices)
@@ -103,8 +109,10 @@ class StateEnv(gymnasium.Env):
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Start anew; the environment gets the seed, and no options."""
-        super().reset(seed=seed)
-        observation, info = self._env.reset(seed=seed)
+        if seed is not None:
+            self._rng = np.random.default_rng([seed, _STREAM])
+        with self._told():
+            observation, info = self._env.reset(seed=seed)
         return self._state(observation), info
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
@@ -116,11 +124,16 @@ class StateEnv(gymnasium.Env):
         sent: Any = np.asarray(action, dtype=float)
         if not np.isfinite(sent).all():
             raise GslError(f"{self.world.env_id}: the action {sent.tolist()} is not finite: a policy must give numbers")
+        noise = self.world.action_noise
         if self.layout.choices:
-            sent = round(float(sent[0])) + self._first
+            other = noise > 0.0 and self._rng.random() < noise
+            number = int(self._rng.integers(self.layout.choices)) if other else round(float(sent[0]))
+            given, sent = number + self._first, np.array([float(number)])
         else:
-            sent = np.clip(sent + self.world.action_noise * self.np_random.standard_normal(len(sent)), -1.0, 1.0)
-        observation, reward, ended, cut, info = self._env.step(sent)
+            sent = np.clip(sent + noise * self._rng.standard_normal(len(sent)), -1.0, 1.0)
+            given = sent.astype(self._env.action_space.dtype)
+        with self._told():
+            observation, reward, ended, cut, info = self._env.step(given)
         reward = float(reward)
         if not np.isfinite(reward):
             raise GslError(f"{self.world.env_id}: the reward is {reward}; its dynamics or its reward are broken")
@@ -130,8 +143,21 @@ class StateEnv(gymnasium.Env):
         """Free what the environment holds."""
         self._env.close()
 
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Tell what fails inside the user's environment as the environment's own failure."""
+        try:
+            yield
+        except (KeyboardInterrupt, GslError):
+            raise
+        except Exception as error:
+            raise GslError(f"{self.world.env_id}: fails by itself: {type(error).__name__}: {_line(error)}") from error
+
     def _state(self, observation: Any) -> np.ndarray:
-        state = np.atleast_1d(np.asarray(observation, dtype=float)).ravel()
+        state = np.array(observation, dtype=float).ravel() - self._lowest
+        if len(state) != self.layout.states:
+            problem = f"observes {len(state)} numbers, but its space has {self.layout.states}"
+            raise GslError(f"{self.world.env_id}: {problem}")
         if not np.isfinite(state).all():
             place = int(np.argmin(np.isfinite(state)))
             problem = f"state.{place} is {state[place]}; its dynamics are broken, or its time step is too long"
@@ -145,22 +171,30 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
     Raises:
         ConfigError: It does not exist, cannot be imported, or refuses its arguments.
     """
-    place, separator, attribute = name.partition(":")
+    make = _maker(name)
     try:
-        if separator and attribute.isidentifier():
-            kind = getattr(importlib.import_module(place), attribute)
-            env = kind(**kwargs)
-        else:
-            env = gymnasium.make(name, disable_env_checker=True, **kwargs)
-    except (ImportError, gymnasium.error.DependencyNotInstalled) as error:
+        env = make(**kwargs)
+    except gymnasium.error.DependencyNotInstalled as error:
         raise ConfigError("env_id", f"{_line(error)}; MuJoCo's are in gsl[mujoco]", given=name) from error
-    except (AttributeError, gymnasium.error.Error) as error:
+    except gymnasium.error.Error as error:
         raise ConfigError("env_id", f"there is no such environment: {_line(error)}", given=name) from error
-    except (TypeError, ValueError) as error:
-        raise ConfigError("kwargs", f"{name} refuses them: {_line(error)}", given=str(dict(kwargs))) from error
+    except Exception as error:
+        told = f"{name} cannot be made with them: {type(error).__name__}: {_line(error)}"
+        raise ConfigError("kwargs", told, given=str(dict(kwargs))) from error
     if not isinstance(env, gymnasium.Env):
         raise ConfigError("env_id", "is no gymnasium.Env", given=name)
     return env
+
+
+def _maker(name: str) -> Callable[..., Any]:
+    place, separator, attribute = name.partition(":")
+    if not separator or not attribute.isidentifier():
+        return partial(gymnasium.make, name, disable_env_checker=True)
+    try:
+        found = getattr(importlib.import_module(place), attribute)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise ConfigError("env_id", f"there is no such environment: {_line(error)}", given=name) from error
+    return found
 
 
 def _line(error: Exception) -> str:
@@ -187,6 +221,8 @@ def _action_size(world: GymnasiumWorld, space: gymnasium.Space[Any]) -> int:
     if not isinstance(space, Box) or len(space.shape) != 1:
         problem = f"its actions are a {type(space).__name__}; gsl needs a Box of one dimension or a Discrete"
         raise ConfigError("env_id", problem, given=world.env_id)
+    if not np.issubdtype(space.dtype, np.floating) or np.any(space.low >= space.high):
+        raise ConfigError("env_id", "its actions have no room: the space is of integers or empty", given=world.env_id)
     if not space.is_bounded():
         problem = "its actions have no bounds; wrap it with gymnasium.wrappers.TransformAction or give the space some"
         raise ConfigError("env_id", problem, given=world.env_id)
