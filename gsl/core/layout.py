@@ -72,3 +72,6 @@ def check_alike(sim: Layout, real: Layout) -> None:
     ):
         if ours != theirs:
             raise ConfigError("real", f"has {theirs} {name}, the simulator {ours}; a policy must fit both")
+    if sim.joints != real.joints:
+        different = ", ".join(sorted(set(sim.joints) ^ set(real.joints))) or "their order"
+        raise ConfigError("real", f"has other joints than the simulator ({different}); a policy must fit both")

@@ -35,6 +35,12 @@ class Trpo:
     critic_updates: Annotated[int, setting("passes of the critic over a rollout", ge=1)] = 10
     exploration: Annotated[float, setting("first standard deviation of the actions, range -1 to 1", gt=0)] = 0.5
 
+    @property
+    def taken(self) -> int:
+        """Steps that it takes: whole rollouts, in every generation."""
+        each = max(self.steps // self.generations, 1)
+        return self.generations * -(-each // self.rollout) * self.rollout
+
     def learn(
         self, simulator: Simulator, policy: Policy, parameters: np.ndarray, seed: int, *, bold: bool
     ) -> Iterator[np.ndarray]:
@@ -53,8 +59,8 @@ class Trpo:
             raise ConfigError("optimizer", f"TRPO needs gsl[rl]: pip install 'gsl[rl]' ({error})") from error
         threads = torch.get_num_threads()
         torch.set_num_threads(1)
+        env = VecNormalize(DummyVecEnv([simulator.env]), norm_obs=bold, gamma=self.discount)
         try:
-            env = VecNormalize(DummyVecEnv([simulator.env]), norm_obs=bold, gamma=self.discount)
             model = sb3_contrib.TRPO(
                 "MlpPolicy",
                 env,
@@ -79,8 +85,8 @@ class Trpo:
             for _ in range(self.generations):
                 model.learn(max(self.steps // self.generations, 1), reset_num_timesteps=False)
                 yield vector_of(_folded(_taken(model), env.obs_rms if bold else None, float(env.epsilon)))
-            env.close()
         finally:
+            env.close()
             torch.set_num_threads(threads)
 
 

@@ -58,5 +58,5 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str) -> Figure:
             axes.set_ylabel("return in real")
             axes.set_title(name, loc="left", fontsize=10.5)
         axes.legend(frameon=False, fontsize=9, loc="upper right")
-        headline(whole, "Return in a noisy real world")
+        headline(whole, "Return in the real world")
     return whole

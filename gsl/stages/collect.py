@@ -13,6 +13,7 @@ from gsl.core.described import described
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
+from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
 from gsl.grounding.random_choice import RandomChoice
 from gsl.policies.policy import Policy, neighbour, sized
@@ -54,6 +55,9 @@ class Collect:
     def __post_init__(self) -> None:
         """Tell the policy its world."""
         object.__setattr__(self, "policy", sized(self.policy, self.world.layout))
+        if self.world.layout.choices and self.action_noise > 1.0:
+            given = f"{self.action_noise:g}"
+            raise ConfigError("action_noise", "is the chance of another choice here, 1 at most", given=given)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the artifact that the parameters come from and the file that is played, if any."""

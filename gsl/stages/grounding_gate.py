@@ -150,7 +150,7 @@ class Gate:
         """Compare what π0 is worth with held-out real episodes."""
         if uncharged(ready):
             problem = "the reward may charge for the grounded action instead of the agent's"
-            self.console.status(f"warning: {problem}; say what it charges with world.control_cost")
+            self.console.status(f"warning: {problem}; say what it charges with control_cost of the simulator")
         real = of_policy(heldout, pi0=True) or heldout.episodes
         report = value_report(ready, self.parameters, real, derived_seed(self.seed, "check"))
         write_json(self.folder / REPORT, report.metrics())

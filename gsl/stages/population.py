@@ -88,34 +88,39 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: list[i
     """Yield (index, result) as they come, until a worker dies."""
     import joblib
     from joblib.externals.loky.process_executor import TerminatedWorkerError
+    from joblib.parallel import get_active_backend
 
     if workers == 1:
         yield from ((index, function(frozen, jobs[index])) for index in missing)
         return
+    parent = os.getpid() if type(get_active_backend()[0]).__name__ == "LokyBackend" else 0
     parallel = joblib.Parallel(n_jobs=workers, batch_size=1, return_as="generator_unordered")
     try:
         with processes_starting():
-            found = parallel(joblib.delayed(_numbered)(function, frozen, jobs[index], index) for index in missing)
+            found = parallel(
+                joblib.delayed(_numbered)(function, frozen, jobs[index], index, parent) for index in missing
+            )
         yield from found
     except TerminatedWorkerError:
         return
 
 
-def _numbered(function: Any, frozen: bytes, job: Any, index: int) -> tuple[int, Any]:
-    _end_with_parent()
+def _numbered(function: Any, frozen: bytes, job: Any, index: int, parent: int) -> tuple[int, Any]:
+    if parent:
+        _end_with_parent(parent)
     return index, function(frozen, job)
 
 
 @lru_cache(maxsize=1)
-def _end_with_parent() -> None:
+def _end_with_parent(parent: int) -> None:
     """Let this worker end soon after the process that started it, which cannot see to it after a kill -9."""
 
-    def watch(parent: int) -> None:
+    def watch() -> None:
         while os.getppid() == parent:
             time.sleep(1.0)
         os._exit(1)
 
-    threading.Thread(target=watch, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _trajectory(frozen: bytes, job: Job) -> Trajectory:

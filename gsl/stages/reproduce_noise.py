@@ -116,7 +116,7 @@ class NoiseStudy:
                 below / "real" / name / "optimize", NoGrounding(), start, seed, console
             )
             value = self._value(at, below / "real" / name / "evaluate", on_real, seed, console)
-            points.append(Point(world, noise, REAL, number, value, self.further.steps))
+            points.append(Point(world, noise, REAL, number, value, self.further.taken))
         return points
 
     def _chain(self, sim: World) -> Chain:
@@ -154,7 +154,7 @@ class NoiseStudy:
         below = (
             f"\nMean ± standard error over {self.trials} trials; learned groundings saw at most {spent:,} real steps"
         )
-        below += f", the reference learned from {self.further.steps:,}.\n"
+        below += f", the reference learned from {self.further.taken:,}.\n"
         return markdown(("real world", "noise", *self._shown, "sgat - gat (95 %)"), rows) + below
 
 

@@ -59,8 +59,14 @@ def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed
     """
     layout = scenario.world.layout
     observation, _ = env.reset(seed=seed, options={"posture": scenario.policy.posture(parameters, layout)})
-    policy = scenario.policy.start(parameters, layout)
-    task = scenario.task.start(layout, observation, scenario.role)
+    try:
+        policy = scenario.policy.start(parameters, layout)
+        task = scenario.task.start(layout, observation, scenario.role)
+    except KeyError as error:
+        hint = "a gymnasium environment goes with task=own_reward and policy=mlp"
+        raise ConfigError(
+            "task or policy", f"needs {error.args[0]}, which this world does not observe; {hint}"
+        ) from error
     observations, actions, sent, rewards, ended = [observation], [], [], [], False
     for _ in range(policy.ticks if isinstance(policy, OpenLoopRun) else scenario.ticks):
         action = policy.act(observation)
