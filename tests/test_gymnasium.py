@@ -71,7 +71,7 @@ class InPlace(Strange):
 
 
 def a_policy(world: GymnasiumWorld, hidden: tuple[int, ...] = ()) -> Any:
-    return sized(Mlp(hidden=hidden), world.layout)
+    return sized(Mlp(hidden=hidden), world)
 
 
 def episodes(world: GymnasiumWorld, count: int, sd: float = 0.0, role: str = "sim") -> Batch:

@@ -26,10 +26,10 @@ class Scaling(NamedTuple):
         return values
 
 
-def scaling(values: np.ndarray, least: float = LEAST) -> Scaling:
+def scaling(values: np.ndarray) -> Scaling:
     """Return the scaling of a sample, shape (N, n).
 
     A column that hardly changes stays small: what a joint at rest does must not become a regressor.
     """
     sd = values.std(axis=0)
-    return Scaling(values.mean(axis=0), np.maximum(sd, least * sd.max()) if sd.any() else np.ones_like(sd))
+    return Scaling(values.mean(axis=0), np.maximum(sd, LEAST * sd.max()) if sd.any() else np.ones_like(sd))

@@ -29,8 +29,9 @@ def calibrated(network: Network, head: Head, episodes: Sequence[Samples]) -> tup
     errors = [_standardised(network, head, *one) for one in episodes]
     together = np.concatenate(errors)
     scale = np.clip(np.sqrt(np.mean(together**2, axis=0)), *SCALE)
-    steps = [(one[:-1] * one[1:]) for one in errors if len(one) > 1]
-    memory = np.mean(np.concatenate(steps), axis=0) / np.mean(together**2, axis=0) if steps else np.zeros_like(scale)
+    mean, variance = together.mean(axis=0), together.var(axis=0)
+    steps = np.concatenate([(one[:-1] - mean) * (one[1:] - mean) for one in errors])
+    memory = steps.mean(axis=0) / variance if len(steps) else np.zeros_like(scale)
     *hidden, (weight, bias) = [(weight, bias) for weight, bias in network.layers]
     wider = np.tile(np.log(scale), head.components)  # the last outputs are logarithms of standard deviations
     added = np.concatenate([np.zeros(len(bias) - len(wider)), wider])

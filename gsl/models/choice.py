@@ -7,7 +7,6 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from gsl.core.scaling import LEAST
 from gsl.models.config import ModelConfig
 from gsl.models.head import POINT, Head
 from gsl.models.linear import fit_linear, with_spread
@@ -24,22 +23,20 @@ class Choice(NamedTuple):
 
 
 def fit_network(
-    training: Samples,
-    validation: Samples,
-    config: ModelConfig,
-    *,
-    seed: int,
-    head: Head = POINT,
-    least: float = LEAST,
+    training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT
 ) -> Network:
-    """Return a network of one family; the linear one, which needs no early stopping, learns from all samples."""
+    """Return a network of one family.
+
+    The linear one needs no early stopping and learns from all samples, but for those that are to calibrate its spread.
+    """
     if config.family == "linear":
-        inputs, targets = (np.concatenate(both) for both in zip(training, validation, strict=True))
-        network = fit_linear(inputs, targets, ridge=config.ridge, least=least)
+        both = (np.concatenate(pair) for pair in zip(training, validation, strict=True))
+        inputs, targets = training if head.draws else both
+        network = fit_linear(inputs, targets, ridge=config.ridge)
         return with_spread(network, inputs, targets) if head.draws else network
     from gsl.models.fitting import fit_mlp
 
-    return fit_mlp(training, validation, config, seed=seed, head=head, least=least)
+    return fit_mlp(training, validation, config, seed=seed, head=head)
 
 
 def best(config: ModelConfig, fit: Callable[[ModelConfig], M], score: Callable[[M], float]) -> tuple[M, Choice]:

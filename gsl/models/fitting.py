@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import torch
 
-from gsl.core.scaling import LEAST, scaling
+from gsl.core.scaling import scaling
 from gsl.models.config import ModelConfig
 from gsl.models.head import POINT, Head
 from gsl.models.network import Network, Samples, unscaled
@@ -17,15 +17,7 @@ Loss = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 LEAST_LOG_SD = -5.0  # in units of the targets' spread: where data are all but exact the likelihood has no end
 
 
-def fit_mlp(
-    training: Samples,
-    validation: Samples,
-    config: ModelConfig,
-    *,
-    seed: int,
-    head: Head = POINT,
-    least: float = LEAST,
-) -> Network:
+def fit_mlp(training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT) -> Network:
     """Return the network of the epoch with the least loss on `validation`; the same seed, the same weights.
 
     The loss is the squared error of a point, the negative log likelihood of a distribution.
@@ -37,13 +29,13 @@ def fit_mlp(
     try:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            return _fitted(training, validation, config, head, least)
+            return _fitted(training, validation, config, head)
     finally:
         torch.set_num_threads(threads)
 
 
-def _fitted(training: Samples, validation: Samples, config: ModelConfig, head: Head, least: float) -> Network:
-    given, wanted = scaling(training[0], least), scaling(training[1], least)
+def _fitted(training: Samples, validation: Samples, config: ModelConfig, head: Head) -> Network:
+    given, wanted = scaling(training[0]), scaling(training[1])
     known, unseen = ((_tensor(given.apply(x)), _tensor(wanted.apply(y))) for x, y in (training, validation))
     network = _network((training[0].shape[1], *config.hidden, head.width(training[1].shape[1])))
     _descend(network, known, unseen, config, _surprise(head) if head.draws else torch.nn.functional.mse_loss)

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.scaling import LEAST, scaling
+from gsl.core.scaling import scaling
 from gsl.models.network import Network, unscaled
 
 SMALLEST = 1e-6  # standard deviation [rad], of a change that is exact
 
 
-def fit_linear(inputs: np.ndarray, targets: np.ndarray, *, ridge: float, least: float = LEAST) -> Network:
+def fit_linear(inputs: np.ndarray, targets: np.ndarray, *, ridge: float) -> Network:
     """Return W, b that minimise |W z + b - y|^2 / N + ridge |W|^2, where z and y are scaled to unit variance.
 
     Args:
         inputs: Shape (N, n).
         targets: Shape (N, m).
         ridge: Of collinear inputs (a gait makes all joints nearly so), not of noise; at least 0.
-        least: See `gsl.core.scaling`.
     """
-    given, wanted = scaling(inputs, least), scaling(targets, least)
+    given, wanted = scaling(inputs), scaling(targets)
     z, y = given.apply(inputs), wanted.apply(targets)
     square = z.T @ z / len(z) + ridge * np.eye(z.shape[1])
     weight = np.linalg.solve(square, z.T @ y / len(z)).T

@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from gsl.core.layout import Layout
+from gsl.worlds.world import World
 
 
 class PolicyRun(Protocol):
@@ -47,9 +48,9 @@ class Sized(Protocol):
         """Return the policy for a world."""
 
 
-def sized(policy: Policy, layout: Layout) -> Policy:
-    """Return a policy that knows its world, if it has to."""
-    return policy.sized(layout) if isinstance(policy, Sized) else policy
+def sized(policy: Policy, world: World) -> Policy:
+    """Return a policy that knows its world, if it has to; only then has the world to say what it observes."""
+    return policy.sized(world.layout) if isinstance(policy, Sized) else policy
 
 
 def neighbour(policy: Policy, parameters: np.ndarray, spread: float, rng: np.random.Generator) -> np.ndarray:

@@ -54,7 +54,7 @@ class Collect:
 
     def __post_init__(self) -> None:
         """Tell the policy its world."""
-        object.__setattr__(self, "policy", sized(self.policy, self.world.layout))
+        object.__setattr__(self, "policy", sized(self.policy, self.world))
         if self.world.layout.choices and self.action_noise > 1.0:
             given = f"{self.action_noise:g}"
             raise ConfigError("action_noise", "is the chance of another choice here, 1 at most", given=given)

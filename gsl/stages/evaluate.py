@@ -49,7 +49,7 @@ class Evaluate:
 
     def __post_init__(self) -> None:
         """Tell the policy its world."""
-        object.__setattr__(self, "policy", sized(self.policy, self.world.layout))
+        object.__setattr__(self, "policy", sized(self.policy, self.world))
 
     def parents(self) -> Mapping[str, Path]:
         """Return where the policies come from."""

@@ -69,7 +69,7 @@ class Iterate:
 
     def __post_init__(self) -> None:
         """Tell the policy its world; refuse two worlds that no policy could act in both of."""
-        object.__setattr__(self, "policy", sized(self.policy, self.sim.layout))
+        object.__setattr__(self, "policy", sized(self.policy, self.sim))
         check_alike(self.sim.layout, self.real.layout)
 
     def parents(self) -> Mapping[str, Path]:
@@ -90,7 +90,7 @@ class Iterate:
                 if not rounds.rising:
                     break
             if self.beside:
-                for row in rounds.add_beside(self._ungrounded(home, console)):
+                for row in rounds.add_beside(self._ungrounded(home, start, console)):
                     table.row(*row)
         returned = Path(rounds.last) / FILE if rounds.last else Path(start) if start else None
         if returned is None:
@@ -156,9 +156,8 @@ class Iterate:
             console.status(flight.told)
         return grounding
 
-    def _ungrounded(self, home: Path, console: Any) -> Artifact:
+    def _ungrounded(self, home: Path, start: str | None, console: Any) -> Artifact:
         place = home / FIRST
-        start = self._start(home, console)
         found = self.chain.search(place / "optimize_none", NoGrounding(), start, self.seed, console)
         return self.chain.measure(place / "evaluate_none", found, self.seed, console)
 

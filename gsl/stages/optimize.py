@@ -52,7 +52,7 @@ class Optimize:
 
     def __post_init__(self) -> None:
         """Tell the policy its world."""
-        object.__setattr__(self, "policy", sized(self.policy, self.world.layout))
+        object.__setattr__(self, "policy", sized(self.policy, self.world))
 
     def parents(self) -> Mapping[str, Path]:
         """Return the start policy and what the grounding is made of."""

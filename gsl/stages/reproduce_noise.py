@@ -6,12 +6,14 @@ import json
 import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from gsl.console import Console
+from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
 from gsl.core.statistics import mean_interval
 from gsl.grounding.effects import innermost
@@ -31,7 +33,7 @@ from gsl.worlds.gymnasium import GymnasiumWorld
 from gsl.worlds.world import World
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "figure.png"
-REAL = "trained on real"
+REAL, BOTH = "trained on real", {"gat", "sgat"}
 
 
 class Point(NamedTuple):
@@ -77,6 +79,8 @@ class NoiseStudy:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials; write the points, the table and the figure."""
+        for name, world in self.worlds.items():
+            check_alike(self.sims.get(name, self.iterate.sim).layout, world.layout)
         home = folder.parent
         jobs = [(number, home) for number in range(1, self.trials + 1)]
         with console.progress(len(jobs), "trials") as progress:
@@ -95,11 +99,15 @@ class NoiseStudy:
     def _shown(self) -> tuple[str, ...]:
         return (*self.methods, REAL)
 
+    @property
+    def _places(self) -> list[tuple[str, float]]:
+        return list(product(self.worlds, self.noises))
+
     def trial(self, number: int, home: Path) -> list[Point]:
         """Return all points of a trial, built below `home`."""
         seed, console = self.iterate.seed + number - 1, Console(json=True)
         name, points = f"trial_{number:02d}", []
-        for world, noise in ((world, noise) for world in self.worlds for noise in self.noises):
+        for world, noise in self._places:
             real, sim = replace(self.worlds[world], action_noise=noise), self.sims.get(world)
             chain = self._chain(sim or self.iterate.sim)
             alone, below = home / (f"{world}_sim" if sim else "sim"), home / f"{world}_{noise:g}"
@@ -121,41 +129,41 @@ class NoiseStudy:
 
     def _chain(self, sim: World) -> Chain:
         """Return the links in a simulator, for whose sizes the policy is made anew."""
-        policy = sized(self.iterate.policy, sim.layout)
+        policy = sized(self.iterate.policy, sim)
         return replace(self.iterate.chain, sim=sim, policy=policy, workers=1, accept=True)
 
     def _value(self, chain: Chain, place: Path, policy: Any, seed: int, console: Any) -> float:
         return float(chain.measure(place, policy, seed, console).metrics["last"]["value"])
 
+    def _values(self, points: Sequence[Point], world: str, noise: float, method: str) -> list[float]:
+        return [one.value for one in points if one[:3] == (world, noise, method)]
+
     def _means(self, points: Sequence[Point], world: str, method: str) -> list[tuple[float, float]]:
         """Return mean and standard error at each noise."""
-        each = [[one.value for one in points if one[:3] == (world, noise, method)] for noise in self.noises]
-        return [
-            (float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0)
-            for values in each
-        ]
+        return [_mean(self._values(points, world, noise, method)) for noise in self.noises]
 
     def _table(self, points: Sequence[Point]) -> str:
         rows = []
-        for world in self.worlds:
-            for noise in self.noises:
-                of = {
-                    method: [one.value for one in points if one[:3] == (world, noise, method)] for method in self._shown
-                }
-                apart = mean_interval(np.subtract(of["sgat"], of["gat"])) if {"sgat", "gat"} <= of.keys() else None
-                told = [
-                    f"{mean:.0f} ± {error:.0f}"
-                    for method in self._shown
-                    for mean, error in [self._means(points, world, method)[self.noises.index(noise)]]
-                ]
-                between = f"{apart.mean:+.0f} ({apart.lower:+.0f} to {apart.upper:+.0f})" if apart else "-"
-                rows.append((world, f"{noise:g}", *told, between))
+        for world, noise in self._places:
+            values = {method: self._values(points, world, noise, method) for method in self._shown}
+            means = [_mean(found) for found in values.values()]
+            apart = mean_interval(np.subtract(values["sgat"], values["gat"])) if values.keys() >= BOTH else None
+            between = f"{apart.mean:+.0f} ({apart.lower:+.0f} to {apart.upper:+.0f})" if apart else "-"
+            rows.append((world, f"{noise:g}", *(f"{mean:.0f} ± {error:.0f}" for mean, error in means), between))
         spent = max(one.real_steps for one in points if one.method != REAL)
-        below = (
-            f"\nMean ± standard error over {self.trials} trials; learned groundings saw at most {spent:,} real steps"
+        below = [
+            f"Mean ± standard error over {self.trials} trials; learned groundings saw at most {spent:,} real steps,",
+            f"the reference learned from {self.further.taken:,}.",
+        ]
+        return (
+            markdown(("real world", "noise", *self._shown, "sgat - gat (95 %)"), rows) + "\n" + "\n".join(below) + "\n"
         )
-        below += f", the reference learned from {self.further.taken:,}.\n"
-        return markdown(("real world", "noise", *self._shown, "sgat - gat (95 %)"), rows) + below
+
+
+def _mean(values: Sequence[float]) -> tuple[float, float]:
+    """Return mean and standard error, 0 of a single value."""
+    error = np.std(values, ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0
+    return float(np.mean(values)), float(error)
 
 
 def _steps(place: Path) -> int:

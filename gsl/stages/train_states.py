@@ -9,18 +9,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gsl.core.scaling import Scaling
 from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError
 from gsl.models.choice import best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.counts import Counts, counted
 from gsl.models.head import POINT, Head
-from gsl.models.network import Samples
+from gsl.models.network import Network, Samples, unscaled
 from gsl.models.states import NearestChoice, StateForward, StateInverse, encoded
 from gsl.stages.training import Parts, explained, summary
 from gsl.storage.models import write_model
 
-EXACT = 1e-3  # of the largest standard deviation: states have units of their own, some of them small
+ROUNDING = 1e-9  # of the largest value, below which a spread is rounding
 
 
 class Steps(NamedTuple):
@@ -112,7 +113,7 @@ def _forward(config: ModelConfig, data: Parts, seed: int, head: Head | None = No
     training, validation = (
         (np.hstack([part.states, encoded(part.actions, choices)]), part.changes) for part in (known, unseen)
     )
-    network = fit_network(training, validation, config, seed=seed, head=head, least=EXACT)
+    network = _fitted(training, validation, config, seed, head)
     scale = np.maximum(known.changes.std(axis=0), 1e-12)
     actions = choices or known.actions.shape[1]
     return StateForward(network, head, data.training.states, actions, choices, variables, scale)
@@ -121,8 +122,21 @@ def _forward(config: ModelConfig, data: Parts, seed: int, head: Head | None = No
 def _inverse(config: ModelConfig, data: Parts, seed: int) -> StateInverse:
     variables = _variables(config, data.training)
     known, unseen = (_turned(_steps(part, variables)) for part in (data.training, data.validation))
-    network = fit_network(known, unseen, config, seed=seed, least=EXACT)
+    network = _fitted(known, unseen, config, seed)
     return StateInverse(network, data.training.states, known[1].shape[1], variables)
+
+
+def _fitted(training: Samples, validation: Samples, config: ModelConfig, seed: int, head: Head = POINT) -> Network:
+    """Return a network that was fitted in units of each column's own spread; what never changes stays as it is."""
+    given, wanted = (_own_units(values) for values in training)
+    known, unseen = ((given.apply(x), wanted.apply(y)) for x, y in (training, validation))
+    network = fit_network(known, unseen, config, seed=seed, head=head)
+    return unscaled([(weight, bias) for weight, bias in network.layers], given, head.scaling(wanted))
+
+
+def _own_units(values: np.ndarray) -> Scaling:
+    sd = values.std(axis=0)
+    return Scaling(values.mean(axis=0), np.where(sd > ROUNDING * np.abs(values).max(axis=0), sd, 1.0))
 
 
 def _nearest(config: ModelConfig, data: Parts, seed: int) -> NearestChoice:

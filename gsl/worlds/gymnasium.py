@@ -130,7 +130,8 @@ class StateEnv(gymnasium.Env):
             number = int(self._rng.integers(self.layout.choices)) if other else round(float(sent[0]))
             given, sent = number + self._first, np.array([float(number)])
         else:
-            sent = np.clip(sent + noise * self._rng.standard_normal(len(sent)), -1.0, 1.0)
+            shaken = sent + noise * self._rng.standard_normal(len(sent)) if noise else sent
+            sent = np.clip(shaken, -1.0, 1.0)
             given = sent.astype(self._env.action_space.dtype)
         with self._told():
             observation, reward, ended, cut, info = self._env.step(given)
