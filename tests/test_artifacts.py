@@ -265,9 +265,10 @@ def test_a_partial_of_other_work_is_discarded(out: Path) -> None:
 
 
 KILLED = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
 from gsl.storage.artifact import build
+signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background is deaf to it
 class Slow:
     kind, progress = "slow", "half" if sys.argv[2] == "resumable" else ""
     def parents(self): return {}

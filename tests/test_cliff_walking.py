@@ -11,8 +11,10 @@ from commands import done
 
 from gsl.core.table import Table
 from gsl.core.table_episodes import played
+from gsl.core.trajectory import Trajectory
+from gsl.errors import InputError
 from gsl.grounding.states import TableTransformation
-from gsl.models.counts import Counts
+from gsl.models.counts import Counts, counted
 from gsl.worlds.cliff_walking import CliffWalking
 from gsl.worlds.gymnasium import GymnasiumWorld
 
@@ -78,6 +80,14 @@ def test_a_deterministic_grounding_hides_the_noise() -> None:
     np.testing.assert_allclose(made.chances[~real.terminal], sim.chances[~real.terminal])
 
 
+@pytest.mark.parametrize(("state", "line"), [(48.0, "state 48 is not one of the 48"), (0.5, "state 0.5 is not one")])
+def test_numbers_that_are_no_states_are_refused(state: float, line: str) -> None:
+    states, nothing = np.array([[36.0], [state]]), np.zeros((2, 0))
+    one = Trajectory(np.arange(2.0), np.zeros((1, 1)), nothing, nothing, state=states)
+    with pytest.raises(InputError, match=line):
+        counted([one], 48, 4)
+
+
 def test_what_was_never_seen_is_left_alone() -> None:
     sim = the_cliff()
     nothing = TableTransformation(Counts(np.zeros((48, 4, 48))), Counts(sim.chances), draws=True)
@@ -124,6 +134,7 @@ def test_figure_11_is_one_command(tmp_path: Path) -> None:
 
 def test_the_chain_of_stages_grounds_the_cliff(tmp_path: Path) -> None:
     few = ("recipe.real_episodes=60", "recipe.sim_episodes=100", "workers=1", "budget.episodes=2")
+    few = (*few, "recipe.real_action_noise=0")  # π0 is checked with the noise of its real episodes
     done("iterate", "experiment=cliff_walking", "preset=toy", *few, "name=c", folder=tmp_path)
     report = json.loads((tmp_path / "runs/c/iteration_01/optimize/grounding.json").read_text())
     values = {name: np.mean(one["values"]) for name, one in report["pi0"].items()}

@@ -18,6 +18,7 @@ from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError, GslError, TrajectoryError
 from gsl.grounding.ane import ActionNoise
+from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.random_choice import RandomChoice
 from gsl.grounding.states import StateTransformation
@@ -26,6 +27,7 @@ from gsl.models.states import NearestChoice, StateForward, StateInverse
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.mlp import Mlp
 from gsl.policies.policy import sized
+from gsl.stages.grounding_states import value_report
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.simulator import GroundedSimulator
 from gsl.stages.train_states import forward_of_states, inverse_of_states
@@ -33,7 +35,7 @@ from gsl.stages.training import Parts
 from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.storage.trajectories import read, write
 from gsl.tasks.own_reward import OwnReward
-from gsl.worlds.control_cost import Quadratic
+from gsl.worlds.control_cost import Charged, Quadratic
 from gsl.worlds.gymnasium import GymnasiumWorld
 
 CART = GymnasiumWorld(env_id="examples.cart:Cart")
@@ -180,6 +182,17 @@ def test_the_reward_charges_for_the_action_of_the_agent() -> None:
     assert rewards["given"] == pytest.approx(rewards["told"])
 
 
+def test_a_price_in_the_actuators_own_units_is_charged_in_them() -> None:
+    low, high = np.array([0.0, -4.0]), np.array([2.0, 4.0])
+    raw = {"sent": np.array([1.5, 1.0]), "agent": np.array([0.5, -2.0])}
+    sent, agent = ((2.0 * one - high - low) / (high - low) for one in raw.values())
+    price = {name: -0.3 * float(one @ one) for name, one in raw.items()}
+    told = Charged(None, low, high).corrected(
+        7.0 + price["sent"], agent, {"carried_out": sent, "reward_ctrl": price["sent"]}
+    )
+    assert told == pytest.approx(7.0 + price["agent"])
+
+
 def models(tmp_path: Path, sim: GymnasiumWorld, real: GymnasiumWorld, likelihood: Any = "point") -> tuple[Any, Any]:
     config = ModelConfig("mlp", hidden=(32,), epochs=40, likelihood=likelihood)
     for name, world, learn, role in (
@@ -267,6 +280,23 @@ def test_the_example_of_the_docs_wins_by_its_grounding(tmp_path: Path) -> None:
     assert metrics["returned"]["value"] > metrics["ungrounded"]["returned"]["value"]
 
 
+def test_the_check_of_pi0_is_with_the_noise_of_the_real_episodes() -> None:
+    policy = a_policy(CART)
+    real = episodes(CART, 30, 0.8).episodes
+    scenario = Scenario(CART, OwnReward(), policy, "sim", NoGrounding())
+    alike = value_report(scenario, policy.initial, real, ActionNoise(sd=0.8), 3)
+    still = value_report(scenario, policy.initial, real, ActionNoise(sd=0.0), 3)
+    assert abs(alike.values["grounded"].mean() - alike.values["real"].mean()) < 1.0
+    assert abs(still.values["grounded"].mean() - still.values["real"].mean()) > 1.5
+
+
+def test_all_bodies_are_heavier_with_all() -> None:
+    pytest.importorskip("mujoco")
+    light = GymnasiumWorld(env_id="HalfCheetah-v5")
+    masses = [one.make().unwrapped_env.model.body_mass.sum() for one in (light, replace(light, mass={"all": 2.0}))]
+    assert masses[1] == pytest.approx(2.0 * masses[0])
+
+
 def test_heavier_bodies() -> None:
     pytest.importorskip("mujoco")
     light = GymnasiumWorld(env_id="InvertedPendulum-v5")
@@ -311,6 +341,8 @@ def test_an_environment_that_breaks_is_one_line(wrong: str, line: str) -> None:
 def test_worlds_that_no_policy_fits_both_of_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="real: has 4 states, the simulator 2"):
         check_alike(CART.layout, POLE.layout)
+    with pytest.raises(ConfigError, match=r"real: acts every 0\.05 s, the simulator every 0\.02 s"):
+        check_alike(POLE.layout, replace(POLE.layout, control_period=0.05))
     worlds = ("sim.env_id=examples.cart:Cart", "real.env_id=CartPole-v1")
     assert "has 4 states" in refused("iterate", "experiment=gymnasium", *worlds, folder=tmp_path)
 
@@ -336,6 +368,35 @@ def test_worlds_that_no_policy_fits_both_of_are_refused(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_what_does_not_go_together_is_refused(arguments: str, line: str, tmp_path: Path) -> None:
     assert refused(*arguments.split(), folder=tmp_path).startswith(line)
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"variables": ()}, "model.variables: names at least one"),
+        ({"variables": (1, 1)}, "model.variables: names at least one entry of the state, each once"),
+        ({"variables": (0, 2)}, "model.variables = 2: the state has entries 0 to 1"),
+        ({"horizon": 2}, "model.horizon: is for robots"),
+        ({"members": 3}, "model.members: is for robots"),
+    ],
+)
+def test_models_that_an_environment_cannot_have(changes: dict[str, Any], line: str, tmp_path: Path) -> None:
+    parts = Parts(*(episodes(CART, 2, 0.5) for _ in range(3)))
+    with pytest.raises(ConfigError) as caught:
+        forward_of_states(tmp_path, parts, ModelConfig("mlp", **changes), 1)
+    assert str(caught.value).startswith(line)
+
+
+def test_joints_of_an_environment_cannot_be_grounded(tmp_path: Path) -> None:
+    f, f_inv = models(tmp_path, CART, CART)
+    grounding = ActionTransformation("f", "i", x=("elbow",))
+    with pytest.raises(ConfigError, match="x: names joints of a robot"):
+        grounding.load(lambda _: f, lambda _: f_inv)
+
+
+def test_batches_that_leave_a_part_of_a_rollout_are_refused() -> None:
+    with pytest.raises(ConfigError, match=r"optimizer\.batch = 100: must divide the rollout of 2048"):
+        Trpo(steps=10, batch=100)
 
 
 def test_figure_12_is_one_command(tmp_path: Path) -> None:

@@ -72,6 +72,9 @@ def check_alike(sim: Layout, real: Layout) -> None:
     ):
         if ours != theirs:
             raise ConfigError("real", f"has {theirs} {name}, the simulator {ours}; a policy must fit both")
+    if abs(sim.control_period - real.control_period) > 1e-9:
+        rates = f"acts every {real.control_period:g} s, the simulator every {sim.control_period:g} s"
+        raise ConfigError("real", f"{rates}; a change within a step must mean the same in both")
     if sim.joints != real.joints:
         different = ", ".join(sorted(set(sim.joints) ^ set(real.joints))) or "their order"
         raise ConfigError("real", f"has other joints than the simulator ({different}); a policy must fit both")

@@ -70,7 +70,11 @@ class ActionTransformation:
         f, f_inv = forward(self.forward_model), inverse(self.inverse_model)
         if getattr(f, "space", "joints") != getattr(f_inv, "space", "joints"):
             raise ConfigError("inverse_model", "is of another kind of world than the forward model")
+        if self.x != "all" and not isinstance(f, Forward):
+            raise ConfigError("x", "names joints of a robot; model.variables are an environment's")
         if isinstance(f, Counts):
+            if self.noise or self.gate is not None or self.alpha not in (1.0, "auto"):
+                raise ConfigError("grounding", "alpha, noise and gate are for actions that are numbers, not choices")
             return TableTransformation(f, f_inv, draws=self.predicts != "point")
         if self.predicts not in ("point", f.head.likelihood):
             problem = f"predicts a {f.head.likelihood}; train it with model.likelihood={self.predicts}"

@@ -9,6 +9,12 @@ import numpy as np
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
+from gsl.grounding.ane import ActionNoise
+
+
+def exploration(size: float, layout: Layout) -> ActionNoise | RandomChoice:
+    """Return the noise that trajectories are collected with: a standard deviation, or of choices a chance."""
+    return RandomChoice(size) if layout.choices else ActionNoise(sd=size)
 
 
 @component

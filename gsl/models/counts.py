@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gsl.core.trajectory import Trajectory
+from gsl.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -62,11 +63,23 @@ class Counts:
 
 
 def counted(episodes: Sequence[Trajectory], cells: int, choices: int) -> np.ndarray:
-    """Return how often each transition occurs in some episodes, shape (S, A, S); actions are those carried out."""
+    """Return how often each transition occurs in some episodes, shape (S, A, S); actions are those carried out.
+
+    Raises:
+        InputError: A state or an action is not the number of one.
+    """
     seen = np.zeros((cells, choices, cells))
     for one in episodes:
         assert one.state is not None, "a world of cells has states"
         sent = one.action if one.grounded_action is None else one.grounded_action
-        state = one.state[:, 0].astype(int)
-        np.add.at(seen, (state[:-1], sent[:, 0].astype(int), state[1:]), 1.0)
+        state, chosen = _numbers(one.state[:, 0], cells, "state"), _numbers(sent[:, 0], choices, "action")
+        np.add.at(seen, (state[:-1], chosen, state[1:]), 1.0)
     return seen
+
+
+def _numbers(values: np.ndarray, count: int, what: str) -> np.ndarray:
+    found = values.astype(int)
+    wrong = (found != values) | (found < 0) | (found >= count)
+    if wrong.any():
+        raise InputError(f"{what} {values[wrong.argmax()]:g} is not one of the {count}, 0 to {count - 1}")
+    return found

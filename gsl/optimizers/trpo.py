@@ -35,6 +35,11 @@ class Trpo:
     critic_updates: Annotated[int, setting("passes of the critic over a rollout", ge=1)] = 10
     exploration: Annotated[float, setting("first standard deviation of the actions, range -1 to 1", gt=0)] = 0.5
 
+    def __post_init__(self) -> None:
+        """Refuse batches that leave a part of a rollout."""
+        if self.rollout % self.batch:
+            raise ConfigError("optimizer.batch", f"must divide the rollout of {self.rollout}", given=str(self.batch))
+
     @property
     def taken(self) -> int:
         """Steps that it takes: whole rollouts, in every generation."""

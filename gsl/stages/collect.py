@@ -14,8 +14,7 @@ from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ConfigError
-from gsl.grounding.ane import ActionNoise
-from gsl.grounding.random_choice import RandomChoice
+from gsl.grounding.random_choice import exploration
 from gsl.policies.policy import Policy, neighbour, sized
 from gsl.policies.programme import Piece, Programmed
 from gsl.stages.choices import PolicyChoice
@@ -67,8 +66,7 @@ class Collect:
         """Write one parquet file."""
         layout = self.world.layout
         policy = playing(self.policy, layout)
-        noise = RandomChoice(self.action_noise) if layout.choices else ActionNoise(sd=self.action_noise)
-        scenario = Scenario(self.world, self.task, policy, self.role, noise)
+        scenario = Scenario(self.world, self.task, policy, self.role, exploration(self.action_noise, layout))
         pieces = policy.programme if isinstance(policy, Programmed) else self._pieces()
         jobs = [
             Job(piece.parameters, derived_seed(self.seed, self.kind, self.role, index))

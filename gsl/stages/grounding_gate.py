@@ -15,6 +15,7 @@ from gsl.errors import GslError, InputError, TrajectoryError
 from gsl.grounding.effects import DiagnosedEffects, switched_on
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.random_choice import exploration
 from gsl.grounding.randomised import RandomisedEffects, randomised
 from gsl.report.grounding_errors import grounding_errors
 from gsl.stages.diagnosis_files import read_diagnosis
@@ -152,7 +153,8 @@ class Gate:
             problem = "the reward may charge for the grounded action instead of the agent's"
             self.console.status(f"warning: {problem}; say what it charges with control_cost of the simulator")
         real = of_policy(heldout, pi0=True) or heldout.episodes
-        report = value_report(ready, self.parameters, real, derived_seed(self.seed, "check"))
+        noise = exploration(heldout.metadata.get("action_noise", 0.0), ready.world.layout)
+        report = value_report(ready, self.parameters, real, noise, derived_seed(self.seed, "check"))
         write_json(self.folder / REPORT, report.metrics())
         self.console.table("π0 in the grounded simulator", VALUE_TITLES, report.rows())
         self._judge(report.problems, "Collect more data")

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.layout import Layout
 from gsl.core.seeds import derived_seed
 from gsl.core.statistics import difference_interval, mean_interval
 from gsl.core.trajectory import Trajectory
+from gsl.grounding.grounding import Grounding, GroundingRun
 from gsl.grounding.none import NoGrounding
 from gsl.stages.rollout import Scenario, rollout
 from gsl.worlds.control_cost import KEY
@@ -57,16 +59,46 @@ class ValueReport:
         return name, f"{values.mean():.1f}", bounds, f"{self.steps[name].mean():.0f}"
 
 
-def value_report(scenario: Scenario, parameters: np.ndarray, real: Sequence[Trajectory], seed: int) -> ValueReport:
+@dataclass(frozen=True)
+class Shaken:
+    """A grounding behind noise: what the real episodes were collected with is not to tell the worlds apart."""
+
+    noise: Grounding
+    grounding: Grounding
+
+    def start(self, layout: Layout, rng: np.random.Generator) -> ShakenRun:
+        """Return both at the beginning of an episode."""
+        return ShakenRun(self.noise.start(layout, rng), self.grounding.start(layout, rng))
+
+
+@dataclass(frozen=True)
+class ShakenRun:
+    """Noise and grounding in one episode."""
+
+    noise: GroundingRun
+    grounding: GroundingRun
+
+    def transform(self, observation: np.ndarray, action: np.ndarray) -> np.ndarray:
+        """Return the grounded noisy action."""
+        return self.grounding.transform(observation, self.noise.transform(observation, action))
+
+
+def value_report(
+    scenario: Scenario, parameters: np.ndarray, real: Sequence[Trajectory], noise: Grounding, seed: int
+) -> ValueReport:
     """Compare π0's episodes.
 
     Args:
         scenario: The simulator with a grounding ready to act.
         parameters: Of π0, shape (n_parameters,).
         real: Its held-out episodes.
+        noise: On the actions of the real episodes; the simulated ones get it too.
         seed: Of the simulated ones.
     """
-    ways = {"grounded": scenario, "ungrounded": replace(scenario, grounding=NoGrounding())}
+    ways = {
+        name: replace(scenario, grounding=Shaken(noise, grounding))
+        for name, grounding in (("grounded", scenario.grounding), ("ungrounded", NoGrounding()))
+    }
     episodes = {"real": list(real), **{name: _episodes(way, parameters, seed) for name, way in ways.items()}}
     values = {name: np.array([one.value for one in done]) for name, done in episodes.items()}
     steps = {name: np.array([float(len(one)) for one in done]) for name, done in episodes.items()}

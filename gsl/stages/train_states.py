@@ -39,7 +39,12 @@ class Steps(NamedTuple):
 
 
 def forward_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int) -> Mapping[str, Any]:
-    """Write a forward model of the real world, and return its errors on held-out trajectories."""
+    """Write a forward model of the real world, and return its errors on held-out trajectories.
+
+    Raises:
+        ConfigError: The model is to be something that is for robots alone.
+    """
+    _refuse_robots(config)
     if few(data.training):
         return _counts(folder, data, "forward_model")
     model, choice = best(config, partial(_forward, data=data, seed=seed), partial(_score, data=data))
@@ -57,7 +62,12 @@ def forward_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int)
 
 
 def inverse_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int) -> Mapping[str, Any]:
-    """Write an inverse model of the simulator, and return how well it recovers held-out actions."""
+    """Write an inverse model of the simulator, and return how well it recovers held-out actions.
+
+    Raises:
+        ConfigError: The model is to be something that is for robots alone.
+    """
+    _refuse_robots(config)
     if few(data.training):
         return _counts(folder, data, "inverse_model")
     choices, make = data.training.metadata.get("choices", 0), _nearest if _choices(data) else _inverse
@@ -71,6 +81,12 @@ def inverse_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int)
 def few(batch: Batch) -> bool:
     """Whether states and actions of a batch are few enough to be counted."""
     return bool(batch.metadata.get("cells") and batch.metadata.get("choices"))
+
+
+def _refuse_robots(config: ModelConfig) -> None:
+    for name, asked in (("horizon", config.horizon > 1), ("members", config.members > 1), ("sensors", config.sensors)):
+        if asked:
+            raise ConfigError(f"model.{name}", "is for robots; a gymnasium environment's state is observed whole")
 
 
 def _counts(folder: Path, data: Parts, kind: str) -> Mapping[str, Any]:
@@ -90,6 +106,8 @@ def _choices(data: Parts) -> int:
 def _variables(config: ModelConfig, batch: Batch) -> tuple[int, ...]:
     if config.variables == "all":
         return tuple(range(batch.states))
+    if not config.variables or len(set(config.variables)) < len(config.variables):
+        raise ConfigError("model.variables", "names at least one entry of the state, each once")
     for variable in config.variables:
         if not 0 <= variable < batch.states:
             problem = f"the state has entries 0 to {batch.states - 1}"

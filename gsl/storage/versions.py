@@ -12,7 +12,7 @@ import gsl
 
 LIBRARIES = (
     *("numpy", "pybullet", "gymnasium", "torch", "cma", "numba", "pandas", "pyarrow"),
-    *("hydra-core", "pydantic", "joblib", "safetensors"),
+    *("hydra-core", "pydantic", "joblib", "safetensors", "mujoco", "stable-baselines3", "sb3-contrib"),
 )
 
 

@@ -85,16 +85,19 @@ class StateEnv(gymnasium.Env):
         env = _made(world.env_id, world.kwargs)
         if world.mass:
             change_masses(env, world.mass)
+        self.charged: Charged | None = None
         states, size = _state_size(world, env.observation_space), _action_size(world, env.action_space)
         cells, choices = _count(env.observation_space), _count(env.action_space)
         if choices:
             self._first = int(env.action_space.start)  # type: ignore[attr-defined]
             self.action_space = Box(0.0, choices - 1.0, (1,), dtype=np.float64)
         else:
+            low, high = env.action_space.low, env.action_space.high  # type: ignore[attr-defined]
             env = gymnasium.wrappers.RescaleAction(env, np.float32(-1.0), np.float32(1.0))
+            self.charged = Charged(world.control_cost, low, high)
             self.action_space = Box(-1.0, 1.0, (size,), dtype=np.float64)
         self._lowest = float(env.observation_space.start) if cells else 0.0  # type: ignore[attr-defined]
-        self._env, self.charged = env, None if choices else Charged(world.control_cost)
+        self._env = env
         self._rng = np.random.default_rng()
         self.observation_space = Box(-np.inf, np.inf, (states,), dtype=np.float64)
         names = tuple(map(str, range(size)))

@@ -27,13 +27,14 @@ def change_masses(env: Any, factors: Mapping[str, float]) -> None:
     import mujoco
 
     model = inside.model
-    names = [model.body(index).name for index in range(1, model.nbody)]
+    bodies = {model.body(index).name: index for index in range(1, model.nbody)}
+    named = [name for name in bodies if name]
     for name, factor in factors.items():
-        if name != ALL and name not in names:
-            raise ConfigError(f"mass.{name}", f"there is no such body{did_you_mean(name, names, listed=True)}")
+        if name != ALL and name not in named:
+            raise ConfigError(f"mass.{name}", f"there is no such body{did_you_mean(name, named, listed=True)}")
         if not factor > 0.0:
             raise ConfigError(f"mass.{name}", "must be above 0", given=f"{factor}")
-        for body in names if name == ALL else [name]:
-            model.body(body).mass *= factor
-            model.body(body).inertia *= factor
+        which = slice(1, None) if name == ALL else bodies[name]
+        model.body_mass[which] *= factor
+        model.body_inertia[which] *= factor
     mujoco.mj_setConst(model, inside.data)
