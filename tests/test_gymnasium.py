@@ -397,6 +397,8 @@ def test_joints_of_an_environment_cannot_be_grounded(tmp_path: Path) -> None:
 def test_batches_that_leave_a_part_of_a_rollout_are_refused() -> None:
     with pytest.raises(ConfigError, match=r"optimizer\.batch = 100: must divide the rollout of 2048"):
         Trpo(steps=10, batch=100)
+    with pytest.raises(ConfigError, match=r"optimizer\.envs = 3: must divide"):
+        Trpo(steps=10, envs=3)
 
 
 def test_figure_12_is_one_command(tmp_path: Path) -> None:

@@ -24,7 +24,8 @@ class Trpo:
 
     steps: Annotated[int, setting("steps in the simulator, in all", ge=1)]
     generations: Annotated[int, setting("how often the policy is kept", ge=1)] = 1
-    rollout: Annotated[int, setting("steps between updates", ge=2)] = 2048
+    rollout: Annotated[int, setting("steps between updates, of all environments together", ge=2)] = 2048
+    envs: Annotated[int, setting("environments side by side: one pass of the network acts in all", ge=1)] = 8
     batch: Annotated[int, setting("samples in a step of the critic", ge=2)] = 128
     discount: Annotated[float, setting("of later rewards", gt=0, le=1)] = 0.99
     gae: Annotated[float, setting("lambda of the generalised advantage estimate", ge=0, le=1)] = 0.95
@@ -36,9 +37,10 @@ class Trpo:
     exploration: Annotated[float, setting("first standard deviation of the actions, range -1 to 1", gt=0)] = 0.5
 
     def __post_init__(self) -> None:
-        """Refuse batches that leave a part of a rollout."""
-        if self.rollout % self.batch:
-            raise ConfigError("optimizer.batch", f"must divide the rollout of {self.rollout}", given=str(self.batch))
+        """Refuse batches, or environments, that leave a part of a rollout."""
+        for name, parts in (("batch", self.batch), ("envs", self.envs)):
+            if self.rollout % parts:
+                raise ConfigError(f"optimizer.{name}", f"must divide the rollout of {self.rollout}", given=str(parts))
 
     @property
     def taken(self) -> int:
@@ -64,13 +66,13 @@ class Trpo:
             raise ConfigError("optimizer", f"TRPO needs gsl[rl]: pip install 'gsl[rl]' ({error})") from error
         threads = torch.get_num_threads()
         torch.set_num_threads(1)
-        env = VecNormalize(DummyVecEnv([simulator.env]), norm_obs=bold, gamma=self.discount)
+        env = VecNormalize(DummyVecEnv([simulator.env] * self.envs), norm_obs=bold, gamma=self.discount)
         try:
             model = sb3_contrib.TRPO(
                 "MlpPolicy",
                 env,
                 learning_rate=self.critic_rate,
-                n_steps=self.rollout,
+                n_steps=self.rollout // self.envs,
                 batch_size=self.batch,
                 gamma=self.discount,
                 gae_lambda=self.gae,
