@@ -147,7 +147,8 @@ class NoiseStudy:
         for world, noise in self._places:
             values = {method: self._values(points, world, noise, method) for method in self._shown}
             means = [_mean(found) for found in values.values()]
-            apart = mean_interval(np.subtract(values["sgat"], values["gat"])) if values.keys() >= BOTH else None
+            known = values.keys() >= BOTH and self.trials > 1
+            apart = mean_interval(np.subtract(values["sgat"], values["gat"])) if known else None
             between = f"{apart.mean:+.0f} ({apart.lower:+.0f} to {apart.upper:+.0f})" if apart else "-"
             rows.append((world, f"{noise:g}", *(f"{mean:.0f} ± {error:.0f}" for mean, error in means), between))
         spent = max(one.real_steps for one in points if one.method != REAL)
