@@ -21,6 +21,7 @@ from gsl.diagnosis.options import Options
 from gsl.diagnosis.records import records
 from gsl.diagnosis.world_file import diagnosed_effects
 from gsl.effects.effect import applied, built
+from gsl.report.diagnosis_text import summary_lines
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo import COMMANDS
 
@@ -126,6 +127,19 @@ def test_a_fault_of_one_joint_is_named_there() -> None:
 def test_two_causes_at_once() -> None:
     result = found({"command_latency": {"delay": 0.02}, "coulomb_friction": {"torque": 0.15}}, most=2)
     assert set(result.selection.chosen.names) == {"command_latency", "coulomb_friction"}
+
+
+def test_one_motion_alone_makes_nobody_sure() -> None:
+    whole = log({"command_latency": {"delay": 0.016}})
+    steps = [one for one, about in zip(whole.episodes, whole.metadata["episodes"], strict=True)
+             if about["policy"] == "steps_a"][0]  # fmt: skip
+    lone = replace(whole, episodes=(steps,), metadata={"episodes": [{"policy": "steps_a"}]})
+    found = document(diagnosed(lone, arm(), nominal(arm()), 0.002, QUICK, lambda _: None))
+    assert [cause["effect"] for cause in found["causes"]] == ["command_latency"]
+    assert found["causes"][0]["probability"] <= 0.8
+    assert any(one.startswith("There is one motion only") for one in found["caveats"])
+    (told,) = [one for one in summary_lines(found) if one.title == "what next"]
+    assert "Mind: There is one motion only" in str(told.caption)
 
 
 def test_what_the_library_lacks_is_unknown() -> None:

@@ -136,7 +136,7 @@ def diagnosed(
         tick("self-test: can the causes that are left be told apart")
         trials = tuple(duels(found, arena, survivors, options, tick))
     expected = _expected(selection, trials, shakes=shaking > 0.0) * (1.0 + found.noise.slack)
-    verdict = judged(selection, expected, _margins(trials, survivors), doubt, walking=walking)
+    verdict = judged(selection, expected, _margins(trials, survivors), doubt, walking=walking, lone=not found.by_record)
     return Findings(
         found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong, options.seed
     )

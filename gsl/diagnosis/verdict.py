@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ COARSE = 0.12  # share of a difference of costs that an imperfect model makes
 FOREIGN, EXPLAINED = 1.12, 0.85  # remaining cost, and share explained, beyond which nothing of the library is the cause
 LOCAL = 1.5  # and remaining cost of one joint
 KNOWN_SOFT = 0.15
+LONE = 0.8  # factor on probabilities where parts of one motion were held out: they share what is particular to it
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,7 @@ def judged(
     doubt: float = 0.0,
     *,
     walking: bool = False,
+    lone: bool = False,
 ) -> Verdict:
     """Judge a selection.
 
@@ -76,6 +78,7 @@ def judged(
         margins: Spread of the difference of costs to a rival, by the rival's effect, as a self-test measured it.
         doubt: Share of a cost by which that of two causes differs by chance.
         walking: Whether the robot is on the ground, where the base tells what is alike in the air.
+        lone: Whether there is one motion only.
     """
     chosen, none = found.chosen, found.none
     least = expected * float(none.counts.sum())
@@ -94,7 +97,8 @@ def judged(
         if cause.rival is not None and cause.probability < SEPARATED:
             groups.append((chosen.names[cause.index], cause.rival))
     unique = tuple(dict.fromkeys(tuple(sorted(set(group))) for group in groups))
-    scaled = tuple(Cause(c.index, c.probability * known, c.rival, c.value, c.low, c.high) for c in causes)
+    sure = known * (LONE if lone else 1.0)
+    scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
     word = "unknown" if known < 0.5 else "inseparable" if unique else "causes"
     return Verdict(word, scaled, unique, explained, remaining, known)
 

@@ -29,7 +29,7 @@ from gsl.report.diagnosis_words import (
     value,
 )
 
-CAUSES, JOINTS = 8, 5  # rows at most
+CAUSES, JOINTS, CAVEATS = 8, 5, 3  # rows at most
 
 
 class Told(NamedTuple):
@@ -97,7 +97,10 @@ def _where(document: Document) -> Told:
 def _next(document: Document) -> Told:
     files = {"report": "report", "world_file": "corrected simulator"}
     rows = [(words, str(document[key])) for key, words in files.items() if document.get(key)]
-    told = [
+    doubts = [str(one) for one in entries(document, "caveats")]
+    more = [f"{len(doubts) - CAVEATS} more of these in the report"] if len(doubts) > CAVEATS else []
+    told = [*(f"Mind: {one}" for one in doubts[:CAVEATS]), *more]
+    told += [
         line for step in steps(document) for line in (step.why, *(f"    {one}" for one in step.command.splitlines()))
     ]
     return Told("what next", ("", ""), rows or [("report", "report.html")], "\n".join(told))
