@@ -83,6 +83,7 @@ class Robot:
         encoder_step: Resolution of the joint encoders [rad].
         stance: A usual posture [rad] by joint, the one at which approximations are exact.
         upright_height: Base height below which it lies on the ground [m].
+        torque_unit: Size of its servos against the NAO's: by so much more or less their friction differs.
     """
 
     name: str
@@ -100,6 +101,7 @@ class Robot:
     encoder_step: float = 0.0
     stance: Mapping[str, float] = field(default_factory=dict)
     upright_height: float = 0.0
+    torque_unit: float = 1.0
 
     @property
     def base(self) -> str:

@@ -95,6 +95,10 @@ class Arena:
         spread = np.unique(np.linspace(0, count - 1, min(count, looked_at)).round().astype(int))
         return replace(self.train, pieces=self.train.pieces.chosen(spread))
 
+    @property
+    def _torque_unit(self) -> float:
+        return self.train.simulator.plant.robot.torque_unit
+
     def only(self, effects: Sequence[str]) -> Arena:
         """Return the arena with a part of the library."""
         return replace(self, library=tuple(one for one in self.library if one.effect in effects))
@@ -123,7 +127,7 @@ class Arena:
 
         bounds = np.hstack([candidate.bounds for candidate in candidates]) if candidates else np.zeros((2, 0))
         ratios = np.concatenate([np.zeros(0, dtype=bool), *(candidate.ratios for candidate in candidates)])
-        common = shares(candidates, self.scopes) if self.train.simulator.calibrates else ()
+        common = shares(candidates, self.scopes, self._torque_unit) if self.train.simulator.calibrates else ()
         fit = refined(self.train, build, start, bounds, at, ratios=ratios, common=common, every=every, rounds=rounds)
         return self._scored(candidates, parted(fit.parameters), fit, build)
 

@@ -97,7 +97,7 @@ def diagnosed(
         reference: A log without the effect, on which the nominal is calibrated first.
         known_nulls: What chance gained on these commands in this world, if it is known already.
     """
-    found = experiment(log, robot, walking=walking)
+    found = experiment(log, robot, walking=walking, held_out=options.held_out)
     if not len(found.train) or not len(found.held_out):
         raise InputError(
             "too little to fit and to check: two motions, or one trajectory, of some seconds are the least"

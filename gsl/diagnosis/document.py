@@ -52,7 +52,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "sides": sides(exp, z),
         "shrinkage": shrinkage(found, told, after),
         "ranking": _ranking(found),
-        "calibration": _calibration(exp.joints, answer.fit.nuisances[:, : len(exp.joints)]),
+        "calibration": _calibration(exp.joints, answer.fit.nuisances[:, : len(exp.joints)], exp.robot.torque_unit),
         "floor": {
             "source": exp.noise.source,
             "pairs": exp.noise.pairs,
@@ -139,14 +139,14 @@ def _written(one: Hypothesis) -> str:
     )
 
 
-def _calibration(joints: Sequence[str], nuisances: np.ndarray) -> list[dict[str, Any]]:
+def _calibration(joints: Sequence[str], nuisances: np.ndarray, torque_unit: float) -> list[dict[str, Any]]:
     return [
         {
             "joint": joint,
             "kp": float(np.exp(kp)),
             "kd": float(np.exp(kd)),
-            "coulomb": float(coulomb),
-            "viscous": float(viscous),
+            "coulomb": torque_unit * float(coulomb),
+            "viscous": torque_unit * float(viscous),
             "zero": float(zero + offset),
         }
         for joint, (kp, kd, coulomb, zero, offset, _, viscous) in zip(joints, nuisances.T, strict=True)

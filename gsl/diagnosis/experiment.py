@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from gsl.diagnosis.on_ground import Walking
 from gsl.diagnosis.records import BASE, Pieces, Record, pieces, records
 from gsl.diagnosis.replay import Bench, InTheAir, Simulator
 from gsl.diagnosis.residual import Comparison, comparison
+from gsl.errors import InputError
 
 WARM_UP, SCORED = 0.4, 0.6  # of a window [s]: shorter warm-ups bias friction, whose state a log does not show
 ON_GROUND = (0.1, 0.2)  # the same for a walk, where replays part soon
@@ -93,33 +95,43 @@ class Experiment:
         return replace(self, comparison=replace(self.comparison, floor=np.hypot(self.comparison.floor, error)))
 
 
-def experiment(batch: Batch, robot: Robot, *, walking: bool = False) -> Experiment:
+def experiment(
+    batch: Batch, robot: Robot, *, walking: bool = False, held_out: Mapping[str, Any] | None = None
+) -> Experiment:
     """Prepare a log.
 
     Args:
         batch: Of this robot, with records long enough for a window.
         robot: Whose motors follow.
         walking: Whether it is on the ground.
+        held_out: Labels of the records that are for checking; without any, every second motion is.
+
+    Raises:
+        InputError: No record, or every one, has these labels; or effects are known of records on the ground.
     """
     found, period = records(batch, robot, walking=walking), batch.control_period
     if walking:
-        return _on_ground(found, robot, period)
+        if any(one.conditions for one in found):
+            raise InputError("conditions of a trajectory are for logs in the air; leave them out of its label")
+        return _on_ground(found, robot, period, held_out)
     warm_up, scored = round(WARM_UP / period), round(SCORED / period)
     noise = noise_floor(found, robot.encoder_step)
     cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
     commands = cut.windows.commands[:, : warm_up + scored, : len(robot.controlled)]
-    held, by_record = _held_out(found, cut)
+    held, by_record = _held_out(found, cut, held_out)
     how = comparison(cut, noise, np.ptp(commands, axis=1) < STILL)
     return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
 
 
-def _on_ground(found: tuple[Record, ...], robot: Robot, period: float) -> Experiment:
+def _on_ground(
+    found: tuple[Record, ...], robot: Robot, period: float, held_out: Mapping[str, Any] | None
+) -> Experiment:
     warm_up, scored = (round(part / period) for part in ON_GROUND)
     cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
     cut = cut.chosen(_spread(np.arange(len(cut)), WALKS))
     joints = np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
     noise = noise_floor(found, robot.encoder_step, np.r_[joints, list(LEAST.values())])
-    held, by_record = _held_out(found, cut)
+    held, by_record = _held_out(found, cut, held_out)
     how = Comparison(noise.sd, np.zeros(len(noise.sd), dtype=bool), np.zeros(len(noise.sd)))
     return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
 
@@ -129,8 +141,10 @@ def fitting_step(step: float, period: float) -> float:
     return period / max(1, round(period / step))
 
 
-def _held_out(found: Sequence[Record], cut: Pieces) -> tuple[np.ndarray, bool]:
-    """Hold out every second motion, in the order of the names, so that variants part; repeats stay together."""
+def _held_out(found: Sequence[Record], cut: Pieces, asked: Mapping[str, Any] | None) -> tuple[np.ndarray, bool]:
+    """Hold out what is asked for, else every second motion in the order of the names; repeats stay together."""
+    if asked:
+        return np.isin(cut.record, labelled(found, asked)), True
     motions: dict[bytes, list[int]] = {}
     for index in sorted(range(len(found)), key=lambda k: (found[k].name, k)):
         motions.setdefault(np.round(found[index].targets, 6).tobytes(), []).append(index)
@@ -138,6 +152,23 @@ def _held_out(found: Sequence[Record], cut: Pieces) -> tuple[np.ndarray, bool]:
         held = [index for k, group in enumerate(motions.values()) if k % 2 for index in group]
         return np.isin(cut.record, held), True
     return np.arange(len(cut)) % 2 == 1, False
+
+
+def labelled(found: Sequence[Record], asked: Mapping[str, Any]) -> list[int]:
+    """Return the indices of the records that have some labels, each a value or one of several.
+
+    Raises:
+        InputError: None of them has, or every one.
+    """
+    wanted = {key: value if isinstance(value, list | tuple) else [value] for key, value in asked.items()}
+    chosen = [k for k, one in enumerate(found) if all(one.about.get(key) in some for key, some in wanted.items())]
+    if 0 < len(chosen) < len(found):
+        return chosen
+    told = ", ".join(f"{key}: {value}" for key, value in asked.items())
+    known = {key: sorted({str(one.about.get(key)) for one in found}) for key in asked}
+    there = "; ".join(f"{key} is {', '.join(values)}" for key, values in known.items())
+    which = "every trajectory" if chosen else "no trajectory"
+    raise InputError(f"held_out: {which} of the log has {{{told}}}; there {there}")
 
 
 def _spread(index: np.ndarray, most: int) -> np.ndarray:

@@ -84,7 +84,7 @@ def _repeats(found: Sequence[Record]) -> list[list[Record]]:
     groups: dict[bytes, list[Record]] = defaultdict(list)
     for one in found:
         if len(one) > 2 * SETTLED:
-            groups[np.round(one.targets, 6).tobytes()].append(one)
+            groups[np.round(one.targets, 6).tobytes() + repr(one.conditions).encode()].append(one)
     return list(groups.values())
 
 

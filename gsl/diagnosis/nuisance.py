@@ -14,7 +14,8 @@ from gsl.core.plant import Plant, Servo
 
 NAMES = ("kp", "kd", "coulomb", "zero", "offset", "inertia", "viscous")
 # Logarithms of factors, [N·m], [rad] in the log, [rad] in the servo, `inertia_unit`s, [N·m·s/rad]: of one make of servo
-# (estimate). Viscous friction is what a gain's damping is until torque is limited.
+# (estimate); friction in units of `Robot.torque_unit`. Viscous friction is what a gain's damping is until torque is
+# limited.
 SIZES = np.array([0.04, 0.07, 0.012, 0.003, 0.003, 1.0, 0.015])
 PROBES = np.array([0.05, 0.10, 0.02, 0.002, 0.002, 0.5, 0.02])  # of the finite differences
 KP, KD, COULOMB, ZERO, OFFSET, INERTIA, VISCOUS = range(7)
@@ -69,13 +70,13 @@ def calibrated(plant: Plant, nuisances: np.ndarray) -> Plant:
         nuisances: Shape (7, n_joints).
     """
     wide = nuisances[:, plant.robot.drive]
-    servo = plant.servo
+    servo, unit = plant.servo, plant.robot.torque_unit
     changed = plant.with_servo(
         kp=servo.kp * np.exp(wide[KP]),
         kd=servo.kd * np.exp(wide[KD]),
-        coulomb=np.maximum(0.0, servo.coulomb + wide[COULOMB]),
+        coulomb=np.maximum(0.0, servo.coulomb + unit * wide[COULOMB]),
         offset=servo.offset + wide[OFFSET],
-        viscous=np.maximum(0.0, servo.viscous + wide[VISCOUS]),
+        viscous=np.maximum(0.0, servo.viscous + unit * wide[VISCOUS]),
         armature=np.maximum(LEAST * servo.armature, servo.armature + wide[INERTIA] * inertia_unit(servo)),
     )
     return replace(changed, sensors=replace(plant.sensors, bias=plant.sensors.bias + wide[ZERO]))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from gsl.effects.effect import effect_class
 
@@ -20,6 +22,7 @@ class Options:
         clocks: Whether commands and measurements have one clock; else latency is not claimed.
         spread: Of the robot's calibration about the simulator's, as a share of the usual spread of one make.
         seed: Of the simulated logs and of the learned residual.
+        held_out: Labels of the trajectories that are for checking; empty for every second motion.
     """
 
     without: tuple[str, ...] = ()
@@ -30,6 +33,7 @@ class Options:
     clocks: bool = True
     spread: float = 1.0
     seed: int = 0
+    held_out: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse names that no effect has."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -36,6 +37,7 @@ class Record:
             axes [m/s], angular velocity in base axes [rad/s], shape (T + 1, 16); None in the air.
         feet: Whether the left and the right foot carry load, shape (T + 1, 2), if it was logged.
         sensors: Further columns of the log by name, each of shape (T + 1,).
+        about: What the log says of the trajectory: its label.
     """
 
     name: str
@@ -45,6 +47,13 @@ class Record:
     base: np.ndarray | None = None
     feet: np.ndarray | None = None
     sensors: Mapping[str, np.ndarray] = field(default_factory=dict)
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def conditions(self) -> Mapping[str, Any]:
+        """Effects that are known of this trajectory: a payload, other gains, a tilted base."""
+        found: Mapping[str, Any] = self.about.get("conditions") or {}
+        return found
 
     def __len__(self) -> int:
         """Control periods T."""
@@ -65,16 +74,22 @@ def records(batch: Batch, robot: Robot, *, walking: bool = False) -> tuple[Recor
         walking: Whether the base moves and is logged.
     """
     labels = batch.metadata.get("episodes") or []
-    names = [str(label.get("policy", "")) for label in labels] if len(labels) == len(batch) else [""] * len(batch)
+    labels = labels if len(labels) == len(batch) else [{}] * len(batch)
     order = [batch.joints.index(joint) for joint in robot.controlled]
     return tuple(
-        _record(name, episode, order, robot, batch.control_period, walking=walking)
-        for name, episode in zip(names, batch.episodes, strict=True)
+        _record(label, episode, order, robot, batch.control_period, walking=walking)
+        for label, episode in zip(labels, batch.episodes, strict=True)
     )
 
 
 def _record(
-    name: str, episode: Trajectory, order: Sequence[int], robot: Robot, period: float, *, walking: bool
+    label: Mapping[str, Any],
+    episode: Trajectory,
+    order: Sequence[int],
+    robot: Robot,
+    period: float,
+    *,
+    walking: bool,
 ) -> Record:
     ticks = usable(episode)
     position = episode.position[: ticks + 1, order]
@@ -82,7 +97,8 @@ def _record(
     feet = _columns(episode, "foot_force", ("left", "right"))[: ticks + 1] > LOADED if _has_feet(episode) else None
     sensors = {column: values[: ticks + 1] for column, values in episode.sensors.items()}
     targets = episode.action[:ticks][:, order][:, robot.drive]
-    return Record(name, targets, position, slope(position, period), base, feet, sensors)
+    name = str(label.get("policy", ""))
+    return Record(name, targets, position, slope(position, period), base, feet, sensors, label)
 
 
 def _has_feet(episode: Trajectory) -> bool:
@@ -145,6 +161,7 @@ class Pieces:
         record: Index of each window's record, shape (W,).
         tick: Control period at which each begins, shape (W,).
         warm_up: Control periods at the beginning that are not scored.
+        conditions: Effects that are known of each record; empty where nothing is known of any.
     """
 
     windows: Windows | OnGround
@@ -152,6 +169,7 @@ class Pieces:
     record: np.ndarray
     tick: np.ndarray
     warm_up: int
+    conditions: tuple[Mapping[str, Any], ...] = ()
 
     def __len__(self) -> int:
         """Number of windows."""
@@ -166,7 +184,21 @@ class Pieces:
     def chosen(self, index: np.ndarray) -> Pieces:
         """Return some of the windows."""
         windows = type(self.windows)(*(part[index] for part in self.windows))
-        return Pieces(windows, self.real[index], self.record[index], self.tick[index], self.warm_up)
+        return Pieces(windows, self.real[index], self.record[index], self.tick[index], self.warm_up, self.conditions)
+
+    @property
+    def alike(self) -> list[tuple[Mapping[str, Any], np.ndarray]]:
+        """Windows by what is known of them: these effects, and indices, shape (n,)."""
+        if not self.conditions:
+            return [({}, np.arange(len(self)))]
+        kinds = same([self.conditions[k] for k in self.record])
+        return [(self.conditions[self.record[index[0]]], index) for index in kinds]
+
+
+def same(conditions: Sequence[Mapping[str, Any]]) -> list[np.ndarray]:
+    """Return the indices of those that are alike, group by group, shapes (n,)."""
+    told = [json.dumps(one, sort_keys=True, default=str) for one in conditions]
+    return [np.array([k for k, other in enumerate(told) if other == one]) for one in dict.fromkeys(told)]
 
 
 def pieces(found: Sequence[Record], robot: Robot, period: float, *, warm_up: int, scored: int) -> Pieces:
@@ -184,9 +216,13 @@ def pieces(found: Sequence[Record], robot: Robot, period: float, *, warm_up: int
     """
     drive, length = robot.drive, warm_up + scored
     commands, motion, real, record, tick, base = [], [], [], [], [], []
+    conditions = tuple(one.conditions for one in found) if any(one.conditions for one in found) else ()
     for index, one in enumerate(found):
         padded = np.vstack([np.repeat(one.targets[:1], COMMANDS, axis=0), one.targets])
+        works = one.sensors.get("enabled", np.ones(len(one) + 1))
         for start in range(0, len(one) - length + 1, scored):
+            if not works[start : start + length].all():
+                continue  # a joint whose torque is off follows no command
             commands.append(padded[start + 1 : start + COMMANDS + length][::-1])
             motion.append([one.position[start, drive], one.velocity[start, drive]])
             real.append(one.measured[start + 1 : start + 1 + length])
@@ -200,4 +236,4 @@ def pieces(found: Sequence[Record], robot: Robot, period: float, *, warm_up: int
         )
     parts = np.array(commands), np.array(motion), period * np.array(tick, dtype=float)
     windows = Windows(*parts) if base[0] is None else OnGround(*parts, np.array(base))
-    return Pieces(windows, np.array(real), np.array(record), np.array(tick), warm_up)
+    return Pieces(windows, np.array(real), np.array(record), np.array(tick), warm_up, conditions)

@@ -42,13 +42,24 @@ class InTheAir:
 
     def told(self, effects: Effects, nuisances: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return the replayed positions [rad], shape (W, T, n_joints); NaN where a replay diverges."""
-        held = Held.of(calibrated(applied(self.plant, built(effects)), nuisances), self.step, self.period)
-        shares = _shares(len(pieces), self.threads)
-        parts = [Windows(*(part[share] for part in pieces.windows)) for share in shares]
-        result = np.empty((len(pieces), pieces.windows.length, len(self.plant.robot.motors)))
+        plant = calibrated(applied(self.plant, built(effects)), nuisances)
+        alike = pieces.alike
+        if len(alike) == 1:
+            return self._replayed(applied(plant, built(alike[0][0])), pieces.windows)[..., : nuisances.shape[1]]
+        result = np.empty((len(pieces), pieces.windows.length, nuisances.shape[1]))
+        for known, index in alike:
+            windows = Windows(*(part[index] for part in pieces.windows))
+            result[index] = self._replayed(applied(plant, built(known)), windows)[..., : nuisances.shape[1]]
+        return result
+
+    def _replayed(self, plant: Plant, windows: Any) -> np.ndarray:
+        held = Held.of(plant, self.step, self.period)
+        shares = _shares(len(windows.clock), self.threads)
+        parts = [Windows(*(part[share] for part in windows)) for share in shares]
+        result = np.empty((len(windows.clock), windows.length, len(plant.robot.motors)))
         for share, told in zip(shares, self._pool.map(held.replay, parts), strict=True):
             result[share] = told
-        return result[..., : nuisances.shape[1]]
+        return result
 
 
 def _shares(windows: int, threads: int) -> list[slice]:

@@ -16,7 +16,7 @@ from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Arena, Hypothesis
 from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.options import Options
-from gsl.diagnosis.records import Pieces, Record, pieces, slope
+from gsl.diagnosis.records import Pieces, Record, pieces, same, slope
 from gsl.diagnosis.replay import Bench
 from gsl.effects.effect import applied, built
 from gsl.worlds.held import Held
@@ -53,7 +53,12 @@ def simulated(found: Experiment, plant: Plant, step: float, rng: np.random.Gener
     """
     paths, n = [one.targets for one in found.records], len(found.joints)
     starts = [path[0] + START * rng.standard_normal(path.shape[1]) for path in paths]
-    played = Held.of(plant, step, found.period).play(paths, starts, SETTLE)
+    played = [np.zeros(0)] * len(paths)
+    for group in same([one.conditions for one in found.records]):
+        held = Held.of(applied(plant, built(found.records[group[0]].conditions)), step, found.period)
+        some = held.play([paths[k] for k in group], [starts[k] for k in group], SETTLE)
+        for k, told in zip(group, some, strict=True):
+            played[k] = told
     noisy = [told[:, :n] + found.comparison.floor * rng.standard_normal((len(told), n)) for told in played]
     return tuple(
         replace(one, position=position, velocity=slope(position, found.period))

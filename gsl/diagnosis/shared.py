@@ -23,23 +23,30 @@ ROWS = {
     ("sensor_bias", "bias"): ZERO,
 }
 FACTORS = (KP, KD)  # rows that are logarithms of factors
+TORQUES = (COULOMB, VISCOUS)
 
 
 class Share(NamedTuple):
-    """A parameter and the row of the calibration that does the same to the joints of its scope, shape (n_joints,)."""
+    """A parameter and the row of the calibration that does the same to the joints of its scope, shape (n_joints,).
+
+    `unit` is what 1 of the row is of the parameter, where it is no factor.
+    """
 
     parameter: int
     row: int
     joints: np.ndarray
+    unit: float = 1.0
 
 
-def shares(candidates: Sequence[Candidate], scopes: Mapping[str, np.ndarray]) -> tuple[Share, ...]:
-    """Return what parameters of candidates, in their order, share with the calibration."""
+def shares(
+    candidates: Sequence[Candidate], scopes: Mapping[str, np.ndarray], torque_unit: float = 1.0
+) -> tuple[Share, ...]:
+    """Return what parameters of candidates, in their order, share with the calibration of a robot."""
     parameters = [(candidate, name) for candidate in candidates for name in candidate.free]
     return tuple(
-        Share(index, ROWS[candidate.effect, name], scopes[candidate.scope])
+        Share(index, row, scopes[candidate.scope], torque_unit if row in TORQUES else 1.0)
         for index, (candidate, name) in enumerate(parameters)
-        if (candidate.effect, name) in ROWS and candidate.scope in scopes
+        if (row := ROWS.get((candidate.effect, name))) is not None and candidate.scope in scopes
     )
 
 
@@ -48,8 +55,8 @@ def handed_over(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return parameters, shape (p,), with what nuisances, shape (7, n_joints), share, and the nuisances without it."""
     theta, nuisances = theta.copy(), nuisances.copy()
-    for k, row, joints in common:
+    for k, row, joints, unit in common:
         mean, old = float(nuisances[row, joints].mean()), theta[k]
-        theta[k] = np.clip(old * np.exp(mean) if row in FACTORS else old + mean, *bounds[:, k])
-        nuisances[row, joints] -= np.log(theta[k] / old) if row in FACTORS else theta[k] - old
+        theta[k] = np.clip(old * np.exp(mean) if row in FACTORS else old + unit * mean, *bounds[:, k])
+        nuisances[row, joints] -= np.log(theta[k] / old) if row in FACTORS else (theta[k] - old) / unit
     return theta, nuisances

@@ -23,10 +23,13 @@ def in_bullet(found: Findings, *, iterations: int = 50) -> dict[str, Any]:
     index = exp.held_out[np.unique(np.linspace(0, len(exp.held_out) - 1, WINDOWS).round().astype(int))]
     part = exp.pieces.chosen(index)
     plant = calibrated(applied(sim.plant, built(chosen.effects)), chosen.fit.nuisances)
-    engine = Engine(plant, Physics(sim.step, iterations, sim.period, floating=False))
-    told = np.array([_replayed(engine, *window) for window in zip(*part.windows, strict=True)])
-    engine.close()
-    told = told[..., : len(exp.joints)] + plant.sensors.bias[: len(exp.joints)]
+    told = np.empty(part.real.shape)
+    for known, group in part.alike:
+        engine = Engine(applied(plant, built(known)), Physics(sim.step, iterations, sim.period, floating=False))
+        for k in group:
+            told[k] = _replayed(engine, *(values[k] for values in part.windows))[:, : len(exp.joints)]
+        engine.close()
+    told += plant.sensors.bias[: len(exp.joints)]
     chain = sim.told(chosen.effects, chosen.fit.nuisances, part)
     z = exp.comparison.residual(told, part)
     difference = float(np.sqrt(np.mean((told - chain)[:, part.warm_up :] ** 2)))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.plant import Plant
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.replay import Effects
@@ -22,28 +23,29 @@ def diagnosed_effects(found: Findings) -> dict[str, Any]:
     all there is.
     """
     joints, chosen = found.experiment.joints, found.answer
-    unit = nuisance.inertia_unit(found.simulator.plant.servo)
-    parts = [chosen.effects, calibration(joints, chosen.fit.nuisances[:, : len(joints)], unit)]
+    plant = found.simulator.plant
+    parts = [chosen.effects, calibration(joints, chosen.fit.nuisances[:, : len(joints)], plant)]
     if found.baseline is not None:
-        parts = [found.baseline.effects, calibration(joints, found.baseline.nuisances, unit), *parts]
+        parts = [found.baseline.effects, calibration(joints, found.baseline.nuisances, plant), *parts]
     return joined(parts)
 
 
-def calibration(joints: Sequence[str], nuisances: np.ndarray, unit: np.ndarray) -> Effects:
-    """Return nuisances, shape (7, n_joints), as effects of single joints; `unit` see `nuisance.inertia_unit`."""
+def calibration(joints: Sequence[str], nuisances: np.ndarray, plant: Plant) -> Effects:
+    """Return nuisances, shape (7, n_joints), as effects of single joints of a plant."""
     rows = {joint: nuisances[:, k] for k, joint in enumerate(joints)}
+    unit, torque = nuisance.inertia_unit(plant.servo), plant.robot.torque_unit
     return {
         "servo_gain": [
             {"kp": np.exp(row[nuisance.KP]), "kd": np.exp(row[nuisance.KD]), "joints": joint}
             for joint, row in rows.items()
         ],
         "coulomb_friction": [
-            {"torque": row[nuisance.COULOMB], "joints": joint}
+            {"torque": torque * row[nuisance.COULOMB], "joints": joint}
             for joint, row in rows.items()
             if row[nuisance.COULOMB] > 0.0
         ],
         "viscous_friction": [
-            {"coefficient": row[nuisance.VISCOUS], "joints": joint}
+            {"coefficient": torque * row[nuisance.VISCOUS], "joints": joint}
             for joint, row in rows.items()
             if row[nuisance.VISCOUS] > 0.0
         ],

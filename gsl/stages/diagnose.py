@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import time
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -59,6 +59,9 @@ class Diagnose:
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
     workers: Workers = -1
+    held_out: Annotated[
+        Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
+    ] = field(default_factory=dict)
     trust: Annotated[bool, setting("let the policies' files name classes that are not gsl's")] = False
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
@@ -115,7 +118,10 @@ class Diagnose:
 
     def _options(self) -> Options:
         clocks = self.clocks == "synchronised"
-        return Options(self.without, self.most, self.duels, self.nulls, threads(self.workers), clocks, seed=self.seed)
+        workers = threads(self.workers)
+        return Options(
+            self.without, self.most, self.duels, self.nulls, workers, clocks, seed=self.seed, held_out=self.held_out
+        )
 
     def _policy_gap(self, measured: RealReturns, found: Findings, console: Any) -> Mapping[str, Any]:
         effort = Effort(self.episodes, threads(self.workers), self.seed)
@@ -157,6 +163,8 @@ class Diagnose:
         said = [f"real={self.real}"]
         said += [f"reference={self.reference}"] if self.reference else []
         said += [f"without=[{','.join(self.without)}]"] if self.without else []
+        held = ", ".join(f"{key}: {value}" for key, value in self.held_out.items())
+        said += [f"held_out={{{held}}}"] if held else []
         said += [f"clocks={self.clocks}"] if self.clocks != "synchronised" else []
         return shlex.join(["gsl", "diagnose", *said])
 

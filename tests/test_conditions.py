@@ -1,0 +1,89 @@
+"""What is known of single trajectories: effects that are no cause, labels that hold out, torque that was off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from test_diagnosis import PERIOD, QUICK, arm, log
+
+from gsl.core.plant import nominal
+from gsl.core.trajectory import Batch
+from gsl.diagnosis.diagnose import diagnosed
+from gsl.diagnosis.document import document
+from gsl.diagnosis.experiment import experiment
+from gsl.diagnosis.nuisance import none
+from gsl.errors import InputError
+
+SOFT = {"servo_gain": {"kp": 0.5}}
+
+
+def labelled(batch: Batch, **more: Any) -> Batch:
+    labels = [{**one, **more} for one in batch.metadata["episodes"]]
+    return replace(batch, metadata={**batch.metadata, "episodes": labels})
+
+
+def joined(first: Batch, second: Batch) -> Batch:
+    labels = [*first.metadata["episodes"], *second.metadata["episodes"]]
+    return replace(first, episodes=(*first.episodes, *second.episodes), metadata={"episodes": labels})
+
+
+def both(**cause: Any) -> Batch:
+    """One robot, with half the gain in half of its trajectories."""
+    stiff = labelled(log(cause, jitter=0.0), gain=1.0)
+    soft = labelled(log({**cause, **SOFT}, jitter=0.0), gain=0.5, conditions=SOFT)
+    return joined(stiff, soft)
+
+
+def test_what_is_known_of_a_trajectory_is_no_gap() -> None:
+    exp = experiment(both(), arm())
+    known = exp.simulator(nominal(arm()), 0.002, 1, 1.0)
+    left = exp.comparison.residual(known.told({}, none(2), exp.pieces), exp.pieces)
+    forgotten = replace(exp.pieces, conditions=())
+    gap = exp.comparison.residual(known.told({}, none(2), forgotten), forgotten)
+    assert np.sqrt(np.mean(left**2)) == pytest.approx(1.0, abs=0.1)
+    assert np.sqrt(np.mean(gap**2)) > 5.0
+
+
+def test_a_cause_is_found_beside_what_is_known() -> None:
+    options = replace(QUICK, held_out={"gain": 0.5}, most=2)
+    found = diagnosed(both(command_latency={"delay": 0.016}), arm(), nominal(arm()), 0.002, options, lambda _: None)
+    assert found.selection.chosen.names == ("command_latency",)
+    held = {
+        found.experiment.records[k].about["gain"] for k in found.experiment.pieces.record[found.experiment.held_out]
+    }
+    assert held == {0.5}
+    assert document(found)["shrinkage"]["fraction"] > 0.95
+
+
+def test_repeats_under_other_conditions_are_no_noise() -> None:
+    exp = experiment(both(), arm())
+    assert exp.noise.source == "repeats"
+    assert exp.noise.sd.max() < 0.003
+
+
+@pytest.mark.parametrize(
+    ("asked", "line"),
+    [
+        ({"gain": 2.0}, "held_out: no trajectory of the log has {gain: 2.0}; there gain is 0.5, 1.0"),
+        ({"gain": [0.5, 1.0]}, "held_out: every trajectory of the log has"),
+        ({"gian": 1.0}, "held_out: no trajectory of the log has {gian: 1.0}; there gian is None"),
+    ],
+)
+def test_labels_that_hold_out_nothing_or_all_are_refused(asked: dict[str, Any], line: str) -> None:
+    with pytest.raises(InputError) as caught:
+        experiment(both(), arm(), held_out=asked)
+    assert str(caught.value).startswith(line)
+
+
+def test_windows_without_torque_are_left_out() -> None:
+    whole = log({})
+    works = np.ones(len(whole.episodes[0]) + 1, dtype=bool)
+    works[75:] = False
+    cut = replace(whole.episodes[0], sensors={"enabled": works})
+    some = experiment(replace(whole, episodes=(cut, *whole.episodes[1:])), arm()).pieces
+    every = experiment(whole, arm()).pieces
+    ends = (some.tick[some.record == 0] + some.real.shape[1]) * PERIOD
+    assert len(some) < len(every) and ends.max() <= 75 * PERIOD
