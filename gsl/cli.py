@@ -89,6 +89,7 @@ stage("train-inverse", "Learn from simulated trajectories which action makes a m
 stage("optimize", "Improve a policy in the simulator, grounded or not.")
 stage("diagnose", "Say where the simulator is wrong, which effect is missing, and how far the gap shrinks.")
 stage("identify", "Fit every parameter of the effect library at once: system identification, no verdict.")
+stage("cross-validate", "See whether what a diagnosis finds in a part of the trajectories is true of the rest.")
 stage("blind make", "Draw robots with known causes, log what they do, and seal the labels.")
 stage("blind answer", "Diagnose every case without its label, and seal the answers.")
 stage("blind reveal", "Check the seals, set the answers against the labels, and count.")

@@ -1,0 +1,76 @@
+"""A cross-validation as a table: errors of whole replays on what was held out, fold by fold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from gsl.core.statistics import bootstrap_interval
+from gsl.report.markdown import table as markdown
+
+AS_IT_WAS, CALIBRATED, DIAGNOSED = "as it was", "calibrated", "diagnosed"
+
+
+@dataclass(frozen=True)
+class Fold:
+    """What came of holding out one value of a label.
+
+    Attributes:
+        value: Of the label.
+        verdict: Of the diagnosis of the rest.
+        causes: Named, or suspected where nothing may be named.
+        parameters: Of these, as a world's `effects:`.
+        removed: Share of the held-out excess of windows that is gone, if there is any.
+        ceiling: The same with a learned residual.
+        names: Of the held-out trajectories.
+        errors: Mean absolute error of each of them in a whole replay [rad], by what replays it.
+    """
+
+    value: Any
+    verdict: str
+    causes: Sequence[str]
+    parameters: Mapping[str, Any]
+    removed: float | None
+    ceiling: float | None
+    names: Sequence[str]
+    errors: Mapping[str, Sequence[float]]
+
+    def told(self) -> dict[str, Any]:
+        """Return it as a JSON document."""
+        return asdict(self)
+
+
+def table(folds: Sequence[Fold], by: str, usual: str) -> str:
+    """Return the table, and below it how the diagnosis compares with the usual effects, trajectory by trajectory."""
+    ways = list(folds[0].errors)
+    columns = (f"{by} held out", *(f"{way} [mrad]" for way in ways), "excess removed", "learned residual", "causes")
+    rows = [
+        (
+            str(one.value),
+            *(f"{1e3 * np.mean(one.errors[way]):.1f}" for way in ways),
+            _percent(one.removed),
+            _percent(one.ceiling),
+            f"{', '.join(one.causes) or '-'}{' (suspected)' if one.verdict == 'unknown' else ''}",
+        )
+        for one in folds
+    ]
+    every = {way: np.concatenate([one.errors[way] for one in folds]) for way in ways}
+    rows.append(("all", *(f"{1e3 * np.mean(every[way]):.1f}" for way in ways), "", "", ""))
+    before, after = every[usual], every[DIAGNOSED]
+    change = bootstrap_interval(
+        lambda drawn: float(after[drawn].mean() / before[drawn].mean()) - 1.0, len(after), np.random.default_rng(0)
+    )
+    compared = (
+        f"The diagnosed simulator's mean error against that with {usual}: {100.0 * change.mean:+.0f} % "
+        f"({100.0 * change.lower:+.0f} to {100.0 * change.upper:+.0f} %, bootstrap over trajectories); it is smaller in "
+        f"{int((after < before).sum())} of {len(after)} trajectories."
+    )
+    below = "Mean absolute error of the joints in open-loop replays of whole trajectories that no fit has seen."
+    return f"{markdown(columns, rows)}\n{below}\n{compared}\n"
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100.0 * share:.0f} %"
