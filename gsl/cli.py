@@ -76,11 +76,17 @@ def stage(name: str, summary: str) -> None:
         config_dir: ConfigDir = None,
         json: Json = False,
     ) -> None:
-        from gsl.config import run
+        _run(name, overrides or [], multirun=multirun, cfg=cfg, config_dir=config_dir, json=json)
 
-        show = cfg is not None
-        code = run(name, overrides or [], multirun=multirun, cfg=show, config_dir=config_dir, json=json)
-        raise typer.Exit(code)
+
+def _run(
+    name: str, overrides: list[str], *, multirun: bool, cfg: Shown | None, config_dir: Path | None, json: bool
+) -> None:
+    from gsl.config import run
+
+    show = cfg is not None
+    code = run(name, overrides, multirun=multirun, cfg=show, config_dir=config_dir, json=json)
+    raise typer.Exit(code)
 
 
 stage("collect", "Record trajectories of a policy in a world.")
@@ -110,6 +116,23 @@ stage("reproduce garat", "The heavier worlds of the GARAT suite (gsl[mujoco,rl])
 stage("reproduce budget", "Return and grounding error against the number of real trajectories.")
 stage("survey", "See how far real worlds are from the simulator.")
 stage("iterate", "The whole chain, again and again, until the real return stops improving.")
+
+
+IMPORT = "Bring logs of a real robot: CSV, JSON, npz, parquet or bags, by a small mapping."
+
+
+@app.command("import", cls=StageCommand, help=IMPORT, short_help=IMPORT)
+def import_logs(
+    overrides: Overrides = None,
+    check: Annotated[bool, typer.Option("--check", help="Write nothing, say what would be done.")] = False,
+    multirun: Multirun = False,
+    cfg: Cfg = None,
+    config_dir: ConfigDir = None,
+    json: Json = False,
+) -> None:
+    """Import is a stage with one option more."""
+    arguments = [*(overrides or []), *(["check=true"] if check else [])]
+    _run("import", arguments, multirun=multirun, cfg=cfg, config_dir=config_dir, json=json)
 
 
 @app.command()

@@ -87,15 +87,20 @@ def run(
             return run_jobs(command, line, composition, console)
         document = execute(command, line, resolved(composition), console)
         console.result(document, text=said(document))
-        return 0
+        return int(document.get("exit_code", 0))
 
 
 def execute(command: str, line: str, config: Mapping[str, Any], console: Console, *, level: str = "") -> dict[str, Any]:
-    """Build the artifact that a resolved configuration describes and return what there is to say about it."""
+    """Build the artifact that a resolved configuration describes and return what there is to say about it.
+
+    A stage with a setting `check` that is true only looks and builds nothing.
+    """
     from gsl.stages.account import account
     from gsl.storage.artifact import build as build_artifact
 
     stage, settings, own = prepared(config)
+    if getattr(stage, "check", False):
+        return dict(stage.look(console))
     out = own.folder(command, level)
     artifact = build_artifact(stage, config=settings, out=out, command=line, force=own.force, console=console)
     for told in account(artifact):
@@ -105,7 +110,9 @@ def execute(command: str, line: str, config: Mapping[str, Any], console: Console
 
 
 def said(document: Mapping[str, Any]) -> str:
-    """Return the last line of a command: where its results are."""
+    """Return the last line of a command: where its results are, or what it said without writing any."""
+    if "said" in document:
+        return str(document["said"])
     return f"{document['folder']}{' (unchanged)' if document['unchanged'] else ''}"
 
 

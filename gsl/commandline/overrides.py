@@ -4,20 +4,26 @@ sim=nao_ideal                           world@sim=nao_ideal
 world.effects.backlash.width=0.02       ++world.effects.backlash.width=0.02
 experiment=arm                          +experiment=arm
 out=runs/a                              ++out=runs/a
+mapping=logs/my_arm.yaml                mapping=<from the folder of the mappings>/logs/my_arm
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
 
-from gsl.errors import ConfigError
+from gsl.errors import ConfigError, InputError
 
 COMMAND_KEYS = ("name", "out", "force", "trust")
 """Settings of the command, not of the stage; every command takes them, whether its yaml names them or not."""
 
 OPTIONAL_GROUPS = ("experiment",)
 """Groups a command may choose from without having a default."""
+
+FILE_GROUPS = ("mapping",)
+"""Groups of which a path to a yaml file of one's own is an option, too."""
+_ROOT = "../" * 64  # from whatever folder of configuration, up to the root of the file system
 
 _EFFECT = re.compile(r"(?:.*\.)?effects\.[A-Za-z_]\w*")
 
@@ -62,6 +68,8 @@ def _rewritten(argument: str, roles: Mapping[str, str], chosen: Collection[str])
         raise ConfigError(argument, "has no value; write key=value")
     if key.startswith("+"):
         return argument
+    if key in FILE_GROUPS and value.endswith((".yaml", ".yml")):
+        return f"{key}={_as_option(key, Path(value))}"
     if key in roles:
         return f"{roles[key]}={value}"
     if effect_path(key) or key in COMMAND_KEYS:
@@ -69,3 +77,13 @@ def _rewritten(argument: str, roles: Mapping[str, str], chosen: Collection[str])
     if key in OPTIONAL_GROUPS and key not in chosen:
         return f"+{key}={value}"
     return argument
+
+
+def _as_option(group: str, path: Path) -> str:
+    """Return the name under which hydra finds a yaml file that lies anywhere."""
+    if path.suffix != ".yaml":
+        raise InputError(f"{group} = {path}: must end with .yaml")
+    if not path.is_file():
+        raise InputError(f"{group} = {path}: there is no such file")
+    name = _ROOT + path.resolve().with_suffix("").as_posix().lstrip("/")
+    return name if re.fullmatch(r"[\w./-]+", name) else "'" + name.replace("\\", "\\\\").replace("'", "\\'") + "'"

@@ -43,6 +43,18 @@ def _collect(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     return Told("trajectories", tuple(row), [tuple(map(str, row.values()))])
 
 
+def _import(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    row = {
+        "episodes": metrics["episodes"],
+        "files": metrics["files"],
+        "joints": len(metrics["joints"]),
+        "seconds": f"{metrics['seconds']:.1f}",
+        "control period [s]": f"{metrics['control_period']:g}",
+    }
+    caption = "; ".join([metrics["time"], f"velocities {metrics['velocity']}", *metrics["warnings"]])
+    return Told("imported trajectories", tuple(row), [tuple(map(str, row.values()))], caption)
+
+
 def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     names = {
         "one_step_deg": "one tick [°]",
@@ -200,6 +212,7 @@ def _diagnose(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> list[Told
 
 _TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told | list[Told]]] = {
     "collect": _collect,
+    "import": _import,
     "diagnose": _diagnose,
     "train_forward": _train_forward,
     "train_inverse": _train_inverse,

@@ -67,6 +67,10 @@ def _collect(metrics: Metrics, unit: Unit) -> str:
     return told if metrics["value"] is None else f"{told}, π0 {unit.shown(metrics['value'])}"
 
 
+def _import(metrics: Metrics, unit: Unit) -> str:
+    return f"{metrics['episodes']} episodes, {metrics['seconds']:.0f} s, {metrics['time']}"
+
+
 def _diagnose(metrics: Metrics, unit: Unit) -> str:
     causes, verdict = ", ".join(metrics["causes"]), metrics["verdict"].replace("_", " ")
     share = metrics["fraction"]
@@ -142,6 +146,7 @@ def _survey(metrics: Metrics, unit: Unit) -> str:
 
 _TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
     "collect": _collect,
+    "import": _import,
     "diagnose": _diagnose,
     "identify": _identify,
     "train_forward": _train_forward,

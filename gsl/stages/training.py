@@ -33,8 +33,8 @@ class Parts(NamedTuple):
 
 
 def data_file(reference: str) -> Path:
-    """Return the trajectory file that a path, an artifact of `collect` or a run's name stands for."""
-    found = resolve(reference, kind="collect")
+    """Return the trajectory file that a path, an artifact of `collect` or `import`, or a run's name stands for."""
+    found = resolve(reference, kind=("collect", "import"))
     return found / DATA if found.is_dir() else found
 
 

@@ -14,17 +14,19 @@ from gsl.storage.artifact import Artifact
 RUNS = Path("runs")
 
 
-def resolve(reference: str | Path, *, kind: str | None = None, runs: Path = RUNS) -> Path:
+def resolve(reference: str | Path, *, kind: str | tuple[str, ...] | None = None, runs: Path = RUNS) -> Path:
     """Return what `reference` names: a file, an artifact, or the only artifact of `kind` below a folder or a run.
 
     Args:
         reference: A path, or the name of a run in `runs`, which may go on into it: `quick-start/optimize`.
-        kind: What the artifact has to be; None takes any.
+        kind: What the artifact has to be, or one of several; None takes any.
         runs: Folder of the runs.
 
     Raises:
         ArtifactError: There is no such thing, it is of another kind, or several fit.
     """
+    kinds = (kind,) if isinstance(kind, str) else kind
+    wanted = " or ".join(kinds or ())
     place = _place(str(reference), runs)
     if place.is_file():
         return place
@@ -32,18 +34,18 @@ def resolve(reference: str | Path, *, kind: str | None = None, runs: Path = RUNS
         manifest.read(place)
     found = _artifacts(place)
     own = [one for one in found if one.folder == place]
-    if own and kind in (None, own[0].manifest.kind):
+    if own and (kinds is None or own[0].manifest.kind in kinds):
         return place
-    fitting = [one for one in found if kind in (None, one.manifest.kind)]
+    fitting = [one for one in found if kinds is None or one.manifest.kind in kinds]
     if len(fitting) == 1:
         return fitting[0].folder
     if fitting:
         choices = ", ".join(_named(one.folder, runs) for one in fitting)
         raise ArtifactError(reference, f"several artifacts fit, name one of them: {choices}")
     if own:
-        raise ArtifactError(place, f"holds {own[0].manifest.kind}, but {kind} is needed")
+        raise ArtifactError(place, f"holds {own[0].manifest.kind}, but {wanted} is needed")
     there = ", ".join(sorted({one.manifest.kind for one in found})) or "no complete artifact"
-    raise ArtifactError(place, f"holds {there}" + (f", but {kind} is needed" if kind else "; build one in it first"))
+    raise ArtifactError(place, f"holds {there}" + (f", but {wanted} is needed" if kind else "; build one in it first"))
 
 
 def load(reference: str | Path, kind: str, *, runs: Path = RUNS) -> Artifact:

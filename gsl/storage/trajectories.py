@@ -12,6 +12,7 @@ import numpy as np
 from gsl.core.trajectory import Batch
 from gsl.errors import TrajectoryError
 from gsl.storage import documents
+from gsl.storage.parquet import check_declared
 from gsl.storage.trajectory_columns import batch_of, columns_of, metadata_of
 from gsl.storage.trajectory_contract import BOOLEANS, INTEGERS, check_metadata, check_names, check_rows
 from gsl.storage.whole import replacing
@@ -81,6 +82,7 @@ def _table(path: Path) -> pa.Table:
         raise TrajectoryError(path, "does not exist")
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            check_declared(path, file.metadata)
             return file.read()
     except (pa.ArrowException, OSError) as error:
         raise TrajectoryError(

@@ -1,0 +1,88 @@
+"""Series of stamped values: held, interpolated, cut at their holes, and how far one lags behind another."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+SAME = 1e-9  # stamps that differ by less are one [s]
+FINEST = 400  # points of a signal's grid a second, when lags are measured
+POINTS = 60_000  # of a grid at most
+
+
+class Lag(NamedTuple):
+    """How far a signal comes after a command.
+
+    Attributes:
+        seconds: Positive where it comes later [s].
+        correlation: Of the two once it is taken out.
+        contrast: How much higher that is than without a lag or with one the other way; 0 where it says nothing.
+    """
+
+    seconds: float
+    correlation: float
+    contrast: float
+
+
+def held(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return at each time the last value that was there: zero-order hold; before the first it is the first.
+
+    Args:
+        stamps: Rising [s], shape (T,).
+        values: Shape (T, ...).
+        at: Times asked for [s], shape (N,).
+    """
+    index = np.searchsorted(stamps, at + SAME, side="right") - 1
+    return values[np.maximum(index, 0)]
+
+
+def interpolated(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return linear interpolations of values of shape (T, k) at some times, shape (N, k); constant beyond the ends."""
+    return np.column_stack([np.interp(at, stamps, column) for column in values.T])
+
+
+def pieces(stamps: np.ndarray, longest: float) -> list[slice]:
+    """Return the parts of a series between its holes, of at least two rows, longer than `longest` [s]."""
+    cuts = [0, *(np.flatnonzero(np.diff(stamps) > longest) + 1), len(stamps)]
+    return [slice(a, b) for a, b in zip(cuts, cuts[1:], strict=False) if b - a > 1]
+
+
+def lag(command: np.ndarray, measured: np.ndarray, time: np.ndarray, longest: float = 0.5) -> Lag:
+    """Return by how much `measured` comes after `command`, where their correlation is highest.
+
+    Args:
+        command: Shape (T,).
+        measured: Shape (T,).
+        time: Of the rows [s], shape (T,).
+        longest: Lag that is looked for, either way [s].
+    """
+    step = max(float(np.median(np.diff(time))), 1.0 / FINEST)
+    grid = np.arange(time[0], time[-1], step)[:POINTS]
+    reach = min(int(round(longest / step)), (len(grid) - 8) // 2)
+    if reach < 1:
+        return Lag(0.0, 0.0, 0.0)
+    a, b = held(time, command, grid), np.interp(grid, time, measured)
+    score = np.array([_correlation(a, b, shift) for shift in range(-reach, reach + 1)])
+    best = int(np.argmax(score))
+    other = score[: reach + 1] if best > reach else score[reach:]
+    inside = 0 < best < len(score) - 1
+    contrast = float(score[best] - other.max()) if inside and best != reach else 0.0
+    return Lag((best - reach + _top(score, best)) * step, float(score[best]), contrast)
+
+
+def _correlation(a: np.ndarray, b: np.ndarray, shift: int) -> float:
+    """Return the correlation of a(t) with b(t + shift)."""
+    first, second = (a[: len(a) - shift], b[shift:]) if shift >= 0 else (a[-shift:], b[:shift])
+    first, second = first - first.mean(), second - second.mean()
+    size = float(np.sqrt((first**2).sum() * (second**2).sum()))
+    return float((first * second).sum()) / size if size > 0.0 else 0.0
+
+
+def _top(score: np.ndarray, best: int) -> float:
+    """Return where between its neighbours a parabola through the highest point has its top, in steps."""
+    if not 0 < best < len(score) - 1:
+        return 0.0
+    left, middle, right = score[best - 1 : best + 2]
+    bend = left - 2.0 * middle + right
+    return float(0.5 * (left - right) / bend) if bend < 0.0 else 0.0

@@ -1,0 +1,145 @@
+"""Import foreign logs: CSV, JSON, npz, parquet or bags, by a mapping, as trajectories of the contract."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from gsl.core.interruption import checkpoint
+from gsl.core.setting import component, setting
+from gsl.core.trajectory import Batch
+from gsl.errors import ConfigError, InputError, TrajectoryError
+from gsl.stages.import_report import report, tables
+from gsl.storage import documents
+from gsl.storage.importers.assembly import Episode, episodes
+from gsl.storage.importers.mapping import Mapping as LogMapping
+from gsl.storage.importers.places import Place, located, places
+from gsl.storage.importers.reading import raw_episodes
+from gsl.storage.importers.signal import KNOWN
+from gsl.storage.importers.sizes import GB
+from gsl.storage.trajectories import write
+
+FILE = "trajectories.parquet"
+REPORT = "import.json"
+LARGE = 200e6  # bytes of a file whose reading is announced
+
+
+@component
+class Import:
+    """Reads every episode that the mapping finds in the source; refuses what looks wrong unless `accept` is set."""
+
+    kind: ClassVar[str] = "import"
+
+    mapping: Annotated[LogMapping, setting("where each signal is, in which unit: a file in conf/mapping, or your own")]
+    source: Annotated[str | None, setting("a file, a folder or a pattern; the mapping's own if null")] = None
+    check: Annotated[bool, setting("write nothing, say what would be done; the same as --check")] = False
+    accept: Annotated[bool, setting("take what looks swapped or in another unit as it is")] = False
+    memory: Annotated[float, setting("that reading one file may take", unit="GB", gt=0)] = 2.0
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the files that are read."""
+        paths = {f"{one.name}/{role}".rstrip("/"): path for one in self._places() for role, path in one.files.items()}
+        files = {name: path for name, path in paths.items() if path.is_file()}
+        files |= {
+            f"{n}/{one.name}": one for n, path in paths.items() if path.is_dir() for one in sorted(path.iterdir())
+        }
+        return (
+            {"source": next(iter(files.values()))} if len(files) == 1 else {f"source {n}": p for n, p in files.items()}
+        )
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write one parquet file, and what was found as a document."""
+        chosen = self._places()
+        found = [one for place in self._progress(chosen, console) for one in self._episodes(place, console)]
+        told = self._told(found, chosen)
+        if told["refused"] and not self.accept:
+            more = f" (and {len(told['refused']) - 1} more, see --check)" if len(told["refused"]) > 1 else ""
+            raise InputError(f"{self._source()}: {told['refused'][0]}{more}; accept=true takes it as it is")
+        for line in [*told["refused"], *told["warnings"]]:
+            console.status(f"warning: {line}")
+        documents.write_json(folder / REPORT, told)
+        write(folder / FILE, self._batch(found, told))
+        return {key: told[key] for key in ("files", "control_period", "time", "velocity", "warnings")} | {
+            "episodes": len(found),
+            "joints": list(found[0].joints),
+            "steps": sum(len(one.trajectory) for one in found),
+            "seconds": sum(float(one.trajectory.time[-1]) for one in found),
+        }
+
+    def look(self, console: Any) -> dict[str, Any]:
+        """Say what `run` would do, and return it with the exit code that it would have."""
+        chosen, found, problems = self._places(), list[Episode](), list[str]()
+        for place in self._progress(chosen, console):
+            try:
+                found += self._episodes(place, console)
+            except ConfigError:
+                raise
+            except InputError as error:
+                problems.append(str(error))
+        told = self._told(found, chosen) if found else {"refused": [], "warnings": []}
+        for table in tables(told) if found else ():
+            console.table(*table)
+        refused = [*problems, *([] if self.accept else told["refused"])]
+        lines = [*(f"refused: {line}" for line in refused), *(f"warning: {line}" for line in told["warnings"])]
+        if found:
+            lines += [f"{told['time']}; velocities {told['velocity']}; control period {told['control_period']:g} s"]
+        lines += [f"would be refused ({len(refused)}); nothing is written" if refused else "nothing is written"]
+        return {
+            **told,
+            "refused": refused,
+            "source": self._source(),
+            "said": "\n".join(lines),
+            "exit_code": 2 * bool(refused),
+        }
+
+    def _source(self) -> str:
+        source = self.source or self.mapping.source
+        if not source:
+            raise ConfigError("source", "has no value yet; say source=... (a file, a folder or a pattern)")
+        return located(source)
+
+    def _places(self) -> list[Place]:
+        return places(self._source(), self.mapping.files)
+
+    def _progress(self, chosen: list[Place], console: Any) -> Any:
+        with console.progress(len(chosen), "reading logs") as progress:
+            for place in chosen:
+                yield place
+                progress.advance()
+
+    def _episodes(self, place: Place, console: Any) -> list[Episode]:
+        for path in place.files.values():
+            if path.is_file() and (size := path.stat().st_size) > LARGE:
+                console.status(f"reading {path}, {size / GB:.2g} GB; with {self.memory:g} GB of memory at most")
+        checkpoint()
+        return [
+            one for raw in raw_episodes(place, self.mapping, self.memory * GB) for one in episodes(raw, self.mapping)
+        ]
+
+    def _told(self, found: list[Episode], chosen: list[Place]) -> dict[str, Any]:
+        first = found[0]
+        for one in found:
+            if one.joints != first.joints:
+                raise TrajectoryError(
+                    one.label["file"], f"has other joints than {first.label['file']}; import it alone"
+                )
+        files, period = sum(len(place.files) for place in chosen), self.mapping.period
+        kept = f"resampled to {period:g} s (positions linearly, commands held)" if period else "rows kept as logged"
+        derived = sum(one.derived for one in found)
+        which = "" if derived in (0, len(found)) else f" in {derived} of {len(found)} episodes"
+        velocity = f"derived from positions{which}" if derived else "as logged"
+        return {**report(found, files, period), "time": kept, "velocity": velocity}
+
+    def _batch(self, found: list[Episode], told: Mapping[str, Any]) -> Batch:
+        own = {name: signal.unit for name, signal in self.mapping.signals.items() if name not in KNOWN}
+        about = {
+            "robot": self.mapping.robot,
+            "role": "imported",
+            "source": "gsl import",
+            "units": own,
+            "clocks": "synchronised" if self.mapping.synchronised else "unsynchronised",
+            **{key: told[key] for key in ("time", "velocity")},
+            "episodes": [dict(one.label) for one in found],
+        }
+        return Batch(tuple(one.trajectory for one in found), found[0].joints, told["control_period"], about)

@@ -1,0 +1,121 @@
+"""From raw signals to trajectories: one clock, cut at holes, kept as it is or resampled, velocities derived."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gsl.core.series import SAME, held, interpolated, pieces
+from gsl.core.trajectory import Trajectory
+from gsl.errors import ConfigError, InputError
+from gsl.storage.importers.mapping import Mapping as LogMapping
+from gsl.storage.importers.reading import Raw, Series
+from gsl.storage.importers.signal import COMMANDS, FLAGS
+
+ARRAYS = (*COMMANDS, "position", "velocity")
+_FIELD = re.compile(r"\{([^{}]+)\}")
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One trajectory of the contract and how it came about.
+
+    Attributes:
+        trajectory: In the contract's units.
+        label: Its name and what else is known of it.
+        joints: Names, in order.
+        steps: From one row of its positions to the next, as logged [s], shape (T,).
+        dropped: Rows left out: repeated stamps, and what came before the first command.
+        derived: Whether its velocities are slopes of its positions.
+    """
+
+    trajectory: Trajectory
+    label: Mapping[str, Any]
+    joints: tuple[str, ...]
+    steps: np.ndarray
+    dropped: int
+    derived: bool
+
+
+def episodes(raw: Raw, mapping: LogMapping) -> list[Episode]:
+    """Return the trajectories of a recorded episode: one, or several where it has holes.
+
+    Raises:
+        InputError: Its commands and positions do not overlap in time.
+    """
+    stamps, commands = raw.signals["position"].stamps, raw.signals["action"].stamps
+    if len(stamps) < 2:
+        raise InputError(f"{raw.name}: has {len(stamps)} row of positions; an episode takes two at least")
+    if commands[0] >= stamps[-1] or (commands[-1] < stamps[0] and len(commands) > 1):
+        raise InputError(
+            f"{raw.name}: commands are from {commands[0]:.6g} to {commands[-1]:.6g} s, positions from {stamps[0]:.6g} "
+            f"to {stamps[-1]:.6g} s: two clocks? Say what the commands' is ahead: mapping.command_offset=..."
+        )
+    late = int(np.searchsorted(stamps, commands[0] - SAME))
+    own = stamps[late:]
+    cuts = pieces(own, mapping.longest_gap * float(np.median(np.diff(stamps))))
+    label = labelled(raw, mapping)
+    found = []
+    for number, cut in enumerate(cuts):
+        part = {"part": number + 1} if len(cuts) > 1 else {}
+        trajectory = _trajectory(raw, own[cut], mapping)
+        dropped = raw.dropped + (late if number == 0 else 0)
+        derived = "velocity" not in raw.signals
+        found.append(Episode(trajectory, {**label, **part}, raw.joints, np.diff(own[cut]), dropped, derived))
+    if not found:
+        raise InputError(f"{raw.name}: no two rows of positions follow its first command")
+    return found
+
+
+def _trajectory(raw: Raw, stamps: np.ndarray, mapping: LogMapping) -> Trajectory:
+    """Return the rows at `stamps`, or at even steps between the first and the last of them."""
+    at = stamps
+    if mapping.period is not None:
+        count = int((stamps[-1] - stamps[0]) / mapping.period + 1e-6)
+        at = stamps[0] + mapping.period * np.arange(count + 1)
+    if len(at) < 2:
+        raise InputError(f"{raw.name}: lasts {np.ptp(stamps):.3g} s, not even one mapping.period")
+    values = {name: _at(name, series, at) for name, series in raw.signals.items()}
+    time = at - at[0]
+    columns = {
+        column: values[name][:, index]
+        for name, series in raw.signals.items()
+        if name not in ARRAYS
+        for index, column in enumerate(series.names)
+    }
+    velocity = values["velocity"] if "velocity" in values else np.gradient(values["position"], time, axis=0)
+    grounded = values["grounded_action"][:-1] if "grounded_action" in values else None
+    return Trajectory(time, values["action"][:-1], values["position"], velocity, grounded, sensors=columns)
+
+
+def _at(name: str, series: Series, at: np.ndarray) -> np.ndarray:
+    if name in COMMANDS or name in FLAGS:
+        return held(series.stamps, series.values, at)
+    return interpolated(series.stamps, series.values, at)
+
+
+def labelled(raw: Raw, mapping: LogMapping) -> dict[str, Any]:
+    """Return the name of an episode's motion and what else is known of it.
+
+    Raises:
+        ConfigError: A {field} is neither in its files nor in its path.
+    """
+    name = _filled(mapping.name, raw.fields, "mapping.name") if mapping.name else raw.name
+    about = {key: _filled(value, raw.fields, f"mapping.about.{key}") for key, value in mapping.about.items()}
+    return {**about, "policy": str(name), "file": raw.name}
+
+
+def _filled(value: Any, fields: Mapping[str, Any], where: str) -> Any:
+    """Return a value with its {fields} filled in; one that is a field alone keeps its type."""
+    if not isinstance(value, str):
+        return value if isinstance(value, int | float | bool | list | dict) else str(value)
+    for field in _FIELD.findall(value):
+        if field not in fields:
+            there = ", ".join(sorted(fields))
+            raise ConfigError(where, f"there is no field {field}; there is {there}", given=value)
+    alone = _FIELD.fullmatch(value)
+    return fields[alone.group(1)] if alone else _FIELD.sub(lambda match: str(fields[match.group(1)]), value)

@@ -1,0 +1,91 @@
+"""A topic of a ROS bag (rosbag2 folder, MCAP, SQLite, or a bag of ROS 1), read by the library `rosbags`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gsl.errors import InputError, TrajectoryError
+from gsl.storage.importers.sizes import check_need
+from gsl.storage.importers.table import missing_column, numbers
+
+STAMP = "time"
+NANOSECOND = 1e-9
+
+
+class BagTable:
+    """One topic: `time` is when the bag received a message [s]; fields are dotted paths.
+
+    Where a message names its entries, as a JointState does, they are columns by that name: `position.knee`.
+    """
+
+    def __init__(self, path: Path, topic: str, memory: float) -> None:
+        self.path, self.topic, self.memory = path, topic, memory
+        first = next(self._messages(), None)
+        if first is None:
+            raise TrajectoryError(path, f"has no message on {topic}; record it again")
+        self.fields: Mapping[str, Any] = {}
+        self.names: Sequence[str] = [STAMP, *_flat(first[1])]
+
+    def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return the wanted fields, a row a message."""
+        for name in wanted:
+            if name not in self.names:
+                raise missing_column(self, name)
+        found: dict[str, list[Any]] = {name: [] for name in wanted}
+        for row, (stamp, message) in enumerate(self._messages()):
+            values = {**_flat(message), STAMP: stamp}
+            for name, column in found.items():
+                if name not in values:
+                    raise TrajectoryError(self.path, f"a message on {self.topic} lacks it", column=name, row=row)
+                column.append(values[name])
+            if row % 10_000 == 0:
+                check_need(self.path, 50.0 * row * len(found), self.memory)
+        return {name: numbers(self.path, name, values) for name, values in found.items()}
+
+    def _messages(self) -> Iterator[tuple[float, Any]]:
+        anyreader, store = _library(self.path)
+        try:
+            with anyreader.AnyReader([self.path], default_typestore=store) as bag:
+                chosen = [one for one in bag.connections if one.topic == self.topic]
+                if not chosen:
+                    there = ", ".join(sorted({one.topic for one in bag.connections})) or "none"
+                    raise TrajectoryError(self.path, f"has no topic {self.topic or '(none)'}; its topics are {there}")
+                for connection, stamp, raw in bag.messages(connections=chosen):
+                    yield stamp * NANOSECOND, bag.deserialize(raw, connection.msgtype)
+        except (anyreader.AnyReaderError, ValueError, KeyError, OSError) as error:
+            raise TrajectoryError(self.path, f"cannot be read as a bag: {' '.join(str(error).split())}") from error
+
+
+def _library(path: Path) -> tuple[Any, Any]:
+    try:
+        from rosbags.highlevel import anyreader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise InputError(f"{path}: bags are read with the library rosbags: pip install 'gsl[ros]'") from error
+    return anyreader, get_typestore(Stores.ROS2_HUMBLE)
+
+
+def _flat(message: Any, prefix: str = "") -> dict[str, Any]:
+    """Return the numbers of a message by dotted path; entries by their names if it has those."""
+    values: dict[str, Any] = {}
+    names = getattr(message, "name", None)
+    for field in message.__dataclass_fields__:
+        value, path = getattr(message, field), f"{prefix}{field}"
+        if hasattr(value, "__dataclass_fields__"):
+            values |= _flat(value, f"{path}.")
+        elif isinstance(value, np.ndarray):
+            named = isinstance(names, list) and len(names) == len(value)
+            values |= (
+                {f"{path}.{name}": float(one) for name, one in zip(names or (), value, strict=False)} if named else {}
+            )
+            values[path] = value.tolist()
+        elif isinstance(value, bool | int | float):
+            values[path] = value
+    stamp = {f"{prefix}sec", f"{prefix}nanosec"}
+    if stamp <= values.keys():
+        values[prefix.rstrip(".")] = values[f"{prefix}sec"] + NANOSECOND * values[f"{prefix}nanosec"]
+    return values

@@ -1,0 +1,120 @@
+"""Which columns of a table a signal names, one a joint or an axis, and their values side by side."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gsl.errors import ConfigError, TrajectoryError
+from gsl.storage.importers.mapping import Mapping as LogMapping
+from gsl.storage.importers.signal import AXES, PER_JOINT, Signal
+from gsl.storage.importers.table import Table, missing_column
+
+_ENTRY = re.compile(r"(.+)\[(\d+)\]")
+_JOINT = "{joint}"
+
+
+class Reference(NamedTuple):
+    """A column, or one entry of a column that holds several numbers a row."""
+
+    column: str
+    entry: int | None = None
+
+
+def joints_of(mapping: LogMapping, table: Table) -> dict[str, str]:
+    """Return the names of the joints in order, each with its name in the log; found by the positions' columns.
+
+    Raises:
+        TrajectoryError: The mapping names none and the table has no such columns.
+    """
+    if isinstance(mapping.joints, dict):
+        return mapping.joints
+    if mapping.joints is not None:
+        return {joint: joint for joint in mapping.joints}
+    form = mapping.signals["position"].column
+    if not (isinstance(form, str) and form.count(_JOINT) == 1):
+        raise ConfigError("mapping.joints", "has no value; name them in order, or say {joint} in the positions' column")
+    before, after = form.split(_JOINT)
+    found = [re.fullmatch(f"{re.escape(before)}(.+){re.escape(after)}", name) for name in table.names]
+    names = [match.group(1) for match in found if match]
+    if not names:
+        there = ", ".join(table.names[:12]) or "none"
+        problem = f"is in no column; there is {there}; say in a mapping where things are (docs/import.md)"
+        raise TrajectoryError(table.path, problem, column=form)
+    return {name: name for name in names}
+
+
+def references(name: str, signal: Signal, joints: Mapping[str, str], table: Table) -> list[Reference]:
+    """Return the columns of a signal.
+
+    Raises:
+        TrajectoryError: The table lacks one.
+        ConfigError: A joint has none.
+    """
+    found = [_reference(one, table) for one in _words(name, signal, joints)]
+    for reference in found:
+        if reference.column not in table.names:
+            raise missing_column(table, reference.column)
+    return found
+
+
+def _words(name: str, signal: Signal, joints: Mapping[str, str]) -> list[str]:
+    column = signal.column
+    if isinstance(column, dict):
+        if lacking := [joint for joint in joints if joint not in column]:
+            raise ConfigError(f"mapping.signals.{name}.column", f"has no value for {', '.join(lacking)}")
+        return [str(column[joint]) for joint in joints]
+    if isinstance(column, list):
+        return [str(one) for one in column]
+    if _JOINT in str(column) or "{index}" in str(column):
+        pairs = enumerate(joints.values())
+        return [str(column).replace(_JOINT, old).replace("{index}", str(index)) for index, old in pairs]
+    return [str(column)]
+
+
+def _reference(word: str, table: Table) -> Reference:
+    entry = _ENTRY.fullmatch(word)
+    return Reference(word) if word in table.names or not entry else Reference(entry.group(1), int(entry.group(2)))
+
+
+def side_by_side(
+    name: str, found: Sequence[Reference], values: Mapping[str, np.ndarray], joints: Sequence[str], table: Table
+) -> np.ndarray:
+    """Return a signal's raw values, shape (T, 1), (T, n_axes) or (T, n_joints).
+
+    Raises:
+        TrajectoryError: They are no numbers, or not one a joint or an axis.
+    """
+    parts = [_part(table, reference, values[reference.column]) for reference in found]
+    raw = np.hstack(parts)
+    due = len(joints) if name in PER_JOINT else len(AXES[name]) if name in AXES else 0
+    fits = raw.shape[1] == due if due else raw.shape[1] in (1, len(joints))
+    if not fits:
+        what = f"{due} {'joints' if name in PER_JOINT else 'axes'}" if due else f"1 or {len(joints)} are due"
+        problem = f"{raw.shape[1]} values a row for {name}, but {what}; name a column for each in the mapping"
+        raise TrajectoryError(table.path, problem, column=found[0].column)
+    return raw
+
+
+def _part(table: Table, reference: Reference, values: np.ndarray) -> np.ndarray:
+    if values.dtype.kind not in "buif":
+        raise TrajectoryError(table.path, "holds texts, not numbers", column=reference.column)
+    rows = values.reshape(len(values), -1).astype(np.float64)
+    if reference.entry is None:
+        return rows
+    if reference.entry >= rows.shape[1]:
+        problem = f"has {rows.shape[1]} values a row; [{reference.entry}] counts from 0"
+        raise TrajectoryError(table.path, problem, column=reference.column)
+    return rows[:, reference.entry : reference.entry + 1]
+
+
+def output_names(name: str, width: int, joints: Sequence[str]) -> list[str]:
+    """Return the contract's columns of a signal."""
+    if name in AXES:
+        return [f"{name}.{axis}" for axis in AXES[name]]
+    if name in PER_JOINT or (width > 1 and width == len(joints)):
+        return [f"{name}.{joint}" for joint in joints]
+    return [name]

@@ -1,0 +1,111 @@
+"""A mapping says where in a foreign log each signal of the trajectory contract is, in which unit and on which clock."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator
+
+from gsl.core.setting import component, setting
+from gsl.core.validation import did_you_mean, make
+from gsl.errors import ConfigError
+from gsl.storage.importers.signal import KNOWN, Signal, Time
+from gsl.storage.importers.units import factor
+from gsl.storage.trajectory_contract import UNITS, suggestion
+
+
+def _time(value: Any) -> Time:
+    if isinstance(value, str):
+        return make(Time, {"column": value}, where="time")
+    return value if isinstance(value, Time) else make(Time, _dictionary("time", value), where="time")
+
+
+def _signals(value: Any) -> dict[str, Signal]:
+    return {str(name): _signal(str(name), one) for name, one in _dictionary("signals", value).items()}
+
+
+def _signal(name: str, value: Any) -> Signal:
+    if isinstance(value, Signal):
+        return value
+    if isinstance(value, str | int | list) and not isinstance(value, bool):
+        return make(Signal, {"column": value}, where=f"signals.{name}")
+    return make(Signal, _dictionary(f"signals.{name}", value), where=f"signals.{name}")
+
+
+def _dictionary(where: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise ConfigError(where, "must be a column or settings such as {column: ..., unit: ...}", given=str(value))
+    return value
+
+
+@component
+class Mapping:
+    """What `gsl import` needs to know of a kind of log."""
+
+    signals: Annotated[
+        dict[str, Signal], setting("where each signal is: a column, or {column, unit, ...}"), BeforeValidator(_signals)
+    ]
+    joints: Annotated[
+        list[str] | dict[str, str] | None, setting("names in order, or {name: name in the log}; found if null")
+    ] = None
+    robot: Annotated[str, setting("whose log it is")] = "unknown"
+    source: Annotated[str | None, setting("where the logs lie, if source= does not say")] = None
+    files: Annotated[
+        str | dict[str, str] | None, setting("pattern of the files; {role: name} if an episode is a folder of several")
+    ] = None
+    episode: Annotated[str, setting("file, or the column whose value tells episodes apart", min_length=1)] = "file"
+    records: Annotated[str, setting("JSON: path of the list of rows")] = ""
+    time: Annotated[Time, setting("the stamps: {column, unit}, or {period}"), BeforeValidator(_time)] = Time()  # noqa: RUF009  it is frozen
+    period: Annotated[float | None, setting("resample to it; null keeps the rows as they are", unit="s", gt=0)] = None
+    command_offset: Annotated[float, setting("what the commands' clock is ahead of the sensors'", unit="s")] = 0.0
+    synchronised: Annotated[bool, setting("whether commands and sensors share a clock, or the offset is known")] = True
+    longest_gap: Annotated[float, setting("periods without a row, above which an episode is cut in two", gt=1)] = 10.0
+    duplicates: Annotated[Literal["refuse", "drop"], setting("what to do with a stamp that comes twice")] = "refuse"
+    blanks: Annotated[Literal["refuse", "skip"], setting("whether an empty cell is a mistake, or no news")] = "refuse"
+    name: Annotated[str, setting("name of an episode's motion, such as {motion}; that of its file if none")] = ""
+    path: Annotated[str, setting("pattern of an episode's path, such as {date}/{motion}, whose parts are fields")] = ""
+    about: Annotated[dict[str, Any], setting("what else is known of an episode: values, or {field} of its file")] = (
+        field(default_factory=dict)
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse what does not fit together."""
+        names = list(self.joints) if self.joints is not None else None
+        if names is not None and (not names or len(set(names)) != len(names) or not all(names)):
+            raise ConfigError("joints", "must be different names", given=", ".join(names) or "[]")
+        for name in ("action", "position"):
+            if name not in self.signals:
+                raise ConfigError(f"signals.{name}", "has no value; say in which column it is")
+        for name, signal in self.signals.items():
+            self._check_file(f"signals.{name}.file", signal.file)
+            _check_unit(name, signal)
+            _check_joints(f"signals.{name}", signal, names)
+
+    def _check_file(self, where: str, file: str) -> None:
+        if isinstance(self.files, dict):
+            if file not in self.files:
+                raise ConfigError(where, f"must be one of {', '.join(self.files)}", given=file or "(none)")
+        elif file and not file.startswith("/"):
+            raise ConfigError(where, "is no topic of a bag, and `files` names no such role", given=file)
+
+
+def _check_unit(name: str, signal: Signal) -> None:
+    where = f"signals.{name}"
+    if name not in KNOWN and not signal.unit:
+        near = f"no such signal{suggestion(name, KNOWN)}; " if suggestion(name, KNOWN) else ""
+        raise ConfigError(where, f"{near}a signal of your own needs a unit; the contract has {', '.join(KNOWN)}")
+    units = signal.unit if isinstance(signal.unit, dict) else {"": signal.unit}
+    for joint, unit in units.items():
+        try:
+            factor(unit, UNITS[name]) if unit and name in UNITS else None
+        except ValueError as error:
+            raise ConfigError(f"{where}.unit{'.' * bool(joint)}{joint}", str(error), given=unit) from error
+
+
+def _check_joints(where: str, signal: Signal, names: list[str] | None) -> None:
+    for key in ("column", "unit", "sign", "factor", "zero", "offset"):
+        value = getattr(signal, key)
+        for joint in value if isinstance(value, dict) and names else ():
+            if joint not in (names or ()):
+                raise ConfigError(f"{where}.{key}.{joint}", f"is no joint{did_you_mean(joint, names or ())}")

@@ -1,0 +1,61 @@
+"""Parquet tables of any schema; lists of numbers are rows of several values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gsl.errors import TrajectoryError
+from gsl.storage.importers.sizes import check_need
+from gsl.storage.importers.table import missing_column, numbers
+from gsl.storage.parquet import declared_bytes
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+class ParquetTable:
+    """A parquet file."""
+
+    def __init__(self, path: Path, memory: float) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        self.path, self.memory = path, memory
+        self.fields: Mapping[str, Any] = {}
+        try:
+            self.names: Sequence[str] = list(pq.read_schema(path).names)
+        except (pa.ArrowException, OSError) as error:
+            raise TrajectoryError(path, "is not a parquet file, or truncated or damaged; copy it again") from error
+
+    def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return the wanted columns."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        for name in wanted:
+            if name not in self.names:
+                raise missing_column(self, name)
+        try:
+            with pq.ParquetFile(self.path) as file:
+                check_need(self.path, 2.0 * declared_bytes(file.metadata, wanted), self.memory)
+                table = file.read(columns=list(wanted))
+        except (pa.ArrowException, OSError) as error:
+            raise TrajectoryError(self.path, "is truncated or damaged; copy it again") from error
+        if not table.num_rows:
+            raise TrajectoryError(self.path, "has no rows; log it again")
+        return {name: _values(self.path, name, table.column(name)) for name in wanted}
+
+
+def _values(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:
+    import pyarrow as pa
+
+    kind = column.type
+    if pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind):
+        return np.asarray(column.to_numpy())
+    if pa.types.is_timestamp(kind):
+        return np.asarray(column.cast(pa.timestamp("ns")).to_numpy())
+    return numbers(path, name, column.to_pylist())

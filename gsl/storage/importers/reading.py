@@ -1,0 +1,184 @@
+"""From the files of one place to raw signals: stamped values in the contract's units, before they share a clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gsl.errors import TrajectoryError
+from gsl.storage.importers.columns import Reference, joints_of, output_names, references, side_by_side
+from gsl.storage.importers.formats import table
+from gsl.storage.importers.mapping import Mapping as LogMapping
+from gsl.storage.importers.places import Place, fields_of
+from gsl.storage.importers.signal import COMMANDS, FLAGS, Signal
+from gsl.storage.importers.stamps import ordered, seconds
+from gsl.storage.importers.table import Table, missing_column
+from gsl.storage.trajectory_contract import UNITS
+
+FILE = "file"
+
+
+class Series(NamedTuple):
+    """A signal with its stamps.
+
+    Attributes:
+        stamps: Rising [s], shape (T,).
+        values: In the contract's unit, shape (T, k).
+        names: The contract's columns, k of them.
+    """
+
+    stamps: np.ndarray
+    values: np.ndarray
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Raw:
+    """One recorded episode as it is in the files.
+
+    Attributes:
+        name: Where it comes from.
+        joints: Names, in order.
+        signals: By the contract's name.
+        fields: What its files and its path say once.
+        dropped: Rows left out because their stamp had come before.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    signals: Mapping[str, Series]
+    fields: Mapping[str, Any]
+    dropped: int
+
+
+def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[Raw]:
+    """Read what the mapping names in the files of a place.
+
+    Raises:
+        InputError: A file is missing something, or is empty, damaged or too large.
+    """
+    tables = _tables(place, mapping, memory)
+    joints = joints_of(mapping, tables[mapping.signals["position"].file])
+    named = {name: one for name, one in mapping.signals.items() if _there(name, one, joints, tables)}
+    found = {name: references(name, one, joints, tables[one.file]) for name, one in named.items()}
+    values = {role: _columns(one, role, mapping, named, found) for role, one in tables.items()}
+    fields = {name: value for one in tables.values() for name, value in one.fields.items()}
+    fields |= {FILE: place.name, **fields_of(place.name, mapping.path)}
+    for key, rows in _groups(values, mapping, tables):
+        own = {**fields, **({mapping.episode: key} if key is not None else {})}
+        name = place.name if key is None else f"{place.name}/{key}"
+        signals, dropped = {}, 0
+        for signal, one in named.items():
+            reading = _Reading(signal, one, found[signal], tables[one.file], rows[one.file], mapping)
+            series, twice = reading.series(values[one.file], tuple(joints))
+            signals[signal], dropped = series, max(dropped, twice)
+        yield Raw(name, tuple(joints), signals, own, dropped)
+
+
+def _tables(place: Place, mapping: LogMapping, memory: float) -> dict[str, Table]:
+    roles = dict.fromkeys(one.file for one in mapping.signals.values())
+    return {
+        role: table(place.files.get(role) or place.files[""], topic=role, records=mapping.records, memory=memory)
+        for role in roles
+    }
+
+
+def _there(name: str, signal: Signal, joints: Mapping[str, str], tables: Mapping[str, Table]) -> bool:
+    if not signal.optional:
+        return True
+    try:
+        return bool(references(name, signal, joints, tables[signal.file]))
+    except TrajectoryError:
+        return False
+
+
+def _columns(
+    one: Table, role: str, mapping: LogMapping, named: Mapping[str, Signal], found: Mapping[str, Sequence[Reference]]
+) -> dict[str, np.ndarray]:
+    """Return all columns that are needed of a file, read once."""
+    signals = [name for name, signal in named.items() if signal.file == role]
+    wanted = [reference.column for name in signals for reference in found[name]]
+    if mapping.time.period is None:
+        wanted += [named[name].time or mapping.time.column for name in signals]
+    if mapping.episode != FILE:
+        wanted.append(mapping.episode)
+    for name in wanted:
+        if name not in one.names:
+            raise missing_column(one, name)
+    values = one.columns(list(dict.fromkeys(wanted)))
+    lengths = {name: len(column) for name, column in values.items()}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise TrajectoryError(one.path, f"its columns are of different lengths: {told}")
+    if not min(lengths.values()):
+        raise TrajectoryError(one.path, "has no rows; log it again")
+    return values
+
+
+def _groups(
+    values: Mapping[str, Mapping[str, np.ndarray]], mapping: LogMapping, tables: Mapping[str, Table]
+) -> Iterator[tuple[Any, dict[str, np.ndarray]]]:
+    """Return for each episode the rows that are its own, by role; all where a file is one episode."""
+    if mapping.episode == FILE:
+        yield None, {role: np.arange(len(next(iter(columns.values())))) for role, columns in values.items()}
+        return
+    keys = {role: columns[mapping.episode] for role, columns in values.items()}
+    first = next(iter(keys.values()))
+    for key in dict.fromkeys(first.tolist()):
+        rows = {role: np.flatnonzero(column == key) for role, column in keys.items()}
+        if empty := [role for role, own in rows.items() if not len(own)]:
+            raise TrajectoryError(tables[empty[0]].path, f"lacks the episode {key}", column=mapping.episode)
+        yield key, rows
+
+
+class _Reading(NamedTuple):
+    """One signal of one episode on its way into the contract's units."""
+
+    name: str
+    signal: Signal
+    found: Sequence[Reference]
+    table: Table
+    rows: np.ndarray
+    mapping: LogMapping
+
+    def series(self, values: Mapping[str, np.ndarray], joints: tuple[str, ...]) -> tuple[Series, int]:
+        """Return the signal and the number of rows that were left out."""
+        raw = side_by_side(self.name, self.found, values, joints, self.table)[self.rows]
+        stamps = seconds(self.table.path, self._stamps(values), self.mapping.time, self._column())
+        keep = self._filled(raw)
+        stamps, raw, rows = stamps[keep], raw[keep], self.rows[keep]
+        keep = ordered(self.table.path, stamps, self._column(), rows, drop=self.mapping.duplicates == "drop")
+        stamps, raw = stamps[keep], raw[keep]
+        names = output_names(self.name, raw.shape[1], joints)
+        if self.name in FLAGS:
+            return Series(stamps, raw != 0.0, tuple(names)), int(np.sum(~keep))
+        wanted = UNITS.get(self.name)
+        scales = [self.signal.scale(joint, wanted) for joint in (joints if len(names) == len(joints) else [""])]
+        gains, offsets = np.array(scales if len(names) == len(scales) else scales * len(names)).T
+        if self.name in COMMANDS:
+            stamps = stamps - self.mapping.command_offset
+        return Series(stamps, self.signal.signed(raw) * gains + offsets, tuple(names)), int(np.sum(~keep))
+
+    def _column(self) -> str:
+        return self.signal.time or self.mapping.time.column
+
+    def _stamps(self, values: Mapping[str, np.ndarray]) -> np.ndarray:
+        if self.mapping.time.period is not None:
+            return self.mapping.time.period * np.arange(len(self.rows))
+        return values[self._column()][self.rows]
+
+    def _filled(self, raw: np.ndarray) -> np.ndarray:
+        """Return which rows have values; empty cells are refused unless they mean that nothing is new."""
+        wrong = ~np.isfinite(raw)
+        empty = wrong.any(axis=1)
+        if not empty.any():
+            return ~empty
+        if self.mapping.blanks == "refuse" or np.isinf(raw).any() or empty.all():
+            row = int(np.argmax(empty))
+            column = self.found[int(np.argmax(wrong[row])) if len(self.found) > 1 else 0].column
+            problem = "is not a finite number; drop or mend the row, or say mapping.blanks=skip if it means no news"
+            raise TrajectoryError(self.table.path, problem, column=column, row=int(self.rows[row]))
+        return ~empty

@@ -1,0 +1,80 @@
+"""What reading a file would take, told before it is read; packed files are counted while they are unpacked."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+from gsl.errors import TrajectoryError
+
+GB = 1e9
+LONGEST_LINE = 4_000_000
+"""Bytes; a text file without line ends would fill the memory."""
+PICKLE = b"\x80"
+
+
+def check_need(path: Path, need: float, memory: float) -> None:
+    """Refuse to read what needs more memory than allowed, both in [bytes].
+
+    Raises:
+        TrajectoryError: It says how much is needed.
+    """
+    if need > memory:
+        problem = f"would need about {need / GB:.2g} GB of memory, {memory / GB:.2g} GB are allowed"
+        raise TrajectoryError(path, f"{problem}; cut it into several files, or say memory={1.1 * need / GB:.2g}")
+
+
+@contextmanager
+def opened(path: Path, *, most: float, lines: bool = False) -> Iterator[IO[bytes]]:
+    """Open a file for reading, unpacked if its name ends with gz.
+
+    Args:
+        path: The file.
+        most: Bytes that may come out of it.
+        lines: Whether it has to have line ends.
+
+    Raises:
+        TrajectoryError: It is empty, damaged, a pickle, or holds more.
+    """
+    try:
+        with path.open("rb") as raw:
+            source = gzip.GzipFile(fileobj=raw) if path.name.endswith(".gz") else raw
+            reader = io.BufferedReader(_Counted(path, source, most, lines))
+            start = reader.peek(1)[:1]
+            if not start:
+                raise TrajectoryError(path, "is empty; log it again")
+            if start == PICKLE:
+                raise TrajectoryError(path, "is a Python pickle, which can run code: none is read; export it as CSV")
+            yield reader
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise TrajectoryError(path, "is no gzip file, or truncated or damaged; copy it again") from error
+    except OSError as error:
+        raise TrajectoryError(path, f"cannot be read: {error.strerror or error}") from error
+
+
+class _Counted(io.RawIOBase):
+    """Counts what is read and refuses more than `most` bytes, and lines that do not end."""
+
+    def __init__(self, path: Path, source: io.BufferedIOBase | gzip.GzipFile, most: float, lines: bool) -> None:
+        self.path, self.source, self.most, self.lines = path, source, most, lines
+        self.count = self.line = 0
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
+        size = self.source.readinto(buffer)
+        self.count += size
+        if self.count > self.most:
+            problem = f"unpacks to more than {self.most / GB:.2g} GB; cut it into several files, or say memory=..."
+            raise TrajectoryError(self.path, problem)
+        end = bytes(buffer[:size]).rfind(b"\n")
+        self.line = self.line + size if end < 0 else size - end
+        if self.lines and self.line > LONGEST_LINE:
+            raise TrajectoryError(self.path, f"has a line of more than {LONGEST_LINE:,} bytes; it is no text table")
+        return size

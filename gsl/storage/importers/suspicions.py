@@ -1,0 +1,135 @@
+"""What looks wrong in imported trajectories: units, swapped columns, channels that are stuck; told column by column."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gsl.core.series import Lag, lag
+from gsl.storage.importers.assembly import Episode
+
+MOVES = 0.02  # range of a command below which it tells nothing of what follows it [rad]
+ALIKE = 0.8  # correlation above which a signal is taken to follow a command
+FAR = 4.0 * np.pi  # beyond this an angle is hardly in radians [rad]
+TICKS = 100.0  # whole numbers beyond this are ticks
+DEGREES = (40.0, 80.0)  # a ratio between these is that of degrees and radians, 57.3
+FASTER = 10.0  # times the slope of the positions that velocities may be
+SLOW = 0.05  # slopes below are noise [rad/s]
+SLOWEST, FASTEST = 1.0, 2e-5  # from one row to the next [s]
+STUCK = 0.05  # share of the rows at one end, above which a channel is told to be saturated
+CONTRAST = 2e-3  # of correlations, from which on a lag is clear
+MOSTLY = 0.75  # share of the contrast that has to be of negative lags before columns are called swapped
+NONE = Lag(0.0, 0.0, 0.0)
+
+
+class Suspicion(NamedTuple):
+    """What looks wrong with one column; `refused` ones are not imported unless they are accepted."""
+
+    column: str
+    problem: str
+    refused: bool
+
+
+def suspicions(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> list[Suspicion]:
+    """Return all of them.
+
+    Args:
+        found: Trajectories of the same joints.
+        lags: Of each trajectory and joint, from command to position.
+    """
+    joints = found[0].joints
+    told = [*_time(found), *_order(found, lags)]
+    for index, joint in enumerate(joints):
+        told += _joint(joint, index, found)
+    return told
+
+
+def lags_of(episode: Episode) -> list[Lag]:
+    """Return how far each joint's position comes after its command; zero where the command does not move."""
+    one = episode.trajectory
+    return [
+        lag(one.action[:, k], one.position[:-1, k], one.time[:-1])
+        if np.ptp(one.action[:, k]) > MOVES
+        else Lag(0.0, 0.0)
+        for k in range(len(episode.joints))
+    ]
+
+
+def saturated(values: np.ndarray, command: np.ndarray) -> float:
+    """Return the share of rows in which a channel is at one of its ends while the command goes on moving."""
+    if np.ptp(values) == 0.0 or np.ptp(command) < MOVES:
+        return 0.0
+    shares = []
+    for end in (values.min(), values.max()):
+        there = np.abs(values - end) <= 1e-6 * np.ptp(values)
+        moving = np.ptp(command[there]) > 0.1 * np.ptp(command)
+        shares.append(float(np.mean(there)) if moving else 0.0)
+    return max(shares)
+
+
+def _all(found: Sequence[Episode], name: str, index: int) -> np.ndarray:
+    rows = [getattr(one.trajectory, name)[:, index][: len(one.trajectory)] for one in found]
+    return np.concatenate(rows)
+
+
+def _time(found: Sequence[Episode]) -> Iterator[Suspicion]:
+    steps = [float(np.median(one.steps)) for one in found]
+    if max(steps) > SLOWEST or min(steps) < FASTEST:
+        problem = f"rows are {max(steps):.3g} s apart; is time: {{unit: ...}} right? Stamps are taken to be in it"
+        yield Suspicion("time", problem, True)
+
+
+def _order(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> Iterator[Suspicion]:
+    """Tell of positions that come before their commands."""
+    least = 0.5 * min(float(np.median(one.steps)) for one in found)
+    clear = [one for row in lags for one in row if is_clear(one)]
+    early = [one for one in clear if one.seconds < -least]
+    if early and sum(one.contrast for one in early) > MOSTLY * sum(one.contrast for one in clear):
+        typical = 1e3 * -float(np.median([one.seconds for one in early]))
+        problem = (
+            f"comes {typical:.0f} ms before action: are the columns of commands and measurements swapped, or is the "
+            "commands' clock ahead (mapping.command_offset)?"
+        )
+        yield Suspicion("position", problem, True)
+
+
+def is_clear(one: Lag) -> bool:
+    """Tell whether a lag can be believed: slow or periodic motions, and friction, leave many that do as well."""
+    return one.correlation > ALIKE and one.contrast > CONTRAST
+
+
+def _joint(joint: str, index: int, found: Sequence[Episode]) -> Iterator[Suspicion]:
+    action, position, velocity = (_all(found, name, index) for name in ("action", "position", "velocity"))
+    for name, values in (("action", action), ("position", position)):
+        reach = float(np.abs(values).max())
+        if reach > FAR:
+            whole = reach > TICKS and np.allclose(values, np.round(values))
+            asked = "are these ticks (unit: ticks/4096, zero: 2048)?" if whole else "are these degrees (unit: deg)?"
+            yield Suspicion(f"{name}.{joint}", f"reaches {reach:.4g} rad; {asked}", True)
+            return
+    yield from _ratio(joint, action, position)
+    slopes = [np.gradient(one.trajectory.position[:, index], one.trajectory.time) for one in found]
+    size = max(float(np.sqrt(np.mean(np.concatenate(slopes) ** 2))), SLOW)
+    if (own := float(np.sqrt(np.mean(velocity**2)))) > FASTER * size:
+        problem = f"is {own / size:.3g} times the slope of position.{joint}; is it in deg/s or ticks/s?"
+        yield Suspicion(f"velocity.{joint}", problem, True)
+
+
+def _ratio(joint: str, action: np.ndarray, position: np.ndarray) -> Iterator[Suspicion]:
+    """Tell of a command and a position that are of different sizes or signs."""
+    if np.ptp(action) < MOVES:
+        return
+    if np.ptp(position) == 0.0:
+        yield Suspicion(f"position.{joint}", f"never changes, but action.{joint} does: another joint's column?", False)
+        return
+    a, b = action - action.mean(), position - position.mean()
+    ratio, alike = float(np.std(b) / np.std(a)), float(np.mean(a * b) / (np.std(a) * np.std(b)))
+    if abs(alike) > ALIKE and any(DEGREES[0] < one < DEGREES[1] for one in (ratio, 1.0 / ratio)):
+        which = "position" if ratio > 1.0 else "action"
+        other = "action" if ratio > 1.0 else "position"
+        problem = f"moves {max(ratio, 1.0 / ratio):.3g} times as far as {other}.{joint}; is it in degrees (unit: deg)?"
+        yield Suspicion(f"{which}.{joint}", problem, True)
+    elif alike < -ALIKE:
+        yield Suspicion(f"position.{joint}", f"moves against action.{joint}; is a sign: -1 missing?", False)

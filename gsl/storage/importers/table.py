@@ -1,0 +1,62 @@
+"""A table of a foreign log: columns by name, of which only those that are asked for are read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from gsl.errors import TrajectoryError
+from gsl.storage.trajectory_contract import suggestion
+
+SHOWN = 12
+
+
+class Table(Protocol):
+    """One file of a log, or one topic of a bag.
+
+    Attributes:
+        path: The file.
+        names: Its columns.
+        fields: What it says once, such as a JSON document's single values, by name.
+    """
+
+    path: Path
+    names: Sequence[str]
+    fields: Mapping[str, Any]
+
+    def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return columns that are there: numbers, truth values or texts (T,), or several numbers a row (T, n)."""
+        ...
+
+
+def missing_column(table: Table, name: str) -> TrajectoryError:
+    """Return the error for a column that a table lacks."""
+    shown = ", ".join(table.names[:SHOWN]) + (f" and {len(table.names) - SHOWN} more" * (len(table.names) > SHOWN))
+    near = suggestion(name, table.names)
+    return TrajectoryError(table.path, f"is missing{near or ''}; the file has {shown or 'no column'}", column=name)
+
+
+def numbers(path: Path, name: str, values: Sequence[Any]) -> np.ndarray:
+    """Return values of one kind as an array: numbers (T,), truth values, texts, or rows of numbers (T, n).
+
+    Raises:
+        TrajectoryError: They are of different kinds or lengths, or nested deeper.
+    """
+    if values and all(isinstance(value, str) for value in values):
+        return np.array(values, dtype=object)
+    filled = [np.nan if value is None else value for value in values]
+    try:
+        found = np.array(filled)
+    except ValueError:
+        found = np.array(None)
+    if found.dtype.kind in "buif" and found.ndim in (1, 2):
+        return found
+    for row, value in enumerate(filled):
+        shape = np.shape(value) if isinstance(value, list) else ()
+        if isinstance(value, str | dict) or shape != np.shape(filled[0]):
+            told = str(value) if len(str(value)) <= 40 else f"{str(value)[:37]}..."
+            raise TrajectoryError(path, f"{told} is not a number, or not as long as the first", column=name, row=row)
+    raise TrajectoryError(path, "holds no numbers", column=name)

@@ -1,0 +1,133 @@
+"""Text tables: CSV, semicolon, tab or blank separated, with a header or not, read in pieces."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gsl.errors import TrajectoryError
+from gsl.storage.importers.sizes import check_need, opened
+from gsl.storage.importers.table import missing_column, numbers
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+ROWS = 100_000  # read at once
+FACTOR = 100.0  # bytes of text that may be read for one of memory: only the wanted columns stay
+BLANKS = r"\s+"
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
+_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|")
+
+
+class TextTable:
+    """A text file with one row a line; columns without a header are called 0, 1, 2, ..."""
+
+    def __init__(self, path: Path, memory: float) -> None:
+        self.path, self.memory = path, memory
+        self.fields: Mapping[str, Any] = {}
+        with opened(path, most=FACTOR * memory, lines=True) as file:
+            first, second = (_text(path, file.readline()) for _ in range(2))
+        self.separator = _separator(first)
+        cells = _cells(first.lstrip("#% "), self.separator)
+        self.header = not all(_NUMBER.fullmatch(cell.lower()) for cell in cells)
+        self.names: Sequence[str] = cells if self.header else [str(index) for index in range(len(cells))]
+        values = _cells(second if self.header else first, self.separator)
+        self.decimal = "," if self.separator != "," and any(map(_DECIMAL_COMMA.fullmatch, values)) else "."
+        for name in self.names:
+            if list(self.names).count(name) > 1:
+                raise TrajectoryError(path, "there are several columns of this name; keep one", column=name)
+
+    def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return the wanted columns, read in pieces."""
+        for name in wanted:
+            if name not in self.names:
+                raise missing_column(self, name)
+        pieces: dict[str, list[np.ndarray]] = {name: [] for name in wanted}
+        rows = 0
+        for piece in self._pieces(wanted):
+            for name in wanted:
+                pieces[name].append(_values(self.path, name, piece[name], rows))
+            rows += len(piece)
+            kept = sum(part.nbytes for parts in pieces.values() for part in parts)
+            check_need(self.path, 2.0 * kept, self.memory)
+        if not rows:
+            raise TrajectoryError(self.path, "has no rows; log it again")
+        return {name: _joined(self.path, name, parts) for name, parts in pieces.items()}
+
+    def _pieces(self, wanted: Sequence[str]) -> Any:
+        import pandas as pd
+
+        options = {"usecols": list(dict.fromkeys(wanted)), "chunksize": ROWS, "decimal": self.decimal}
+        options |= {"header": None, "names": self.names, "skiprows": int(self.header), "index_col": False}
+        with opened(self.path, most=FACTOR * self.memory, lines=True) as file, warnings.catch_warnings():
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            try:
+                yield from pd.read_csv(file, sep=self.separator, skipinitialspace=True, **options)
+            except pd.errors.EmptyDataError:
+                return
+            except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
+                told = " ".join(str(error).split()).removeprefix("Error tokenizing data. C error: ")
+                raise TrajectoryError(self.path, f"has rows of another length than its header: {told}") from error
+            except UnicodeDecodeError as error:
+                raise TrajectoryError(self.path, "is no text; which format is it?") from error
+
+
+def _text(path: Path, line: bytes) -> str:
+    try:
+        return line.decode("utf-8-sig").strip("\r\n")
+    except UnicodeDecodeError as error:
+        raise TrajectoryError(path, "is no text in UTF-8; export it again, or rename it after its format") from error
+
+
+def _separator(line: str) -> str:
+    counts = {mark: line.count(mark) for mark in (";", "\t", ",")}
+    best = max(counts, key=lambda mark: counts[mark])
+    return best if counts[best] else BLANKS
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    if separator == BLANKS:
+        return line.split()
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+
+
+def _values(path: Path, name: str, column: pd.Series, first: int) -> np.ndarray:
+    """Return a column of a piece whose first row is number `first`."""
+    if column.dtype.kind in "buif":
+        return column.to_numpy()
+    cells = [cell.strip() if isinstance(cell, str) else "" for cell in column]
+    if cells and cells[0].startswith("["):
+        return _vectors(path, name, cells, first)
+    words = {"true": 1.0, "false": 0.0, "": np.nan}
+    found = []
+    for row, cell in enumerate(cells):
+        value = words.get(cell.lower())
+        try:
+            found.append(float(cell) if value is None else value)
+        except ValueError:
+            if row == 0 and all(cells):
+                return np.array(cells, dtype=object)
+            raise TrajectoryError(path, f"{cell[:40]!r} is not a number", column=name, row=first + row) from None
+    return np.array(found)
+
+
+def _vectors(path: Path, name: str, cells: list[str], first: int) -> np.ndarray:
+    try:
+        return numbers(path, name, json.loads(f"[{','.join(cells)}]"))
+    except ValueError as error:
+        row = next((row for row, cell in enumerate(cells) if not (cell.startswith("[") and cell.endswith("]"))), 0)
+        raise TrajectoryError(path, "is no list of numbers", column=name, row=first + row) from error
+
+
+def _joined(path: Path, name: str, parts: list[np.ndarray]) -> np.ndarray:
+    try:
+        return np.concatenate(parts)
+    except ValueError as error:
+        raise TrajectoryError(path, "its lists are not all of one length", column=name) from error

@@ -1,0 +1,59 @@
+"""Units of foreign logs: what one of them is in the SI unit of the trajectory contract."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+from gsl.core.validation import did_you_mean
+
+DEGREE, TURN, GRAVITY = math.pi / 180.0, 2.0 * math.pi, 9.80665
+_ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "turn": TURN}
+FACTORS: Mapping[str, Mapping[str, float]] = {
+    "rad": _ANGLES,
+    "rad/s": {**{f"{name}/s": factor for name, factor in _ANGLES.items()}, "rpm": TURN / 60.0},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "N·m": {"Nm": 1.0, "mNm": 1e-3, "kgcm": GRAVITY / 100.0},
+    "V": {"V": 1.0, "mV": 1e-3},
+    "°C": {"degC": 1.0},
+    "m/s²": {"m/s²": 1.0, "g": GRAVITY},
+    "N": {"N": 1.0},
+    "m": {"m": 1.0, "mm": 1e-3},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3},
+    "1": {"1": 1.0},
+}
+"""SI unit of the contract -> unit of a log -> factor."""
+
+_TICKS = re.compile(r"ticks/(\d+)(/s)?")
+_SPELLINGS = {
+    "degrees": "deg",
+    "degree": "deg",
+    "°": "deg",
+    "°/s": "deg/s",
+    "radians": "rad",
+    "°C": "degC",
+    "C": "degC",
+}
+_SPELLINGS |= {"deg.": "deg", "m/s2": "m/s²", "rev": "turn", "rev/s": "turn/s", "dps": "deg/s", "sec": "s"}
+
+
+def factor(unit: str, wanted: str) -> float:
+    """Return what one `unit` is in the contract's unit `wanted`.
+
+    `ticks/4096` is a 4096th of a turn, `ticks/4096/s` that every second.
+
+    Raises:
+        ValueError: There is no such unit of this quantity; the text says which there are.
+    """
+    name = unit.replace("·", "").replace("*", "").replace(" ", "").replace("µ", "u").replace("μ", "u")
+    name = name.replace("^2", "²")
+    name = _SPELLINGS.get(name, name)
+    known = FACTORS[wanted]
+    if name in known:
+        return known[name]
+    ticks = _TICKS.fullmatch(name)
+    if ticks and int(ticks.group(1)) and wanted == ("rad/s" if ticks.group(2) else "rad"):
+        return TURN / int(ticks.group(1))
+    more = {"rad": ["ticks/4096"], "rad/s": ["ticks/4096/s"]}.get(wanted, [])
+    raise ValueError(f"is no unit for what is in {wanted}{did_you_mean(unit, [*known, *more], listed=True)}")

@@ -1,0 +1,38 @@
+"""What a parquet file declares before it is read: a small file can hold billions of rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gsl.errors import TrajectoryError
+
+if TYPE_CHECKING:
+    import pyarrow.parquet as pq
+
+MOST = 16e9  # bytes of a trajectory file in memory; hours of a humanoid are some 0.1e9
+
+
+def declared_bytes(metadata: pq.FileMetaData, names: Sequence[str] | None = None) -> float:
+    """Return the memory that columns take [bytes], all if `names` is None: 8 a value, or what they unpack to."""
+    total = 0.0
+    for group in range(metadata.num_row_groups):
+        row_group = metadata.row_group(group)
+        for index in range(row_group.num_columns):
+            column = row_group.column(index)
+            if names is None or any(column.path_in_schema.split(".list.")[0] == name for name in names):
+                total += max(8.0 * column.num_values, column.total_uncompressed_size)
+    return total
+
+
+def check_declared(path: Path, metadata: pq.FileMetaData) -> None:
+    """Refuse a trajectory file that says it holds more than fits into any memory.
+
+    Raises:
+        TrajectoryError: It says how much it is.
+    """
+    need = declared_bytes(metadata)
+    if need > MOST:
+        problem = f"declares {metadata.num_rows:,} rows, {need / 1e9:.3g} GB of memory; a log this long has to be cut"
+        raise TrajectoryError(path, problem)
