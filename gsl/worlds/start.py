@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Robot
 from gsl.core.dynamics import forward_kinematics
@@ -56,6 +57,7 @@ def lowest_point(robot: Robot, positions: np.ndarray, turn: np.ndarray | None = 
     for name, link in robot.links.items():
         for shape in link.shapes:
             if shape.collides and shape.kind == "box":
-                corners = np.array(shape.size)[:, None] * _CORNERS + np.array(shape.centre)[:, None]
+                box = Rotation.from_euler("xyz", shape.turn).as_matrix() @ (np.array(shape.size)[:, None] * _CORNERS)
+                corners = box + np.array(shape.centre)[:, None]
                 heights.append(float((up @ (frames.origin[name][:, None] + frames.turn[name] @ corners)).min()))
     return min(heights)
