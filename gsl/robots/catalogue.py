@@ -13,7 +13,7 @@ from gsl.robots.robot_file import SUFFIXES, files_of, from_file
 
 _NOT_ROBOTS = (
     *("catalogue", "defaults", "frames", "hinges", "nao_legs", "nao_shapes", "robot_file", "so101_shapes"),
-    *("sts3215", "urdf", "urdf_xml", "xl330"),
+    *("urdf", "urdf_xml"),
 )
 
 

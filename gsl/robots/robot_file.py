@@ -1,4 +1,4 @@
-"""A robot from a file of the user: a URDF as it is, or a yaml that says of a URDF, or of lone servos, what it leaves open.
+"""A robot from a user's file: a URDF as it is, or a yaml that says what a URDF leaves open, or of servos alone.
 
     urdf: arm.urdf                # beside this file; without it every joint is a servo of its own with an unknown load
     joints:                       # those that an action names, in this order; the others are held

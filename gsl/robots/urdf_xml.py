@@ -21,7 +21,7 @@ LARGEST = 20e6  # of a file that is read [bytes]
 PRIMITIVES = ("box", "sphere", "cylinder")
 TURNING = ("revolute", "continuous")
 _LIMITS = ("lower", "upper", "effort", "velocity")
-_GREY = (0.75, 0.77, 0.8)
+_GREY = (0.75, 0.77, 0.8, 1.0)
 KINDS = (*TURNING, "fixed", "prismatic")
 
 
@@ -143,20 +143,22 @@ def _shape(node: xml.Element, role: str) -> list[Shape]:
     else:
         names = ("radius",) if form.tag == "sphere" else ("radius", "length")
         size = tuple(_number(form, name, f"<{form.tag}>") for name in names)
-    place, attitude = tuple(centre.tolist()), tuple(rpy(turn))
+    (x, y, z), attitude = centre.tolist(), rpy(turn)
     if role == "collision":
-        return [Shape(form.tag, size, place, collides=True, turn=attitude)]
+        return [Shape(form.tag, size, (x, y, z), collides=True, turn=attitude)]
     colour = node.find("material/color")
-    seen = _numbers(colour.get("rgba", ""), 4, "rgba of a <color>")[:3] if colour is not None else _GREY
-    return [Shape(form.tag, size, place, turn=attitude, colour=seen)]
+    red, green, blue, _ = _numbers(colour.get("rgba", ""), 4, "rgba of a <color>") if colour is not None else _GREY
+    return [Shape(form.tag, size, (x, y, z), turn=attitude, colour=(red, green, blue))]
 
 
 def _hinge(name: str, node: xml.Element) -> Hinge:
     kind = node.get("type", "")
     if kind not in KINDS:
         raise ValueError(f"type '{kind}' is not supported; there are {', '.join(KINDS)}")
-    ends = [end.get("link", "") if (end := node.find(role)) is not None else "" for role in ("parent", "child")]
-    if not all(ends):
+    parent, child = (
+        end.get("link", "") if (end := node.find(role)) is not None else "" for role in ("parent", "child")
+    )
+    if not (parent and child):
         raise ValueError("names no parent or no child link")
     axis = node.find("axis")
     way = np.array(_numbers(axis.get("xyz", ""), 3, "axis") if axis is not None else (1.0, 0.0, 0.0))
@@ -171,7 +173,7 @@ def _hinge(name: str, node: xml.Element) -> Hinge:
         )
         follows = (mimic.get("joint", ""), ratio, offset)
     unit = way / np.linalg.norm(way) if way.any() else np.array([1.0, 0.0, 0.0])
-    return Hinge(name, kind, *ends, *_origin(node), unit, told, follows)
+    return Hinge(name, kind, parent, child, *_origin(node), unit, told, follows)
 
 
 def _tree(links: dict[str, Link], hinges: Sequence[Hinge]) -> tuple[str, tuple[Hinge, ...]]:

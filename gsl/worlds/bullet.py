@@ -64,13 +64,8 @@ class BulletWorld:
     def layout(self) -> Layout:
         """What an observation holds."""
         joints, feet = self.plant.robot.controlled, len(self.plant.robot.feet)
-        body = {
-            "gyro": 3,
-            **({"foot_force": feet} if feet else {}),
-            "base.position": 3,
-            "base.orientation": 4,
-            "base.velocity": 3,
-        }
+        base = {"base.position": 3, "base.orientation": 4, "base.velocity": 3}
+        body = {"gyro": 3, **({"foot_force": feet} if feet else {}), **base}
         return Layout(joints, {"position": len(joints), "velocity": len(joints), **body}, self.period)
 
     def make(self) -> BulletEnv:
