@@ -86,10 +86,11 @@ def bench(servo: Xl330, *, mass: float = 0.49, length: float = 0.10, arm_mass: f
         Shape("sphere", (radius,), (0.0, 0.012, -length), colour=_BRASS),
         Shape("cylinder", (0.008, 0.008), (0.0, 0.012, 0.0), colour=_STEEL, along="y"),
     )
+    floor, top = -length - 0.02 - radius, 0.025
     body = (
         Shape("box", (0.02, 0.026, 0.034), (0.0, -0.008, 0.0095), colour=_DARK),
-        Shape("box", (0.02, 0.02, length + 0.03), (0.0, -0.03, -0.5 * length), colour=_STEEL),
-        Shape("box", (0.1, 0.1, 0.01), (0.0, -0.02, -length - 0.02 - radius), colour=_STEEL),
+        Shape("box", (0.02, 0.02, top - floor), (0.0, -0.03, 0.5 * (top + floor)), colour=_STEEL),
+        Shape("box", (0.1, 0.1, 0.01), (0.0, -0.02, floor), colour=_STEEL),
     )
     links = (Link("base", 0.5, np.zeros(3), 1e-3 * np.eye(3), body), replace(pole, shapes=shapes))
     joint = Joint(

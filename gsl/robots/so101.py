@@ -5,8 +5,8 @@ upright, forearm and gripper level. How sure that is: the collector writes degre
 range, as A does, and LeRobot uses A with the same degrees. Of the logs' own evidence, at slow speed on three dates,
 Pitch, Elbow and Wrist_Pitch stand off their commands to the side to which A's gravity pulls, by 50 to 120 mrad/(N·m),
 which bears out their signs as long as no zero is off by more than 40 mrad; a free zero leaves Pitch open, since it
-never moves far enough for its load to change. Nothing but convention speaks for the signs of Rotation and Wrist_Roll, which
-gravity hardly loads. Jaw is logged from 0 to 1 and taken to run over A's range, 0 closed.
+never moves far enough for its load to change. Nothing but convention speaks for the signs of Rotation and Wrist_Roll,
+which gravity hardly loads. Jaw is logged from 0 to 1 and taken to run over A's range, 0 closed.
 
 The firmware drives the motor with a duty in proportion to the error, P times .165 for each radian at a register P (B,
 by oscilloscope), and LeRobot and the collector set P 16, I 0, D 32. In the terms of our servo (worlds/servo.py)
