@@ -35,12 +35,27 @@ def test_two_points_welded_turn_about_their_common_centre() -> None:
     np.testing.assert_allclose(pair.inertia, np.diag([1.0, 1.0, 0.0]) * (2.0 * 3.0 / 5.0) * 0.25, atol=1e-15)
 
 
-def test_nothing_may_move_on_a_welded_link() -> None:
-    links = {name: Link(name, 1.0, np.zeros(3), np.eye(3)) for name in "abc"}
-    held = Joint("weld", "a", "b", np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0.0, 0.0, fixed_at=0.0)
-    hinge = Joint("hinge", "b", "c", np.zeros(3), np.array([1.0, 0.0, 0.0]), -1.0, 1.0, 1.0, 1.0)
+def welded_and_hinged(held_at: float) -> Robot:
+    """Link b is held on a, c moves on b, d is held on c."""
+    links = {name: Link(name, 1.0, np.zeros(3), np.eye(3)) for name in "abcd"}
+    along, out = np.array([1.0, 0.0, 0.0]), np.array([0.3, 0.0, 0.1])
+    held = Joint("weld", "a", "b", out, along, 0.0, 0.0, 0.0, 0.0, fixed_at=held_at)
+    hinge = Joint("hinge", "b", "c", out, along, -1.0, 1.0, 1.0, 1.0)
+    tip = Joint("tip", "c", "d", out, along, 0.0, 0.0, 0.0, 0.0, fixed_at=0.0)
+    return Robot("chain", links, (held, hinge, tip), ("hinge",))
+
+
+def test_what_moves_on_a_welded_link_moves_on_the_one_that_carries_it() -> None:
+    body = lumped(welded_and_hinged(0.0))
+    (hinge,) = body.joints
+    assert (hinge.parent, hinge.child, [*body.links]) == ("a", "c", ["a", "c"])
+    np.testing.assert_allclose(hinge.origin, [0.6, 0.0, 0.2])
+    assert [link.mass for link in body.links.values()] == [2.0, 2.0]
+
+
+def test_nothing_may_move_on_a_link_that_is_held_at_an_angle() -> None:
     with pytest.raises(ValueError, match="hinge moves on b"):
-        lumped(Robot("chain", links, (held, hinge), ("hinge",)))
+        lumped(welded_and_hinged(0.2))
 
 
 def test_rotation_agrees_with_the_rotation_vector() -> None:

@@ -12,7 +12,7 @@ from gsl.blind.extras import EXTRAS, Extra
 from gsl.core.body import Robot, lumped
 from gsl.core.plant import Plant
 from gsl.core.setting import Setting, settings_of
-from gsl.effects.effect import effect_class, names
+from gsl.effects.effect import documented, effect_class, names
 
 UNSEEN = ("encoder_noise", "action_noise", "external_push")  # besides effects of contact: not for a log in the air
 RANDOM = ("uneven_ground",)  # new in every episode: no replay repeats it
@@ -81,7 +81,7 @@ def drawn(effect: str, robot: Robot, rng: np.random.Generator, *, alone: bool = 
         floating: On the ground, where it acts on all joints, or on the base.
     """
     target: Any = effect_class(effect)
-    known, hints = settings_of(target), get_type_hints(target)
+    known, hints = documented(effect, robot), get_type_hints(target)
     fixed: dict[str, Any] = {}
     if "joints" in known:
         fixed["joints"] = "all" if floating else _scope(robot, rng, alone=alone)

@@ -10,7 +10,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Shape:
-    """A primitive on a link [m]: a `box` of full edges, a `sphere` (radius,) or a `cylinder` (radius, length)."""
+    """A primitive on a link [m]: a `box` of full edges, a `sphere` (radius,) or a `cylinder` (radius, length).
+
+    It is turned by `turn`: roll, pitch and yaw about the link's x, y and z, in this order [rad].
+    """
 
     kind: str
     size: tuple[float, ...]
@@ -18,6 +21,7 @@ class Shape:
     collides: bool = False
     colour: tuple[float, float, float] = (0.9, 0.9, 0.92)
     along: str = "z"  # a cylinder's axis
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,8 @@ class Robot:
         stance: A usual posture [rad] by joint, the one at which approximations are exact.
         upright_height: Base height below which it lies on the ground [m].
         torque_unit: Size of its servos against the NAO's: by so much more or less their friction differs.
+        ranges: Documented ranges that differ from those of a NAO's class, by effect and parameter: (lower, upper).
+        remarks: What was left out or assumed when the robot was read from a file.
     """
 
     name: str
@@ -102,6 +108,8 @@ class Robot:
     stance: Mapping[str, float] = field(default_factory=dict)
     upright_height: float = 0.0
     torque_unit: float = 1.0
+    ranges: Mapping[str, Mapping[str, tuple[float, float]]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     @property
     def base(self) -> str:
@@ -154,7 +162,10 @@ def carrier(robot: Robot, link: str, point: np.ndarray) -> tuple[str, np.ndarray
 
 
 def lumped(robot: Robot) -> Robot:
-    """Return the same robot with every fixed joint's child welded into its parent."""
+    """Return the same robot with every fixed joint's child welded into its parent.
+
+    Joints may move on a welded link if it is held at 0: its axes are then those of its parent.
+    """
     links, joints = dict(robot.links), list(robot.joints)
     for joint in reversed(robot.joints):  # children before parents
         if joint.fixed_at is None:
@@ -162,10 +173,15 @@ def lumped(robot: Robot) -> Robot:
         turn, child = rotation(joint.axis, joint.fixed_at), links.pop(joint.child)
         links[joint.parent] = _welded(links[joint.parent], child, turn, joint.origin)
         joints.remove(joint)
-        for other in joints:
-            if other.parent == joint.child:
-                raise ValueError(f"{other.name} moves on {joint.child}, which is welded to {joint.parent}")
+        joints = [_carried(other, joint) if other.parent == joint.child else other for other in joints]
     return replace(robot, links=links, joints=tuple(joints))
+
+
+def _carried(other: Joint, joint: Joint) -> Joint:
+    """Return a joint that moves on the link which `joint` welds to its parent, as one of that parent."""
+    if joint.fixed_at != 0.0:
+        raise ValueError(f"{other.name} moves on {joint.child}, which is held at an angle")
+    return replace(other, parent=joint.parent, origin=joint.origin + other.origin)
 
 
 def _welded(parent: Link, child: Link, turn: np.ndarray, origin: np.ndarray) -> Link:

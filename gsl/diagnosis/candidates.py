@@ -14,9 +14,9 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 
 from gsl.core.body import Robot, carrier, lumped
-from gsl.core.setting import Setting, settings_of
+from gsl.core.setting import Setting
 from gsl.diagnosis.replay import Effects
-from gsl.effects.effect import effect_class, names
+from gsl.effects.effect import documented, effect_class, names
 
 ONE_SIDED = (0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)  # shares of the way from doing nothing to the end of the range
 DENSE = (0.02, 0.05, 0.1, 0.15, 0.22, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0)  # where joints shake: minima are narrow there
@@ -126,16 +126,20 @@ def library(
         made.beginning_at((starts or {}).get(name))
         for name in names()
         if name not in without
-        for made in _of(name, (moving, pushed), (known or {}).get(name, {}), shares)
+        for made in _of(name, robot, (moving, pushed), (known or {}).get(name, {}), shares)
     )
 
 
 def _of(
-    name: str, places: tuple[Sequence[str], Sequence[str]], given: Mapping[str, Any], shares: Sequence[float]
+    name: str,
+    robot: Robot,
+    places: tuple[Sequence[str], Sequence[str]],
+    given: Mapping[str, Any],
+    shares: Sequence[float],
 ) -> list[Candidate]:
     target: Any = effect_class(name)
     links = places[target.kind != "body"]
-    known, hints = settings_of(target), get_type_hints(target)
+    known, hints = documented(name, robot), get_type_hints(target)
     choices: list[list[tuple[str, Any]]] = []
     if "joints" in known:
         choices.append([("joints", "all")])

@@ -16,8 +16,9 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
-from gsl.core.body import Link
+from gsl.core.body import Link, Robot
 from gsl.core.plant import Plant
+from gsl.core.setting import Setting, settings_of
 from gsl.core.validation import make
 from gsl.errors import ConfigError
 
@@ -59,6 +60,27 @@ def effect_class(name: str) -> type:
         raise ConfigError(f"effects.{name}", f"no effect of this name; {hint}")
     module = importlib.import_module(f"gsl.effects.{name}")
     return getattr(module, "".join(word.capitalize() for word in name.split("_")))
+
+
+def documented(name: str, robot: Robot) -> dict[str, Setting]:
+    """Return the settings of an effect with the ranges that a robot documents, where they differ from a NAO's class."""
+    own = robot.ranges.get(name, {})
+    known = settings_of(effect_class(name)).items()
+    return {key: replace(one, lower=own[key][0], upper=own[key][1]) if key in own else one for key, one in known}
+
+
+def check_ranges(name: str, ranges: Mapping[str, tuple[float, float]]) -> None:
+    """Refuse ranges of an effect, or of parameters, that do not exist or could not be searched.
+
+    Raises:
+        ConfigError: One of them.
+    """
+    known = settings_of(effect_class(name))
+    for key, (lower, upper) in ranges.items():
+        if key not in known or known[key].lower is None:
+            raise ConfigError(f"ranges.{name}.{key}", "the effect has no parameter of this name with a range")
+        if not lower < upper:
+            raise ConfigError(f"ranges.{name}.{key}", f"{lower:g} to {upper:g} is no range")
 
 
 def built(effects: Mapping[str, Any]) -> tuple[Effect, ...]:

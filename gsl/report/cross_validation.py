@@ -65,8 +65,8 @@ def table(folds: Sequence[Fold], by: str, usual: str) -> str:
     )
     compared = (
         f"The diagnosed simulator's mean error against that with {usual}: {100.0 * change.mean:+.0f} % "
-        f"({100.0 * change.lower:+.0f} to {100.0 * change.upper:+.0f} %, bootstrap over trajectories); it is smaller in "
-        f"{int((after < before).sum())} of {len(after)} trajectories."
+        f"({100.0 * change.lower:+.0f} to {100.0 * change.upper:+.0f} %, bootstrap over trajectories); it is smaller "
+        f"in {int((after < before).sum())} of {len(after)} trajectories."
     )
     below = "Mean absolute error of the joints in open-loop replays of whole trajectories that no fit has seen."
     return f"{markdown(columns, rows)}\n{below}\n{compared}\n"

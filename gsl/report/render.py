@@ -11,18 +11,21 @@ import numpy as np
 from gsl.core.body import Robot, lumped
 from gsl.core.trajectory import Trajectory
 from gsl.worlds.camera import Camera, View
-from gsl.worlds.start import lowest_point
+from gsl.worlds.start import extent
+
+FAR_ENOUGH = 2.5  # of the camera, in diagonals of the robot
 
 
 def portrait(robot: Robot, path: Path, *, width: int = 800, height: int = 900) -> None:
     """Write a picture of the robot standing in its stance."""
     body = lumped(robot)
     positions = np.array([robot.stance.get(name, 0.0) for name in robot.motors])
-    place = (0.0, 0.0, -lowest_point(body, positions))
+    low, high = extent(body, positions)
+    place = (0.0, 0.0, -low[2])
     with _camera(robot) as camera:
         camera.pose(dict(zip(robot.motors, positions, strict=True)), place, (0.0, 0.0, 0.0, 1.0))
-        view = View((0.0, 0.0, 0.87 * place[2]), 1.65)
-        _write(camera.picture(view, width, height), path)
+        middle, size = 0.5 * (low + high) - [0.0, 0.0, low[2]], float(np.linalg.norm(high - low))
+        _write(camera.picture(View(middle.tolist(), FAR_ENOUGH * size), width, height), path)
 
 
 def walk_strip(robot: Robot, trajectory: Trajectory, path: Path, *, frames: int = 8, height: int = 260) -> None:

@@ -1,15 +1,20 @@
-"""Robots by name: `nao` is what gsl/robots/nao.py calls nao; a user's own is `package.module.function`."""
+"""Robots by name: `nao` is what gsl/robots/nao.py calls nao; a user's own is a file or `package.module.function`."""
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
+from pathlib import Path
 
 from gsl.core.body import Robot
 from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
+from gsl.robots.robot_file import SUFFIXES, files_of, from_file
 
-_NOT_ROBOTS = ("catalogue", "urdf", "nao_legs", "nao_shapes")
+_NOT_ROBOTS = (
+    *("catalogue", "defaults", "frames", "hinges", "nao_legs", "nao_shapes", "robot_file", "so101_shapes"),
+    *("urdf", "urdf_xml"),
+)
 
 
 def names() -> tuple[str, ...]:
@@ -19,15 +24,29 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(set(found) - set(_NOT_ROBOTS)))
 
 
+def is_file(name: str) -> bool:
+    """Whether a name is that of a file."""
+    return name.lower().endswith(SUFFIXES)
+
+
+def files(name: str) -> tuple[Path, ...]:
+    """Return the files that a robot is read from; none of those that come with gsl."""
+    return files_of(Path(name)) if is_file(name) else ()
+
+
 def robot(name: str) -> Robot:
     """Build a robot.
 
     Raises:
         ConfigError: if nothing is called so.
+        InputError: if it is a file that describes no robot.
     """
+    if is_file(name):
+        return from_file(Path(name))
     place, _, function = name.rpartition(".") if "." in name else (f"gsl.robots.{name}", "", name)
     if not (name in names() or "." in name):
-        raise ConfigError("robot", f"no robot called '{name}'{did_you_mean(name, names(), listed=True)}")
+        hint = f"{did_you_mean(name, names(), listed=True)}, or a file such as arm.urdf"
+        raise ConfigError("robot", f"no robot called '{name}'{hint}")
     try:
         built: Robot = getattr(importlib.import_module(place), function)()
         return built

@@ -1,4 +1,4 @@
-"""URDF text of a robot, each link's inertia in its principal axes."""
+"""URDF text of a robot, each link's inertia in its principal axes; urdf_file.py reads such text."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Joint, Link, Robot, Shape
+from gsl.robots.frames import euler, rpy
 
 _ALONG = {"x": (0.0, np.pi / 2, 0.0), "y": (np.pi / 2, 0.0, 0.0), "z": (0.0, 0.0, 0.0)}
 
@@ -36,7 +37,7 @@ def _add_link(root: xml.Element, link: Link, visuals: bool) -> None:
     node = xml.SubElement(root, "link", name=link.name)
     inertial = xml.SubElement(node, "inertial")
     moments, axes = principal_axes(link.inertia)
-    _origin(inertial, link.com, Rotation.from_matrix(axes).as_euler("xyz"))
+    _origin(inertial, link.com, rpy(axes))
     xml.SubElement(inertial, "mass", value=_text(link.mass))
     if 2 * moments.max() > moments.sum():  # Bullet would set such an inertia to zero; the world sets the true moments
         moments = np.full(3, moments.max())
@@ -51,7 +52,7 @@ def _add_link(root: xml.Element, link: Link, visuals: bool) -> None:
 
 def _add_shape(node: xml.Element, role: str, shape: Shape) -> None:
     element = xml.SubElement(node, role)
-    _origin(element, shape.centre, _ALONG[shape.along])
+    _origin(element, shape.centre, _attitude(shape))
     geometry = xml.SubElement(element, "geometry")
     if shape.kind == "box":
         xml.SubElement(geometry, "box", size=_text(*shape.size))
@@ -63,6 +64,13 @@ def _add_shape(node: xml.Element, role: str, shape: Shape) -> None:
     if role == "visual":
         name = "rgb_" + "_".join(f"{round(255 * c)}" for c in shape.colour)
         xml.SubElement(xml.SubElement(element, "material", name=name), "color", rgba=_text(*shape.colour, 1.0))
+
+
+def _attitude(shape: Shape) -> Sequence[float] | np.ndarray:
+    """Return roll, pitch and yaw of a shape, a cylinder's axis included [rad]."""
+    if not any(shape.turn):
+        return _ALONG[shape.along]
+    return rpy(euler(*shape.turn) @ euler(*_ALONG[shape.along]))
 
 
 def _add_joint(root: xml.Element, joint: Joint) -> None:

@@ -18,6 +18,7 @@ from gsl.errors import ArtifactError
 from gsl.storage import documents, manifest
 from gsl.storage.identity import Identity, changes, identify
 from gsl.storage.manifest import Manifest, Parent
+from gsl.storage.read_files import read_files
 from gsl.storage.versions import commit, versions
 from gsl.storage.whole import explained, flush_tree
 from gsl.storage.workplace import KEY, install, locked, logged, stoppable, workplace
@@ -82,7 +83,7 @@ def build(stage: Stage, *, config: Mapping[str, Any], out: Path, command: str, f
         ArtifactError: `out` is something else, or was built otherwise and `force` is not set, or is being built.
         GslError: The folder is full or cannot be written.
     """
-    identity = identify(stage.kind, config, stage.parents())
+    identity = identify(stage.kind, config, _sources(stage))
     with locked(out), stoppable(), explained(out.parent):
         if (existing := _existing(out, identity, config, force=force)) is not None:
             os.utime(out / manifest.NAME)
@@ -142,5 +143,10 @@ def _work(
 def _parents(stage: Stage, identity: Identity, folder: Path) -> tuple[Parent, ...]:
     return tuple(
         Parent(role, Path(os.path.relpath(path, folder)).as_posix(), identity.parents[role])
-        for role, path in stage.parents().items()
+        for role, path in _sources(stage).items()
     )
+
+
+def _sources(stage: Stage) -> dict[str, Path]:
+    """Return all that a stage reads, by role: what its components read by themselves, such as a robot, included."""
+    return {**read_files(stage), **stage.parents()}

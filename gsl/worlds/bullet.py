@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any
 
 import gymnasium
@@ -19,9 +20,9 @@ from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
 from gsl.effects.effect import applied, built
 from gsl.errors import GslError
-from gsl.robots.catalogue import robot
+from gsl.robots.catalogue import files, robot
 from gsl.worlds.engine import Engine, Physics, Reading
-from gsl.worlds.fits import check_periods, check_plant
+from gsl.worlds.fits import check_base, check_periods, check_plant
 from gsl.worlds.ground import random_heights
 from gsl.worlds.start import Start, resting
 
@@ -32,7 +33,7 @@ FALLEN_TILT = 0.5  # cosine of the tilt beyond which the robot has fallen
 class BulletWorld:
     """A world's configuration; `make` builds the environment."""
 
-    robot: Annotated[str, setting("name of the robot, or package.module.function of one's own")]
+    robot: Annotated[str, setting("name of the robot, or one's own: a URDF or yaml file, or package.module.function")]
     effects: Annotated[Mapping[str, Any], setting("what this world adds to the nominal robot, by name")]
     floating: Annotated[bool, setting("base on the ground (true) or held in the air (false)")] = True
     step: Annotated[float, setting("physics period", unit="s", gt=0, le=0.02)] = 0.002
@@ -45,6 +46,14 @@ class BulletWorld:
         """Refuse periods that do not fit, and effects that do not exist or do not fit them."""
         check_periods(self.step, self.period)
         check_plant(self.plant, self.step, self.period)
+        check_base(self.plant.robot, floating=self.floating)
+
+    @property
+    def files(self) -> Mapping[str, Path]:
+        """What it is read from, by the setting that names it: a robot's files are part of what a world is."""
+        first, *others = files(self.robot) or (None,)
+        named = {} if first is None else {"robot": first}
+        return named | {f"robot.{path.suffix[1:]}": path for path in others}
 
     @cached_property
     def plant(self) -> Plant:
@@ -54,8 +63,9 @@ class BulletWorld:
     @property
     def layout(self) -> Layout:
         """What an observation holds."""
-        joints = self.plant.robot.controlled
-        body = {"gyro": 3, "foot_force": 2, "base.position": 3, "base.orientation": 4, "base.velocity": 3}
+        joints, feet = self.plant.robot.controlled, len(self.plant.robot.feet)
+        base = {"base.position": 3, "base.orientation": 4, "base.velocity": 3}
+        body = {"gyro": 3, **({"foot_force": feet} if feet else {}), **base}
         return Layout(joints, {"position": len(joints), "velocity": len(joints), **body}, self.period)
 
     def make(self) -> BulletEnv:
@@ -144,9 +154,9 @@ class BulletEnv(gymnasium.Env):
         noise = self._plant.sensors.encoder_noise[:n]
         if noise.any():
             observation[:n] += noise * self.np_random.standard_normal(n)
-        rest = observation[2 * n :]
-        rest[:3], rest[3:5], rest[5:8] = reading.gyro, reading.foot_force, reading.place
-        rest[8:12], rest[12:15] = reading.quaternion, reading.velocity
+        rest, feet = observation[2 * n :], 3 + len(reading.foot_force)
+        rest[:3], rest[3:feet], rest[feet : feet + 3] = reading.gyro, reading.foot_force, reading.place
+        rest[feet + 3 : feet + 7], rest[feet + 7 :] = reading.quaternion, reading.velocity
         return observation
 
     def _surface(self) -> np.ndarray | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gsl.core.body import Robot, lumped
 from gsl.core.plant import Plant
 from gsl.errors import ConfigError
 from gsl.worlds.encoder import REMEMBERED
@@ -40,6 +41,16 @@ def check_plant(plant: Plant, step: float, period: float) -> None:
         if bare.any():
             joint = plant.robot.motors[int(np.argmax(bare))]
             raise ConfigError(f"effects.{name}.joints", f"{joint} has no rotor; effects.armature.inertia gives it one")
+
+
+def check_base(robot: Robot, *, floating: bool) -> None:
+    """Refuse to let a robot go that has no weight of its own, or no feet to stand on.
+
+    Raises:
+        ConfigError: if it would have to.
+    """
+    if floating and (lumped(robot).links[robot.base].mass <= 0.0 or not robot.feet):
+        raise ConfigError("floating", f"the {robot.name} has no feet to stand on; say floating=false", given="true")
 
 
 def _check_delay(name: str, delay: float, count: int, length: float, what: str) -> None:

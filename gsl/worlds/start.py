@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.body import Robot
+from gsl.core.body import Robot, Shape
 from gsl.core.dynamics import forward_kinematics
+from gsl.robots.frames import euler
 from gsl.worlds.engine import Reading
 
 CLEARANCE = 5e-4  # of the lowest sole above the ground [m]
@@ -50,12 +52,36 @@ def lowest_point(robot: Robot, positions: np.ndarray, turn: np.ndarray | None = 
         positions: Of the motors [rad], shape (n_motors,).
         turn: From base to world axes, shape (3, 3), by default upright.
     """
-    frames = forward_kinematics(robot, dict(zip(robot.motors, positions.tolist(), strict=True)))
     up = np.array([0.0, 0.0, 1.0]) if turn is None else turn[2]
-    heights = [0.0]
+    soles = [up @ box for shape, box in _boxes(robot, positions) if shape.collides and shape.kind == "box"]
+    return min([0.0, *(float(heights.min()) for heights in soles)])
+
+
+def extent(robot: Robot, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and greatest coordinates of all shapes in base axes [m], both of shape (3,).
+
+    Args:
+        robot: Without fixed joints.
+        positions: Of the motors [rad], shape (n_motors,).
+    """
+    corners = np.concatenate([np.zeros((3, 1)), *(box for _, box in _boxes(robot, positions))], axis=1)
+    return corners.min(axis=1), corners.max(axis=1)
+
+
+def _boxes(robot: Robot, positions: np.ndarray) -> Iterator[tuple[Shape, np.ndarray]]:
+    """Yield every shape with the corners of the box around it in base axes [m], shape (3, 8)."""
+    frames = forward_kinematics(robot, dict(zip(robot.motors, positions.tolist(), strict=True)))
     for name, link in robot.links.items():
         for shape in link.shapes:
-            if shape.collides and shape.kind == "box":
-                corners = np.array(shape.size)[:, None] * _CORNERS + np.array(shape.centre)[:, None]
-                heights.append(float((up @ (frames.origin[name][:, None] + frames.turn[name] @ corners)).min()))
-    return min(heights)
+            box = euler(*shape.turn) @ (_edges(shape)[:, None] * _CORNERS) + np.array(shape.centre)[:, None]
+            yield shape, frames.origin[name][:, None] + frames.turn[name] @ box
+
+
+def _edges(shape: Shape) -> np.ndarray:
+    """Return the edges of the box around a shape [m], shape (3,)."""
+    if shape.kind == "box":
+        return np.array(shape.size)
+    edges = np.full(3, 2.0 * shape.size[0])
+    if shape.kind == "cylinder":
+        edges["xyz".index(shape.along)] = shape.size[1]
+    return edges

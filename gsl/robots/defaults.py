@@ -1,0 +1,74 @@
+"""What a description of a body does not say of its servos, derived from what it says: start values for a diagnosis.
+
+    armature = TIME_CONSTANT effort / velocity      the time in which full torque brings a free rotor up to speed
+    kp       = effort / FULL_AT                     full torque at an error of FULL_AT
+    kd       = 2 DAMPING sqrt(kp inertia)           inertia of rotor and of all that the joint carries, others still
+
+`gsl diagnose` fits gains, friction and inertia of every joint anew before it looks for a cause, so that these need to
+be right only within a factor of some units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from gsl.core.body import Joint, Link, Robot, lumped
+from gsl.core.dynamics import mass_matrix
+
+TIME_CONSTANT = 0.02  # [s]: .006 (Go2) to .046 (STS3215), see the robots; motors' data sheets say .005 to .05
+FULL_AT = 0.2  # [rad]: .02 (NAO) to .9 (XL330 at factory gains)
+DAMPING = 0.7  # of an oscillator: hardly any overshoot
+LOAD_MASS = 1.0  # of a lone servo's load [kg]; what of it is off the axis is the effect centre_of_mass
+WORTH = 0.5  # of a lone servo's torque that an unknown load may take
+_GRAVITY = 9.81  # [m/s²]
+
+
+def armature_of(effort: float, velocity: float) -> float:
+    """Return the rotor inertia at the output [kg·m²] of a motor of some peak torque [N·m] and speed [rad/s]."""
+    return TIME_CONSTANT * effort / velocity
+
+
+def with_gains(robot: Robot, given: Mapping[str, tuple[float | None, float | None]]) -> Robot:
+    """Return the robot with gains for all motors: those given, the others derived.
+
+    Args:
+        robot: With everything else.
+        given: kp [N·m/rad] and kd [N·m·s/rad] by motor, None where it is left open.
+    """
+    body = lumped(robot)
+    carried = np.diag(mass_matrix(body, robot.stance))[6:]
+    gains = {}
+    for name, inertia in zip(robot.motors, carried.tolist(), strict=True):
+        joint, (kp, kd) = robot.joint(name), given.get(name, (None, None))
+        kp = joint.effort / FULL_AT if kp is None else kp
+        kd = 2.0 * DAMPING * float(np.sqrt(kp * (inertia + joint.armature))) if kd is None else kd
+        gains[name] = (kp, kd)
+    return replace(robot, gains=gains)
+
+
+def lone_servos(
+    joints: Mapping[str, Joint], inertias: Mapping[str, float]
+) -> tuple[dict[str, Link], tuple[Joint, ...]]:
+    """Return a tree in which every joint alone turns a load about a level axis, balanced as long as nobody says else.
+
+    Args:
+        joints: Their limits and rotors.
+        inertias: Of the loads [kg·m²].
+    """
+    base = Link("base", LOAD_MASS, np.zeros(3), LOAD_MASS * 1e-3 * np.eye(3))
+    loads = {name: Link(f"{name}_load", LOAD_MASS, np.zeros(3), inertias[name] * np.eye(3)) for name in joints}
+    axis = np.array([0.0, 1.0, 0.0])
+    placed = tuple(
+        replace(joint, parent="base", child=f"{name}_load", origin=0.1 * number * axis, axis=axis)
+        for number, (name, joint) in enumerate(joints.items())
+    )
+    return {"base": base, **{load.name: load for load in loads.values()}}, placed
+
+
+def unknown_loads(joints: Mapping[str, Joint]) -> dict[str, dict[str, tuple[float, float]]]:
+    """Return how far off the axis the load of a lone servo may be, as ranges of the effect centre_of_mass [m]."""
+    far = WORTH * max(joint.effort for joint in joints.values()) / (LOAD_MASS * _GRAVITY)
+    return {"centre_of_mass": dict.fromkeys("xz", (-far, far))}

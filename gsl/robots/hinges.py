@@ -1,0 +1,192 @@
+"""Which joints of a description are driven, which follow another, which are held; and the robot that comes of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+
+from gsl.core.body import Joint, Robot, lumped, rotation
+from gsl.core.setting import component, setting
+from gsl.core.validation import did_you_mean
+from gsl.errors import ConfigError
+from gsl.robots.defaults import armature_of, lone_servos, unknown_loads, with_gains
+from gsl.robots.frames import Mount, aligned
+from gsl.robots.urdf_xml import TURNING, Description, Hinge
+
+ENDLESS = 2.0 * math.pi  # limit of a continuous joint, either way [rad]
+
+Number = float | None
+
+
+@component
+class JointSettings:
+    """What is known of a controlled joint, over what the URDF says."""
+
+    kp: Annotated[Number, setting("proportional gain", unit="N·m/rad", gt=0)] = None
+    kd: Annotated[Number, setting("derivative gain", unit="N·m·s/rad", ge=0)] = None
+    effort: Annotated[Number, setting("peak torque", unit="N·m", gt=0)] = None
+    velocity: Annotated[Number, setting("speed without load", unit="rad/s", gt=0)] = None
+    armature: Annotated[Number, setting("inertia of the rotor at the output", unit="kg·m²", ge=0)] = None
+    lower: Annotated[Number, setting("least position", unit="rad")] = None
+    upper: Annotated[Number, setting("greatest position", unit="rad")] = None
+    torque_constant: Annotated[float, setting("at the output", unit="N·m/A", gt=0)] = 1.0
+    inertia: Annotated[Number, setting("of the load of a lone servo, its rotor's by default", unit="kg·m²", gt=0)] = (
+        None
+    )
+
+
+def from_description(
+    told: Description,
+    joints: Mapping[str, JointSettings] | None,
+    held: Mapping[str, float],
+    stance: Mapping[str, float],
+) -> Robot:
+    """Return the robot of a URDF.
+
+    Args:
+        told: What the file says.
+        joints: The controlled joints in order, with what is known of them; None for all that turn and follow no other.
+        held: Where others are held [rad], or [m] if they slide.
+        stance: A usual posture [rad].
+
+    Raises:
+        ConfigError: A joint does not exist, cannot be driven, or lacks a limit; or a link that moves has no mass.
+    """
+    known = {hinge.name: hinge for hinge in told.hinges}
+    chosen = joints if joints is not None else {name: JointSettings() for name in _drivable(told.hinges)}
+    _check(chosen, held, known)
+    coupled = {
+        hinge.name: hinge.follows[0]
+        for hinge in told.hinges
+        if hinge.follows and hinge.follows[0] in chosen and abs(hinge.follows[1]) == 1.0 and hinge.kind in TURNING
+    }
+    mounts, remarks = [], [*told.remarks]
+    for hinge in told.hinges:
+        if hinge.name in coupled:
+            mounts.append(_coupled(hinge, chosen[coupled[hinge.name]]))
+        elif hinge.name in chosen:
+            mounts.append(Mount(_driven(hinge, chosen[hinge.name]), hinge.turn))
+        else:
+            mounts.append(_held(hinge, place := _place(hinge, held)))
+            if hinge.kind != "fixed" and hinge.name not in held:
+                remarks.append(_remark(hinge, place))
+    links, placed = aligned(told.links, mounts)
+    robot = Robot(
+        told.name, links, placed, tuple(chosen), coupled, stance=dict(stance), remarks=tuple(remarks),
+        torque_constant=_torque_constants(chosen, coupled),
+    )  # fmt: skip
+    _check_masses(robot)
+    leaders = {name: chosen[coupled.get(name, name)] for name in robot.motors}
+    return with_gains(robot, {name: (one.kp, one.kd) for name, one in leaders.items()})
+
+
+def lone(name: str, joints: Mapping[str, JointSettings]) -> Robot:
+    """Return servos of unknown load: a robot without a body.
+
+    Raises:
+        ConfigError: No joint is named, or one has no limits of torque and speed.
+    """
+    if not joints:
+        raise ConfigError("joints", "names no joint; without a urdf they have to be named")
+    nowhere, endless = np.zeros(3), {"lower": -ENDLESS, "upper": ENDLESS}
+    hinges = [
+        Hinge(one, "revolute", "base", one, nowhere, np.eye(3), np.array([0.0, 1.0, 0.0]), endless, None)
+        for one in joints
+    ]
+    driven = {hinge.name: _driven(hinge, joints[hinge.name]) for hinge in hinges}
+    inertias = {one: joints[one].inertia or driven[one].armature for one in joints}
+    links, placed = lone_servos(driven, inertias)
+    remark = "no body: every joint turns a load of its own, which effects of the base's links may put off its axis"
+    robot = Robot(
+        name, links, placed, tuple(joints), ranges=unknown_loads(driven), remarks=(remark,),
+        torque_constant=_torque_constants(joints, {}),
+    )  # fmt: skip
+    return with_gains(robot, {one: (told.kp, told.kd) for one, told in joints.items()})
+
+
+def _drivable(hinges: Sequence[Hinge]) -> list[str]:
+    return [hinge.name for hinge in hinges if hinge.kind in TURNING and hinge.follows is None]
+
+
+def _check(chosen: Mapping[str, JointSettings], held: Mapping[str, float], known: Mapping[str, Hinge]) -> None:
+    for name in (*chosen, *held):
+        if name not in known:
+            role = "joints" if name in chosen else "held"
+            raise ConfigError(f"{role}.{name}", f"the URDF has no such joint{did_you_mean(name, known, listed=True)}")
+    for name in chosen:
+        hinge = known[name]
+        if hinge.kind not in TURNING:
+            problem = f"is {hinge.kind}; only joints that turn can be controlled, others are held"
+            raise ConfigError(f"joints.{name}", problem)
+        if hinge.follows:
+            raise ConfigError(f"joints.{name}", f"follows {hinge.follows[0]} (<mimic>); control that one")
+    if not chosen:
+        raise ConfigError("joints", "the URDF has no joint that turns, so nothing can be controlled")
+
+
+def _driven(hinge: Hinge, told: JointSettings) -> Joint:
+    own = {"effort": told.effort, "velocity": told.velocity, "lower": told.lower, "upper": told.upper}
+    limit = {**hinge.limit, **{key: value for key, value in own.items() if value is not None}}
+    if hinge.kind == "continuous":
+        limit = {"lower": -ENDLESS, "upper": ENDLESS, **limit}
+    for key, what in (("effort", "peak torque [N·m]"), ("velocity", "speed without load [rad/s]")):
+        if not limit.get(key, 0.0) > 0.0:
+            has = f"has no {key}" if key not in limit else f"has {key} {limit[key]:g}, a placeholder"
+            raise ConfigError(f"joints.{hinge.name}", f"{has}; write its motor's {what} in <limit>, or in a robot file")
+    lower, upper = limit.get("lower", 0.0), limit.get("upper", 0.0)
+    if not lower < upper:
+        raise ConfigError(f"joints.{hinge.name}", f"its limits are {lower:g} and {upper:g} rad: it could not move")
+    effort, velocity = limit["effort"], limit["velocity"]
+    armature = armature_of(effort, velocity) if told.armature is None else told.armature
+    origin, axis = hinge.origin, hinge.axis
+    return Joint(hinge.name, hinge.parent, hinge.child, origin, axis, lower, upper, velocity, effort, armature)
+
+
+def _coupled(hinge: Hinge, leader: JointSettings) -> Mount:
+    """Return a joint that follows another, turned and shifted such that its angle is that of the leader."""
+    assert hinge.follows is not None
+    _, ratio, offset = hinge.follows
+    joint = _driven(hinge, replace(leader, lower=None, upper=None))
+    lower, upper = sorted(ratio * (end - offset) for end in (joint.lower, joint.upper))
+    shifted = hinge.turn @ rotation(hinge.axis, offset)
+    return Mount(replace(joint, axis=ratio * joint.axis, lower=lower, upper=upper), shifted)
+
+
+def _held(hinge: Hinge, place: float) -> Mount:
+    """Return a joint that does not move, its frames those that it has where it is held."""
+    turn, origin = hinge.turn, hinge.origin
+    if hinge.kind in TURNING:
+        turn = turn @ rotation(hinge.axis, place)
+    elif hinge.kind == "prismatic":
+        origin = origin + turn @ hinge.axis * place
+    joint = Joint(hinge.name, hinge.parent, hinge.child, origin, hinge.axis, 0.0, 0.0, 0.0, 0.0, fixed_at=0.0)
+    return Mount(joint, turn)
+
+
+def _place(hinge: Hinge, held: Mapping[str, float]) -> float:
+    """Return where a joint is held [rad], or [m] if it slides: where the user says, else as near to 0 as it goes."""
+    lower, upper = hinge.limit.get("lower", -math.inf), hinge.limit.get("upper", math.inf)
+    return held.get(hinge.name, min(max(0.0, lower), max(upper, lower)))
+
+
+def _remark(hinge: Hinge, place: float) -> str:
+    why = f"{hinge.kind}, which cannot be driven" if hinge.kind not in TURNING else "not controlled"
+    if hinge.follows:
+        why = f"follows {hinge.follows[0]} by a factor of {hinge.follows[1]:g}; only 1 and -1 can be driven"
+    return f"joint {hinge.name} is held at {place:g} {'m' if hinge.kind == 'prismatic' else 'rad'} ({why})"
+
+
+def _torque_constants(chosen: Mapping[str, JointSettings], coupled: Mapping[str, str]) -> dict[str, float]:
+    return {name: chosen[coupled.get(name, name)].torque_constant for name in (*chosen, *coupled)}
+
+
+def _check_masses(robot: Robot) -> None:
+    body = lumped(robot)
+    for joint in body.joints:
+        if body.links[joint.child].mass <= 0.0:
+            problem = f"it moves the link '{joint.child}', which has no mass; give that an <inertial>"
+            raise ConfigError(f"joints.{joint.name}", problem)

@@ -1,0 +1,128 @@
+"""A robot from a user's file: a URDF as it is, or a yaml that says what a URDF leaves open, or of servos alone.
+
+    urdf: arm.urdf                # beside this file; without it every joint is a servo of its own with an unknown load
+    joints:                       # those that an action names, in this order; the others are held
+      shoulder: {kp: 40, kd: 1.2, armature: 0.005, effort: 3.0, velocity: 6.0}
+      elbow: {}                   # what is left out comes from the URDF, or from defaults.py
+
+docs/robots.md tells all of it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import yaml
+
+from gsl.core.body import Robot
+from gsl.core.setting import component, setting
+from gsl.core.validation import did_you_mean, make
+from gsl.effects.effect import check_ranges
+from gsl.errors import ConfigError, InputError
+from gsl.robots.hinges import JointSettings, from_description, lone
+from gsl.robots.urdf_xml import read_description
+
+YAML = (".yaml", ".yml")
+SUFFIXES = (".urdf", ".xacro", ".xml", *YAML)
+
+
+@component
+class RobotSettings:
+    """What a robot's yaml file may say."""
+
+    urdf: Annotated[str | None, setting("the body, beside this file; none for servos of unknown load")] = None
+    name: Annotated[str | None, setting("of the robot; that of the URDF by default", min_length=1)] = None
+    joints: Annotated[Mapping[str, Any] | None, setting("controlled joints in order, with what is known of them")] = (
+        None
+    )
+    held: Annotated[Mapping[str, float], setting("where the other joints are held [rad], [m]")] = field(
+        default_factory=dict
+    )
+    groups: Annotated[Mapping[str, tuple[str, ...]], setting("names for sets of joints")] = field(default_factory=dict)
+    stance: Annotated[Mapping[str, float], setting("a usual posture, others at 0", unit="rad")] = field(
+        default_factory=dict
+    )
+    encoder_step: Annotated[float, setting("resolution of the encoders", unit="rad", ge=0)] = 2.0 * math.pi / 4096
+    encoder_side: Annotated[str, setting("output or motor", pattern="^(output|motor)$")] = "output"
+    supply_voltage: Annotated[float, setting("without load", unit="V", gt=0)] = 12.0
+    no_load_speed: Annotated[float, setting("factor on the joints' velocity", gt=0)] = 1.0
+    ranges: Annotated[
+        Mapping[str, Mapping[str, tuple[float, float]]], setting("ranges of effects' parameters for this robot")
+    ] = field(default_factory=dict)
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Return the files that a robot is read from: the file itself, and the URDF that it names."""
+    named = _settings(path).urdf if path.suffix in YAML else None
+    return (path,) if named is None else (path, path.parent / named)
+
+
+def from_file(path: Path) -> Robot:
+    """Read a robot.
+
+    Raises:
+        InputError: A file cannot be read, or what it says cannot be a robot.
+    """
+    told = _settings(path) if path.suffix in YAML else RobotSettings(urdf=path.name)
+    joints = None if told.joints is None else _joints(told.joints, path)
+    try:
+        if told.urdf is not None:
+            robot = from_description(read_description(path.parent / told.urdf), joints, told.held, told.stance)
+        else:
+            robot = lone(told.name or path.stem, joints or {})
+        return _completed(robot, told)
+    except ConfigError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _completed(robot: Robot, told: RobotSettings) -> Robot:
+    for group, members in told.groups.items():
+        for name in members:
+            _check_motor(robot, name, f"groups.{group}")
+    for name in told.stance:
+        _check_motor(robot, name, "stance")
+    for effect, ranges in told.ranges.items():
+        check_ranges(effect, ranges)
+    return replace(
+        robot,
+        name=re.sub(r"[^\w-]+", "_", told.name or robot.name),
+        groups=dict(told.groups),
+        stance=dict(told.stance),
+        encoder_step=told.encoder_step,
+        encoder_side=told.encoder_side,
+        supply_voltage=told.supply_voltage,
+        no_load_speed=told.no_load_speed,
+        ranges={**robot.ranges, **told.ranges},
+    )
+
+
+def _check_motor(robot: Robot, name: str, where: str) -> None:
+    if name not in robot.motors:
+        raise ConfigError(where, f"'{name}' is no controlled joint{did_you_mean(name, robot.motors, listed=True)}")
+
+
+def _settings(path: Path) -> RobotSettings:
+    try:
+        told = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is not YAML, or damaged: {' '.join(str(error).split())}") from error
+    if not isinstance(told, Mapping):
+        raise InputError(f"{path}: says nothing of a robot; see docs/robots.md")
+    try:
+        return make(RobotSettings, told)
+    except ConfigError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _joints(told: Mapping[str, Any], path: Path) -> dict[str, JointSettings]:
+    try:
+        return {str(name): make(JointSettings, entry or {}, where=f"joints.{name}") for name, entry in told.items()}
+    except (ConfigError, TypeError) as error:
+        raise InputError(f"{path}: {error}") from error

@@ -1,0 +1,249 @@
+"""What a URDF says, element by element: links, joints and primitive shapes in its own frames, and what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+from xml.etree import ElementTree as xml
+
+import numpy as np
+
+from gsl.core.body import Link, Shape
+from gsl.core.validation import did_you_mean
+from gsl.errors import InputError
+from gsl.robots.frames import euler, rpy
+
+T = TypeVar("T")
+
+LARGEST = 20e6  # of a file that is read [bytes]
+PRIMITIVES = ("box", "sphere", "cylinder")
+TURNING = ("revolute", "continuous")
+_LIMITS = ("lower", "upper", "effort", "velocity")
+_GREY = (0.75, 0.77, 0.8, 1.0)
+KINDS = (*TURNING, "fixed", "prismatic")
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """A joint as it is written.
+
+    Attributes:
+        kind: One of `KINDS`.
+        origin: Of the child's frame in the parent's [m], shape (3,).
+        turn: From the child's axes to the parent's, shape (3, 3).
+        axis: In the child's frame, of length 1, shape (3,).
+        limit: What <limit> says: lower, upper, effort, velocity.
+        follows: Joint, multiplier and offset [rad] of <mimic>, if there is one.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: np.ndarray
+    turn: np.ndarray
+    axis: np.ndarray
+    limit: dict[str, float]
+    follows: tuple[str, float, float] | None
+
+
+@dataclass(frozen=True)
+class Description:
+    """A whole file.
+
+    Attributes:
+        name: Of the robot.
+        links: By name, the base first.
+        hinges: Parents before children.
+        remarks: What was left out.
+    """
+
+    name: str
+    links: dict[str, Link]
+    hinges: tuple[Hinge, ...]
+    remarks: tuple[str, ...]
+
+
+def read_description(path: Path) -> Description:
+    """Read a URDF.
+
+    Raises:
+        InputError: It cannot be read, or is not a tree of links with names, numbers and known joints.
+    """
+    root = _root(path)
+    try:
+        remarks = [*_meshes(root), *_dynamics(root)]
+        links = {link.name: link for link in _each(root, "link", _link)}
+        base, hinges = _tree(links, _each(root, "joint", _hinge))
+        ordered = {name: links[name] for name in (base, *(hinge.child for hinge in hinges))}
+        return Description(root.get("name") or path.stem, ordered, hinges, tuple(remarks))
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _root(path: Path) -> xml.Element:
+    try:
+        if path.stat().st_size > LARGEST:
+            raise InputError(f"{path}: is larger than {LARGEST / 1e6:g} MB; that is no URDF")
+        root = xml.parse(path).getroot()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except (xml.ParseError, ValueError, LookupError) as error:
+        raise InputError(f"{path}: is not XML, or damaged: {error}") from error
+    if root.tag != "robot":
+        raise InputError(f"{path}: is no URDF: its root is <{root.tag}>, not <robot>")
+    if "xacro" in path.suffix or any("xacro" in str(node.tag) for node in root.iter()):
+        raise InputError(f"{path}: holds xacro macros; expand them first: xacro {path.name} > robot.urdf")
+    return root
+
+
+def _each(root: xml.Element, tag: str, read: Callable[[str, xml.Element], T]) -> list[T]:
+    found: list[T] = []
+    names: set[str] = set()
+    for node in root.findall(tag):
+        name = node.get("name")
+        if not name:
+            raise ValueError(f"a <{tag}> has no name")
+        if name in names:
+            raise ValueError(f"two {tag}s are called '{name}'")
+        names.add(name)
+        try:
+            found.append(read(name, node))
+        except ValueError as error:
+            raise ValueError(f"{tag} '{name}': {error}") from error
+    return found
+
+
+def _link(name: str, node: xml.Element) -> Link:
+    inertial = node.find("inertial")
+    shapes = [shape for role in ("visual", "collision") for part in node.findall(role) for shape in _shape(part, role)]
+    if inertial is None:
+        return Link(name, 0.0, np.zeros(3), np.zeros((3, 3)), tuple(shapes))
+    com, turn = _origin(inertial)
+    mass = _number(inertial.find("mass"), "value", "<mass>")
+    xx, xy, xz, yy, yz, zz = (
+        _number(inertial.find("inertia"), f"i{pair}", "<inertia>") for pair in ("xx", "xy", "xz", "yy", "yz", "zz")
+    )
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if mass < 0.0 or np.linalg.eigvalsh(inertia).min() < -1e-9 * np.abs(inertia).max():
+        raise ValueError("a mass or a principal moment of inertia is negative; no body is like that")
+    return Link(name, mass, com, turn @ inertia @ turn.T, tuple(shapes))
+
+
+def _shape(node: xml.Element, role: str) -> list[Shape]:
+    """Return the primitive that a <visual> or <collision> is; a mesh is none."""
+    form = next((form for kind in PRIMITIVES if (form := node.find(f"geometry/{kind}")) is not None), None)
+    if form is None:
+        return []
+    centre, turn = _origin(node)
+    if form.tag == "box":
+        size = _numbers(form.get("size", ""), 3, "size of a <box>")
+    else:
+        names = ("radius",) if form.tag == "sphere" else ("radius", "length")
+        size = tuple(_number(form, name, f"<{form.tag}>") for name in names)
+    (x, y, z), attitude = centre.tolist(), rpy(turn)
+    if role == "collision":
+        return [Shape(form.tag, size, (x, y, z), collides=True, turn=attitude)]
+    colour = node.find("material/color")
+    red, green, blue, _ = _numbers(colour.get("rgba", ""), 4, "rgba of a <color>") if colour is not None else _GREY
+    return [Shape(form.tag, size, (x, y, z), turn=attitude, colour=(red, green, blue))]
+
+
+def _hinge(name: str, node: xml.Element) -> Hinge:
+    kind = node.get("type", "")
+    if kind not in KINDS:
+        raise ValueError(f"type '{kind}' is not supported; there are {', '.join(KINDS)}")
+    parent, child = (
+        end.get("link", "") if (end := node.find(role)) is not None else "" for role in ("parent", "child")
+    )
+    if not (parent and child):
+        raise ValueError("names no parent or no child link")
+    axis = node.find("axis")
+    way = np.array(_numbers(axis.get("xyz", ""), 3, "axis") if axis is not None else (1.0, 0.0, 0.0))
+    if kind != "fixed" and not np.linalg.norm(way) > 1e-9:
+        raise ValueError("its axis has no direction")
+    limit, mimic = node.find("limit"), node.find("mimic")
+    told = {key: _number(limit, key, "<limit>") for key in _LIMITS if limit is not None and limit.get(key) is not None}
+    follows = None
+    if mimic is not None:
+        ratio, offset = (
+            _number(mimic, key, "<mimic>", missing) for key, missing in (("multiplier", 1.0), ("offset", 0.0))
+        )
+        follows = (mimic.get("joint", ""), ratio, offset)
+    unit = way / np.linalg.norm(way) if way.any() else np.array([1.0, 0.0, 0.0])
+    return Hinge(name, kind, parent, child, *_origin(node), unit, told, follows)
+
+
+def _tree(links: dict[str, Link], hinges: Sequence[Hinge]) -> tuple[str, tuple[Hinge, ...]]:
+    """Return the base and the joints, parents before children, in the file's order otherwise."""
+    if not links:
+        raise ValueError("it has no link")
+    for hinge in hinges:
+        for end in (hinge.parent, hinge.child):
+            if end not in links:
+                raise ValueError(f"joint '{hinge.name}': there is no link '{end}'{did_you_mean(end, links)}")
+    children = [hinge.child for hinge in hinges]
+    roots = [name for name in links if name not in children]
+    if len(roots) != 1 or len(set(children)) != len(children):
+        raise ValueError(f"it is no tree: {_knot(roots, children)}")
+    ordered: list[Hinge] = []
+    waiting, reached = list(hinges), {roots[0]}
+    while ready := [hinge for hinge in waiting if hinge.parent in reached][:1]:
+        ordered += ready
+        reached.add(ready[0].child)
+        waiting.remove(ready[0])
+    if waiting:
+        raise ValueError(f"it is no tree: {waiting[0].child} hangs in a loop")
+    return roots[0], tuple(ordered)
+
+
+def _knot(roots: Sequence[str], children: Sequence[str]) -> str:
+    if len(roots) > 1:
+        return f"{' and '.join(roots)} hang on nothing; one link alone is the base"
+    twice = [name for name in children if children.count(name) > 1]
+    return f"{twice[0]} is the child of two joints" if twice else "its links hang in a loop"
+
+
+def _meshes(root: xml.Element) -> list[str]:
+    files = sorted({mesh.get("filename", "") for mesh in root.iter("mesh")})
+    if not files:
+        return []
+    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    return [f"meshes are not read ({Path(files[0]).name}{more}): they do not show, and nothing collides with them"]
+
+
+def _dynamics(root: xml.Element) -> list[str]:
+    found = [joint.get("name", "") for joint in root.findall("joint") if joint.find("dynamics") is not None]
+    if not found:
+        return []
+    return [f"<dynamics> is not read ({', '.join(found)}): write friction as effects of the world"]
+
+
+def _origin(node: xml.Element) -> tuple[np.ndarray, np.ndarray]:
+    origin = node.find("origin")
+    if origin is None:
+        return np.zeros(3), np.eye(3)
+    place = _numbers(origin.get("xyz", "0 0 0"), 3, "xyz of an <origin>")
+    return np.array(place), euler(*_numbers(origin.get("rpy", "0 0 0"), 3, "rpy of an <origin>"))
+
+
+def _number(node: xml.Element | None, key: str, where: str, missing: float | None = None) -> float:
+    text = None if node is None else node.get(key)
+    if text is None and missing is not None:
+        return missing
+    if text is None:
+        raise ValueError(f"{where} lacks {key}")
+    return _numbers(text, 1, f"{key} of {where}")[0]
+
+
+def _numbers(text: str, count: int, where: str) -> tuple[float, ...]:
+    try:
+        values = tuple(float(word) for word in text.split())
+    except ValueError:
+        values = ()
+    if len(values) != count or not np.isfinite(values).all():
+        wanted = "a finite number" if count == 1 else f"{count} finite numbers"
+        raise ValueError(f"{where} must be {wanted}, not '{text}'")
+    return values
