@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from commands import done, refused
 from test_diagnosis import PERIOD, QUICK, arm, log
 
 from gsl.core.plant import nominal
@@ -15,7 +18,9 @@ from gsl.diagnosis.diagnose import diagnosed
 from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.nuisance import none
+from gsl.effects.effect import names
 from gsl.errors import InputError
+from gsl.storage.trajectories import write
 
 SOFT = {"servo_gain": {"kp": 0.5}}
 
@@ -87,3 +92,25 @@ def test_windows_without_torque_are_left_out() -> None:
     every = experiment(whole, arm()).pieces
     ends = (some.tick[some.record == 0] + some.real.shape[1]) * PERIOD
     assert len(some) < len(every) and ends.max() <= 75 * PERIOD
+
+
+def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
+    made = both(command_latency={"delay": 0.016})
+    about = {"robot": "arm", "role": "imported", "source": "test", "seed": 1, **made.metadata}
+    write(tmp_path / "logs.parquet", replace(made, metadata=about))
+    line = ("real=logs.parquet", "sim.robot=blind_arm.arm", "sim.floating=false", "most=1", "nulls=0", "duels=0")
+    small = f"without=[{','.join(set(names()) - {'command_latency', 'coulomb_friction', 'viscous_friction'})}]"
+    done("cross-validate", *line, small, "by=gain", "workers=1", "name=c", folder=tmp_path)
+    folder = tmp_path / "runs/c/cross_validate"
+    folds = json.loads((folder / "folds.json").read_text())
+    assert [one["value"] for one in folds] == [0.5, 1.0]
+    assert all(one["causes"] == ["command_latency"] for one in folds)
+    for one in folds:
+        errors = {way: np.mean(values) for way, values in one["errors"].items()}
+        assert errors["diagnosed"] < 0.3 * errors["coulomb + viscous"]
+        assert errors["diagnosed"] < 0.3 * errors["as it was"]
+        assert len(one["names"]) == 9
+    table = (folder / "table.md").read_text()
+    assert "in 18 of 18 trajectories" in table
+    said = refused("cross-validate", *line, "by=date", folder=tmp_path)
+    assert said == "by = date: needs a label with two values at least; the log's labels: conditions, gain, policy"
