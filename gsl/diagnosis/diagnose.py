@@ -52,6 +52,7 @@ class Findings:
         shift: Between the clocks of commands and measurements, taken out first [s], if they are apart.
         refuted: Effects that fitted but lost their claim to the name, with the reason.
         seed: Of what was drawn.
+        tolerance: Difference of a joint that does not matter [rad].
     """
 
     experiment: Experiment
@@ -65,6 +66,7 @@ class Findings:
     shift: float = 0.0
     refuted: Mapping[str, str] = field(default_factory=dict)
     seed: int = 0
+    tolerance: float = 0.0
 
     @property
     def answer(self) -> Hypothesis:
@@ -98,6 +100,8 @@ def diagnosed(
         known_nulls: What chance gained on these commands in this world, if it is known already.
     """
     found = experiment(log, robot, walking=walking, held_out=options.held_out)
+    if options.tolerance:
+        found = found.with_model_error(_tolerated(found, options.tolerance))
     if not len(found.train) or not len(found.held_out):
         raise InputError(
             "too little to fit and to check: two motions, or one trajectory, of some seconds are the least"
@@ -138,8 +142,14 @@ def diagnosed(
     expected = _expected(selection, trials, shakes=shaking > 0.0) * (1.0 + found.noise.slack)
     verdict = judged(selection, expected, _margins(trials, survivors), doubt, walking=walking, lone=not found.by_record)
     return Findings(
-        found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong, options.seed
-    )
+        found, arena.train.simulator, arena, selection, verdict, nulls, trials, baseline, shift, wrong, options.seed,
+        options.tolerance,
+    )  # fmt: skip
+
+
+def _tolerated(found: Experiment, tolerance: float) -> np.ndarray:
+    """Return what does not matter of each channel, shape (n_channels,): of joints alone."""
+    return np.where(np.arange(len(found.channels)) < len(found.joints), tolerance, 0.0)
 
 
 def _shaking(found: Experiment) -> float:

@@ -22,6 +22,7 @@ from gsl.effects.effect import effect_class
 
 RANKED = 12  # hypotheses that are listed
 ASKED, STUCK = 0.05, 0.1  # command [rad], and share of it, below which a joint that moves less does not move
+ROUGH = 4.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
 FAR_OFF = 5.0  # spreads of the calibration beyond which it is told
 WIDER = 2.0  # than white noise makes them: what is left of a joint hangs together in time and over nuisances. Estimate
 REPLAYS, SHOWN = 6, 400  # pictures of replays, and their ticks at most
@@ -175,6 +176,15 @@ def _caveats(found: Findings) -> list[str]:
         said.append("Few trajectories are held out: intervals are over parts of them and may be too narrow.")
     if not found.trials and found.verdict.causes and not exp.walking:
         said.append("No self-test was made (duels=0): probabilities are those of the fit alone, and too sure.")
+    if found.tolerance:
+        said.append(
+            f"Differences below {1e3 * found.tolerance:.0f} mrad count as noise (tolerance): smaller causes cannot show."
+        )
+    elif found.verdict.word == "unknown" and found.verdict.remaining > ROUGH:
+        said.append(
+            "What is left is far above the noise, and everything counts as an outlier: say with tolerance=0.02 [rad] "
+            "what does not matter, and the larger causes come out."
+        )
     if exp.comparison.shaking.any():
         names = ", ".join(name for name, shakes in zip(exp.channels, exp.comparison.shaking, strict=True) if shakes)
         said.append(f"These joints shake while their commands rest and are judged by the spectrum: {names}.")

@@ -22,6 +22,7 @@ class Options:
         clocks: Whether commands and measurements have one clock; else latency is not claimed.
         spread: Of the robot's calibration about the simulator's, as a share of the usual spread of one make.
         seed: Of the simulated logs and of the learned residual.
+        tolerance: Difference of a joint that does not matter, beside the noise [rad]: the model's roughness.
         held_out: Labels of the trajectories that are for checking; empty for every second motion.
     """
 
@@ -33,6 +34,7 @@ class Options:
     clocks: bool = True
     spread: float = 1.0
     seed: int = 0
+    tolerance: float = 0.0
     held_out: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

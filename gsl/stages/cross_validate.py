@@ -55,6 +55,9 @@ class CrossValidate:
     most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
+    tolerance: Annotated[
+        float, setting("difference of a joint that does not matter, beside the noise", unit="rad", ge=0)
+    ] = 0.0
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
@@ -93,7 +96,7 @@ class CrossValidate:
         console.status(f"{self.by} {value} is held out")
         options = Options(
             self.without, self.most, self.duels, self.nulls, threads(self.workers), self.clocks == "synchronised",
-            seed=self.seed, held_out={self.by: value},
+            seed=self.seed, tolerance=self.tolerance, held_out={self.by: value},
         )  # fmt: skip
         plant = self.sim.plant
         found = diagnosed(log, lumped(plant.robot), plant, self.sim.step, options, lambda phase: checkpoint())

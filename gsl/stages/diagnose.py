@@ -59,6 +59,9 @@ class Diagnose:
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
     workers: Workers = -1
+    tolerance: Annotated[
+        float, setting("difference of a joint that does not matter, beside the noise", unit="rad", ge=0)
+    ] = 0.0
     held_out: Annotated[
         Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
     ] = field(default_factory=dict)
@@ -120,7 +123,15 @@ class Diagnose:
         clocks = self.clocks == "synchronised"
         workers = threads(self.workers)
         return Options(
-            self.without, self.most, self.duels, self.nulls, workers, clocks, seed=self.seed, held_out=self.held_out
+            self.without,
+            self.most,
+            self.duels,
+            self.nulls,
+            workers,
+            clocks,
+            seed=self.seed,
+            tolerance=self.tolerance,
+            held_out=self.held_out,
         )
 
     def _policy_gap(self, measured: RealReturns, found: Findings, console: Any) -> Mapping[str, Any]:
@@ -163,6 +174,7 @@ class Diagnose:
         said = [f"real={self.real}"]
         said += [f"reference={self.reference}"] if self.reference else []
         said += [f"without=[{','.join(self.without)}]"] if self.without else []
+        said += [f"tolerance={self.tolerance:g}"] if self.tolerance else []
         held = ", ".join(f"{key}: {value}" for key, value in self.held_out.items())
         said += [f"held_out={{{held}}}"] if held else []
         said += [f"clocks={self.clocks}"] if self.clocks != "synchronised" else []
