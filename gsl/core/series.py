@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-SAME = 1e-9  # stamps that differ by less are one [s]
+SAME = 1e-6  # stamps that differ by less are one: as numbers, seconds since 1970 are told to 2e-7 [s]
 FINEST = 400  # points of a signal's grid a second, when lags are measured
 POINTS = 60_000  # of a grid at most
 

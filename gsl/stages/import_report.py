@@ -13,6 +13,7 @@ from gsl.storage.importers.suspicions import MOVES, STUCK, Suspicion, is_clear, 
 from gsl.storage.trajectory_contract import UNITS
 
 UNEVEN = 0.5  # of a period, by which a row may be early or late before a diagnosis refuses it
+RATES = 0.1  # relative, by which episodes may differ in their rate
 SHOWN = 40  # rows of a table
 
 Document = dict[str, Any]
@@ -40,7 +41,8 @@ def report(found: Sequence[Episode], files: int, period: float | None) -> Docume
 
 def nominal(found: Sequence[Episode], period: float | None) -> float:
     """Return the control period of the file [s]: what was resampled to, or the median step."""
-    return period or float(np.round(np.median(np.concatenate([one.steps for one in found])), 6))
+    middle = np.quantile(np.concatenate([one.steps for one in found]), 0.5, method="lower")
+    return period or float(np.round(middle, 6))
 
 
 def _words(one: Suspicion) -> str:
@@ -49,7 +51,7 @@ def _words(one: Suspicion) -> str:
 
 def _episode(one: Episode, lags: Sequence[Lag]) -> Document:
     steps = one.steps
-    clear = max((lag for lag in lags if is_clear(lag)), key=lambda lag: lag.contrast, default=None)
+    clear = [lag.seconds for lag in lags if is_clear(lag)]
     return {
         **one.label,
         "rows": len(steps) + 1,
@@ -59,7 +61,7 @@ def _episode(one: Episode, lags: Sequence[Lag]) -> Document:
         "rate": float(1.0 / np.median(steps)),
         "jitter": float(np.std(steps)),
         "longest_step": float(steps.max()),
-        "lag": clear.seconds if clear else None,
+        "lag": float(np.median(clear)) if clear else None,
     }
 
 
@@ -117,8 +119,9 @@ def _of_rates(found: Sequence[Episode], period: float | None) -> Iterator[str]:
         return
     step = nominal(found, period)
     far = max(float(np.abs(one.steps - step).max()) for one in found)
-    if far > UNEVEN * step:
-        told = f"steps differ from {step:g} s by up to {far:.3g} s" if np.ptp(usual) < 0.1 * step else _rates(usual)
+    alike = np.ptp(usual) < RATES * step
+    if far > UNEVEN * step or not alike:
+        told = f"steps differ from {step:g} s by up to {far:.3g} s" if alike else _rates(usual)
         yield f"time: {told}; gsl diagnose wants even rows: mapping.period={step:.2g} resamples"
 
 

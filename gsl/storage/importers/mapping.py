@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BeforeValidator
 
@@ -14,28 +15,36 @@ from gsl.storage.importers.signal import KNOWN, Signal, Time
 from gsl.storage.importers.units import factor
 from gsl.storage.trajectory_contract import UNITS, suggestion
 
+T = TypeVar("T")
+
 
 def _time(value: Any) -> Time:
-    if isinstance(value, str):
-        return make(Time, {"column": value}, where="time")
-    return value if isinstance(value, Time) else make(Time, _dictionary("time", value), where="time")
+    if isinstance(value, Time):
+        return value
+    return _made(Time, {"column": value} if isinstance(value, str) else value, "time")
 
 
 def _signals(value: Any) -> dict[str, Signal]:
-    return {str(name): _signal(str(name), one) for name, one in _dictionary("signals", value).items()}
+    return {str(name): _signal(one, f"signals.{name}") for name, one in _dictionary(value, "signals").items()}
 
 
-def _signal(name: str, value: Any) -> Signal:
+def _signal(value: Any, where: str) -> Signal:
     if isinstance(value, Signal):
         return value
-    if isinstance(value, str | int | list) and not isinstance(value, bool):
-        return make(Signal, {"column": value}, where=f"signals.{name}")
-    return make(Signal, _dictionary(f"signals.{name}", value), where=f"signals.{name}")
+    alone = isinstance(value, str | int | list) and not isinstance(value, bool)
+    return _made(Signal, {"column": value} if alone else value, where)
 
 
-def _dictionary(where: str, value: Any) -> dict[str, Any]:
+def _made(kind: Callable[..., T], value: Any, where: str) -> T:
+    try:
+        return make(kind, _dictionary(value, ""))
+    except ConfigError as error:
+        raise error.under(where) from error
+
+
+def _dictionary(value: Any, where: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise ConfigError(where, "must be a column or settings such as {column: ..., unit: ...}", given=str(value))
+        raise ConfigError(where, "must be settings such as {column: ..., unit: ...}", given=str(value))
     return value
 
 

@@ -49,12 +49,9 @@ def suspicions(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> list[
 def lags_of(episode: Episode) -> list[Lag]:
     """Return how far each joint's position comes after its command; zero where the command does not move."""
     one = episode.trajectory
-    return [
-        lag(one.action[:, k], one.position[:-1, k], one.time[:-1])
-        if np.ptp(one.action[:, k]) > MOVES
-        else Lag(0.0, 0.0)
-        for k in range(len(episode.joints))
-    ]
+    moving = [float(np.ptp(command)) > MOVES for command in one.action.T]
+    pairs = zip(one.action.T, one.position[:-1].T, moving, strict=True)
+    return [lag(command, position, one.time[:-1]) if moves else NONE for command, position, moves in pairs]
 
 
 def saturated(values: np.ndarray, command: np.ndarray) -> float:

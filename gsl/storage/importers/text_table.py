@@ -19,7 +19,7 @@ from gsl.storage.importers.table import missing_column, numbers
 if TYPE_CHECKING:
     import pandas as pd
 
-ROWS = 100_000  # read at once
+CELLS = 2_000_000  # read at once
 FACTOR = 100.0  # bytes of text that may be read for one of memory: only the wanted columns stay
 BLANKS = r"\s+"
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
@@ -64,8 +64,9 @@ class TextTable:
     def _pieces(self, wanted: Sequence[str]) -> Any:
         import pandas as pd
 
-        options = {"usecols": list(dict.fromkeys(wanted)), "chunksize": ROWS, "decimal": self.decimal}
-        options |= {"header": None, "names": self.names, "skiprows": int(self.header), "index_col": False}
+        # without usecols, with which pandas takes rows of any length
+        options = {"chunksize": max(1000, CELLS // len(self.names)), "decimal": self.decimal, "header": None}
+        options |= {"names": self.names, "skiprows": int(self.header), "index_col": False}
         with opened(self.path, most=FACTOR * self.memory, lines=True) as file, warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
             try:

@@ -1,0 +1,270 @@
+"""Foreign logs become trajectories: the same motion comes out of every format, unit, clock and spelling."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from commands import done
+
+from gsl.core.trajectory import Batch
+from gsl.storage.trajectories import read
+
+JOINTS = ("shoulder", "elbow")
+PERIOD = 0.01
+TIME = PERIOD * np.arange(301)
+LAG = 0.05
+
+
+def waves(time: np.ndarray) -> np.ndarray:
+    return np.column_stack([0.5 * np.sin(2.0 * np.pi * 0.7 * time), 0.3 + 0.4 * np.sin(2.0 * np.pi * 1.1 * time)])
+
+
+ACTION, POSITION = waves(TIME), waves(TIME - LAG)
+
+
+def csv(path: Path, columns: dict[str, np.ndarray], separator: str = ",") -> Path:
+    rows = zip(*columns.values(), strict=True)
+    lines = [separator.join(columns), *(separator.join(map(str, row)) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def joint_columns(prefix: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    return {f"{prefix}_{joint}": column for joint, column in zip(JOINTS, values.T, strict=True)}
+
+
+def plain() -> dict[str, np.ndarray]:
+    return {"t": TIME, **joint_columns("goal", ACTION), **joint_columns("q", POSITION)}
+
+
+def mapping(file: Path, **settings: Any) -> str:
+    told = {
+        "joints": list(JOINTS),
+        "time": {"column": "t"},
+        "signals": {"action": "goal_{joint}", "position": "q_{joint}"},
+        **settings,
+    }
+    file.write_text(yaml.safe_dump(told, sort_keys=False))
+    return f"mapping={file}"
+
+
+def imported(folder: Path, source: Path | str, chosen: str, *more: str) -> Batch:
+    done("import", f"source={source}", chosen, "name=log", *more, folder=folder)
+    return read(folder / "runs/log/import/trajectories.parquet")
+
+
+def check_same(batch: Batch, tolerance: float = 1e-9) -> None:
+    assert batch.joints == JOINTS
+    (episode,) = batch.episodes
+    np.testing.assert_allclose(episode.time, TIME, atol=tolerance)
+    np.testing.assert_allclose(episode.action, ACTION[:-1], atol=tolerance)
+    np.testing.assert_allclose(episode.position, POSITION, atol=tolerance)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+def test_a_text_table_is_read_whatever_separates_its_columns(tmp_path: Path, separator: str) -> None:
+    source = csv(tmp_path / "log.csv", plain(), separator)
+    check_same(imported(tmp_path, source, mapping(tmp_path / "m.yaml")))
+
+
+def test_decimal_commas_and_a_packed_file_are_read(tmp_path: Path) -> None:
+    text = csv(tmp_path / "log.csv", plain(), ";").read_text().replace(".", ",")
+    (tmp_path / "log.csv.gz").write_bytes(gzip.compress(text.encode()))
+    check_same(imported(tmp_path, tmp_path / "log.csv.gz", mapping(tmp_path / "m.yaml")))
+
+
+def test_columns_without_a_header_are_called_by_number(tmp_path: Path) -> None:
+    path = tmp_path / "log.txt"
+    np.savetxt(path, np.column_stack([TIME, ACTION, POSITION]))
+    signals = {"action": [1, 2], "position": [3, 4]}
+    check_same(imported(tmp_path, path, mapping(tmp_path / "m.yaml", time={"column": "0"}, signals=signals)))
+
+
+def test_a_document_of_nested_records_is_read(tmp_path: Path) -> None:
+    rows = [
+        {"t": t, "cmd": {"q": list(a)}, "state": {"q": list(q)}} for t, a, q in zip(TIME, ACTION, POSITION, strict=True)
+    ]
+    signals = {"action": "cmd.q", "position": ["state.q[0]", "state.q[1]"]}
+    for name, text, records in (
+        ("log.json", json.dumps({"run": {"rows": rows}, "kp": 7}), "run.rows"),
+        ("log.jsonl", "\n".join(map(json.dumps, rows)), ""),
+        ("list.json", json.dumps(rows), ""),
+    ):
+        (tmp_path / name).write_text(text)
+        chosen = mapping(tmp_path / "m.yaml", signals=signals, records=records)
+        check_same(imported(tmp_path, tmp_path / name, chosen, "force=true"))
+
+
+def test_a_document_of_lists_an_npz_and_a_parquet_file_are_read(tmp_path: Path) -> None:
+    import pandas
+
+    columns = {"t": TIME, "goal": ACTION, "q": POSITION}
+    lists = {name: values.tolist() for name, values in columns.items()}
+    (tmp_path / "log.json").write_text(json.dumps(lists))
+    np.savez(tmp_path / "log.npz", **columns)
+    pandas.DataFrame(lists).to_parquet(tmp_path / "log.parquet")
+    chosen = mapping(tmp_path / "m.yaml", signals={"action": "goal", "position": "q"})
+    for name in ("log.json", "log.npz", "log.parquet"):
+        check_same(imported(tmp_path, tmp_path / name, chosen, "force=true"))
+
+
+def test_files_in_our_own_words_need_no_mapping(tmp_path: Path) -> None:
+    columns = {"time": TIME}
+    for group, values in (
+        ("action", ACTION),
+        ("position", POSITION),
+        ("velocity", np.gradient(POSITION, TIME, axis=0)),
+    ):
+        columns |= {f"{group}.{joint}": column for joint, column in zip(JOINTS, values.T, strict=True)}
+    batch = imported(tmp_path, csv(tmp_path / "log.csv", columns), "mapping=plain")
+    check_same(batch)
+    assert batch.metadata["velocity"] == "as logged" and batch.metadata["role"] == "imported"
+
+
+def test_units_signs_zeros_and_old_names_are_converted(tmp_path: Path) -> None:
+    ticks = -(POSITION[:, 1] - 0.1) * 4096 / (2.0 * np.pi) + 2048
+    columns = {
+        "us": TIME * 1e6 + 5e9,
+        "a1": np.degrees(ACTION[:, 0]),
+        "a2": ACTION[:, 1],
+        "p1": np.degrees(POSITION[:, 0]),
+        "p2": ticks,
+        "mV": np.full(len(TIME), 7400.0),
+        "on": np.ones(len(TIME)),
+        "raw": np.full(len(TIME), 65535.0),
+    }
+    signals = {
+        "action": {"column": "a{joint}", "unit": {"shoulder": "deg"}},  # the elbow is in rad
+        "position": {
+            "column": {"shoulder": "p1", "elbow": "p2"},
+            "unit": {"shoulder": "deg", "elbow": "ticks/4096"},
+            "sign": {"elbow": -1},
+            "zero": {"elbow": 2048},
+            "offset": {"elbow": 0.1},
+        },
+        "voltage": {"column": "mV", "unit": "mV"},
+        "enabled": "on",
+        "load": {"column": "raw", "unit": "%", "bits": 16, "factor": 0.1},
+    }
+    joints = {"shoulder": "1", "elbow": "2"}
+    chosen = mapping(tmp_path / "m.yaml", joints=joints, time={"column": "us", "unit": "µs"}, signals=signals)
+    batch = imported(tmp_path, csv(tmp_path / "log.csv", columns), chosen)
+    check_same(batch, 1e-8)
+    sensors = batch.episodes[0].sensors
+    assert sensors["voltage"][0] == pytest.approx(7.4) and sensors["enabled"].all()
+    assert sensors["load"][0] == pytest.approx(-0.1) and batch.metadata["units"]["load"] == "%"
+
+
+def test_two_files_are_joined_by_time_and_a_clock_that_is_ahead_is_set_back(tmp_path: Path) -> None:
+    folder = tmp_path / "day_1" / "sweep"
+    folder.mkdir(parents=True)
+    csv(folder / "control.csv", {"t": TIME + 2.0, **joint_columns("goal", ACTION)})
+    csv(folder / "state.csv", {"t": TIME, **joint_columns("q", POSITION)})
+    chosen = mapping(
+        tmp_path / "m.yaml",
+        files={"control": "control.csv", "state": "state.csv"},
+        signals={
+            "action": {"file": "control", "column": "goal_{joint}"},
+            "position": {"file": "state", "column": "q_{joint}"},
+        },
+        command_offset=2.0,
+        path="day_{day}/{motion}",
+        name="{motion}",
+        about={"day": "{day}", "kp": 16},
+    )
+    batch = imported(tmp_path, tmp_path, chosen)
+    check_same(batch)
+    assert batch.metadata["episodes"] == [{"policy": "sweep", "day": "1", "kp": 16, "file": "day_1/sweep"}]
+
+
+def test_commands_are_held_and_positions_interpolated_when_time_is_made_even(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    time = np.cumsum(rng.uniform(0.004, 0.012, 400))
+    action, position = np.floor(4.0 * time)[:, None] * [0.1, 0.02], time[:, None] * [0.2, -0.1]
+    columns = {"t": time, **joint_columns("goal", action), **joint_columns("q", position)}
+    source = csv(tmp_path / "log.csv", columns)
+    kept = imported(tmp_path, source, mapping(tmp_path / "m.yaml"))
+    np.testing.assert_allclose(kept.episodes[0].time, time - time[0], atol=1e-12)
+    assert kept.metadata["time"] == "rows kept as logged"
+    even = imported(tmp_path, source, mapping(tmp_path / "m.yaml", period=0.005), "force=true")
+    (episode,) = even.episodes
+    assert even.control_period == 0.005 and even.metadata["time"].startswith("resampled to 0.005 s")
+    np.testing.assert_allclose(np.diff(episode.time), 0.005, atol=1e-12)
+    np.testing.assert_allclose(episode.position, (episode.time + time[0])[:, None] * [0.2, -0.1], atol=1e-9)
+    assert set(np.unique(episode.action.round(9))) <= set(np.unique(action.round(9)))
+
+
+def test_velocities_are_derived_where_there_are_none(tmp_path: Path) -> None:
+    batch = imported(tmp_path, csv(tmp_path / "log.csv", plain()), mapping(tmp_path / "m.yaml"))
+    slopes = np.gradient(POSITION, TIME, axis=0)
+    np.testing.assert_allclose(batch.episodes[0].velocity, slopes, atol=1e-6)
+    assert batch.metadata["velocity"] == "derived from positions"
+
+
+def test_an_episode_is_cut_at_its_holes_and_what_precedes_the_first_command_is_dropped(tmp_path: Path) -> None:
+    keep = (TIME < 1.0) | (TIME > 1.5)
+    columns = {name: values[keep] for name, values in plain().items()}
+    batch = imported(tmp_path, csv(tmp_path / "log.csv", columns), mapping(tmp_path / "m.yaml"))
+    assert [label["part"] for label in batch.metadata["episodes"]] == [1, 2]
+    assert [len(one.time) for one in batch.episodes] == [100, 150]
+
+
+def test_a_column_can_tell_episodes_apart_and_empty_cells_can_mean_no_news(tmp_path: Path) -> None:
+    columns = {name: np.concatenate([values, values]) for name, values in plain().items()}
+    columns["run"] = np.repeat([3, 7], len(TIME))
+    for name in ("goal_shoulder", "goal_elbow"):
+        columns[name] = np.where(np.arange(len(columns[name])) % len(TIME) % 2, "", columns[name].astype(str))
+    chosen = mapping(tmp_path / "m.yaml", episode="run", blanks="skip", about={"run": "{run}"})
+    batch = imported(tmp_path, csv(tmp_path / "log.csv", columns), chosen)
+    assert [label["run"] for label in batch.metadata["episodes"]] == [3, 7]
+    np.testing.assert_allclose(batch.episodes[1].action[1], ACTION[0])
+    np.testing.assert_allclose(batch.episodes[1].position, POSITION)
+
+
+def test_the_same_log_twice_is_the_same_bytes_and_no_work(tmp_path: Path) -> None:
+    source, chosen = csv(tmp_path / "log.csv", plain()), mapping(tmp_path / "m.yaml")
+    done("import", f"source={source}", chosen, "name=a", folder=tmp_path)
+    first = (tmp_path / "runs/a/import/trajectories.parquet").read_bytes()
+    assert "(unchanged)" in done("import", f"source={source}", chosen, "name=a", folder=tmp_path).out
+    done("import", f"source={source}", chosen, "name=b", folder=tmp_path)
+    assert (tmp_path / "runs/b/import/trajectories.parquet").read_bytes() == first
+
+
+def test_a_check_writes_nothing_and_finds_the_lag(tmp_path: Path) -> None:
+    source, chosen = csv(tmp_path / "log.csv", plain()), mapping(tmp_path / "m.yaml")
+    before = sorted(tmp_path.rglob("*"))
+    told = json.loads(done("import", f"source={source}", chosen, "--check", "--json", folder=tmp_path).out)
+    assert sorted(tmp_path.rglob("*")) == before
+    (episode,) = told["episodes"]
+    assert episode["lag"] == pytest.approx(LAG, abs=0.004) and episode["rate"] == pytest.approx(100.0)
+    assert told["refused"] == [] and {one["column"] for one in told["channels"]} >= {"position.elbow", "action.elbow"}
+    assert "nothing is written" in done("import", f"source={source}", chosen, "check=true", folder=tmp_path).out
+
+
+@pytest.mark.parametrize(
+    ("name", "episodes", "joints", "seconds"),
+    [("xl330_pendulum", 16, 1, 95.9), ("go2_in_air", 1, 12, 23.5), ("so101_arm", 43, 6, 4262.4)],
+)
+def test_the_shipped_logs_are_imported(tmp_path: Path, name: str, episodes: int, joints: int, seconds: float) -> None:
+    done("import", f"mapping={name}", f"name={name}", folder=tmp_path)
+    batch = read(tmp_path / f"runs/{name}/import/trajectories.parquet")
+    assert (len(batch), len(batch.joints)) == (episodes, joints)
+    assert sum(one.time[-1] for one in batch.episodes) == pytest.approx(seconds, abs=0.1)
+    assert max(np.abs(one.position).max() for one in batch.episodes) < np.pi
+
+
+def test_the_pendulum_says_what_hung_on_it(tmp_path: Path) -> None:
+    done("import", "mapping=xl330_pendulum", "name=p", folder=tmp_path)
+    batch = read(tmp_path / "runs/p/import/trajectories.parquet")
+    labels = batch.metadata["episodes"]
+    assert batch.joints == ("joint",) and batch.control_period == 0.005
+    assert {label["kp"] for label in labels} == {100, 200, 400, 800}
+    assert labels[0].items() >= {"mass": 0.49, "length": 0.1, "vin": 7.4, "trajectory": "sin_sin"}.items()
+    off = next(one for one, label in zip(batch.episodes, labels, strict=True) if label["trajectory"] == "lift_and_drop")
+    assert 0.0 < np.mean(off.sensors["enabled"]) < 1.0 and off.sensors["voltage"].min() > 5.0
