@@ -155,7 +155,7 @@ def show(
 
 @app.command()
 def robot(
-    name: Annotated[str, typer.Argument(help="Name of the robot, such as nao.")],
+    name: Annotated[str, typer.Argument(help="Name of the robot, such as nao, or its URDF.")],
     out: Annotated[str, typer.Argument(metavar="[out=DIR]", help="Folder for the files.")] = "out=runs/robot",
     json: Json = False,
 ) -> None:
@@ -163,6 +163,20 @@ def robot(
     from gsl.stages.robot import write_robot
 
     write_robot(name, Path(out.removeprefix("out=")), Console(json=json))
+
+
+_INIT = "also out=DIR, joints=A,B (controlled, in order), effort= [N·m] and velocity= [rad/s] over the URDF's"
+
+
+@app.command()
+def init(
+    settings: Annotated[list[str] | None, typer.Argument(metavar="urdf=FILE name=NAME", help=_INIT)] = None,
+    json: Json = False,
+) -> None:
+    """Write the configuration of your own robot from its URDF."""
+    from gsl.stages.init import write_configuration
+
+    write_configuration(settings or [], Console(json=json))
 
 
 @app.command()

@@ -77,6 +77,7 @@ class Setting:
         source: Where the documented range comes from.
         lower: Lower end of the documented range, or else the least possible value, or None.
         upper: Upper end, likewise.
+        most: Greatest possible value, or None.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Setting:
     source: str = ""
     lower: float | None = None
     upper: float | None = None
+    most: float | None = None
 
     @property
     def neutral(self) -> float | None:
@@ -131,6 +133,7 @@ def _described(parameter: inspect.Parameter, field: FieldInfo | None) -> Setting
         str(extra.get("source", "")),
         _first(extra.get("lower"), _bound(field, "ge"), _bound(field, "gt")),
         _first(extra.get("upper"), _bound(field, "le"), _bound(field, "lt")),
+        _bound(field, "le"),
     )
 
 

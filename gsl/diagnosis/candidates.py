@@ -199,7 +199,8 @@ def _bounds(setting: Setting) -> tuple[float, float]:
     assert lower is not None and upper is not None
     if neutral is None:
         return lower, upper
-    return (0.5 * lower if lower >= 0.0 else BEYOND * lower), neutral + BEYOND * (upper - neutral)
+    highest = neutral + BEYOND * (upper - neutral)
+    return (0.5 * lower if lower >= 0.0 else BEYOND * lower), min(highest, setting.most or highest)
 
 
 def _axis(setting: Setting, shares: tuple[Sequence[float], Sequence[float]], *, strength: bool) -> list[float]:

@@ -23,7 +23,7 @@ class CommandLatency:
     kind: ClassVar[str] = "command"
     rank: ClassVar[int] = 1
 
-    delay: Annotated[float, setting("how much later the target arrives", unit="s", ge=0, le=0.15, lower=0.0, upper=0.05,
+    delay: Annotated[float, setting("how much later the target arrives", unit="s", ge=0, le=0.3, lower=0.0, upper=0.05,
                                     source="B-Human: 36-42 ms on a NAO, request to measurement")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 

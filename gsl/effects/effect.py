@@ -79,8 +79,10 @@ def check_ranges(name: str, ranges: Mapping[str, tuple[float, float]]) -> None:
     for key, (lower, upper) in ranges.items():
         if key not in known or known[key].lower is None:
             raise ConfigError(f"ranges.{name}.{key}", "the effect has no parameter of this name with a range")
-        if not lower < upper:
-            raise ConfigError(f"ranges.{name}.{key}", f"{lower:g} to {upper:g} is no range")
+        most = known[key].most
+        if not lower < upper or (most is not None and upper > most):
+            limit = "" if most is None else f", {most:g} at most"
+            raise ConfigError(f"ranges.{name}.{key}", f"{lower:g} to {upper:g} is no range that it can have{limit}")
 
 
 def built(effects: Mapping[str, Any]) -> tuple[Effect, ...]:

@@ -57,7 +57,7 @@ def from_description(
         ConfigError: A joint does not exist, cannot be driven, or lacks a limit; or a link that moves has no mass.
     """
     known = {hinge.name: hinge for hinge in told.hinges}
-    chosen = joints if joints is not None else {name: JointSettings() for name in _drivable(told.hinges)}
+    chosen = joints if joints is not None else {name: JointSettings() for name in drivable(told.hinges)}
     _check(chosen, held, known)
     coupled = {
         hinge.name: hinge.follows[0]
@@ -108,7 +108,8 @@ def lone(name: str, joints: Mapping[str, JointSettings]) -> Robot:
     return with_gains(robot, {one: (told.kp, told.kd) for one, told in joints.items()})
 
 
-def _drivable(hinges: Sequence[Hinge]) -> list[str]:
+def drivable(hinges: Sequence[Hinge]) -> list[str]:
+    """Return the joints that can be controlled: all that turn and follow no other."""
     return [hinge.name for hinge in hinges if hinge.kind in TURNING and hinge.follows is None]
 
 

@@ -69,8 +69,8 @@ def from_file(path: Path) -> Robot:
         InputError: A file cannot be read, or what it says cannot be a robot.
     """
     told = _settings(path) if path.suffix in YAML else RobotSettings(urdf=path.name)
-    joints = None if told.joints is None else _joints(told.joints, path)
     try:
+        joints = None if told.joints is None else _joints(told.joints)
         if told.urdf is not None:
             robot = from_description(read_description(path.parent / told.urdf), joints, told.held, told.stance)
         else:
@@ -121,8 +121,8 @@ def _settings(path: Path) -> RobotSettings:
         raise InputError(f"{path}: {error}") from error
 
 
-def _joints(told: Mapping[str, Any], path: Path) -> dict[str, JointSettings]:
-    try:
-        return {str(name): make(JointSettings, entry or {}, where=f"joints.{name}") for name, entry in told.items()}
-    except (ConfigError, TypeError) as error:
-        raise InputError(f"{path}: {error}") from error
+def _joints(told: Mapping[str, Any]) -> dict[str, JointSettings]:
+    for name, entry in told.items():
+        if not isinstance(entry or {}, Mapping):
+            raise ConfigError(f"joints.{name}", "must map its settings to values", given=str(entry))
+    return {str(name): make(JointSettings, entry or {}, where=f"joints.{name}") for name, entry in told.items()}

@@ -15,12 +15,12 @@ def write_robot(name: str, folder: Path, console: Any) -> None:
     """Write <name>.urdf and <name>.png.
 
     Args:
-        name: Of the robot, such as `nao`.
+        name: Of the robot, such as `nao`, or its file.
         folder: Where to; made if it does not exist.
         console: Where to say so.
 
     Raises:
-        ConfigError: if there is no such robot.
+        InputError: if there is no such robot, or its file describes none.
     """
     body = robot(name)
     model, picture = folder / f"{body.name}.urdf", folder / f"{body.name}.png"
@@ -29,10 +29,12 @@ def write_robot(name: str, folder: Path, console: Any) -> None:
         model.write_text(urdf(body), encoding="utf-8")
         portrait(body, picture)
     about = f"{body.name}: {len(body.controlled)} controlled joints, {len(body.links)} links, {body.mass:.3f} kg"
+    told = [about, *(f"remark: {remark}" for remark in body.remarks), str(model), str(picture)]
     document = {
         "robot": body.name,
         "mass_kg": body.mass,
         "joints": list(body.controlled),
+        "remarks": list(body.remarks),
         "files": [str(model), str(picture)],
     }
-    console.result(document, text=f"{about}\n{model}\n{picture}")
+    console.result(document, text="\n".join(told))

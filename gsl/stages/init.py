@@ -1,0 +1,147 @@
+"""A folder of one's own: the robot of a URDF with what it leaves open written out, and a world that has it."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+from pathlib import Path
+from typing import Annotated, Any
+
+import yaml
+
+from gsl.core.body import Robot
+from gsl.core.setting import component, setting
+from gsl.core.validation import make
+from gsl.errors import ConfigError, InputError
+from gsl.robots.hinges import JointSettings, drivable, from_description
+from gsl.robots.urdf_xml import read_description
+from gsl.storage.whole import explained
+
+ROBOT, WORLD = "robot.yaml", "world/{}.yaml"
+
+_ROBOT_HEAD = """\
+# The robot of {urdf}: the joints that an action names, in this order, and their servos.
+# Gains and rotors (armature) are derived from effort and velocity (docs/robots.md); what you know better, write here.
+# A diagnosis fits gains, friction and rotors of every joint anew before it looks for a cause.
+"""
+_WORLD_TEXT = """\
+# {name}, its base fixed. What you know that the simulator lacks is for effects to say (docs/effects.md).
+defaults: [urdf, _self_]
+robot: {robot}   # as seen from where you type gsl
+period: 0.02   # [s]: the control period of your logs
+effects: {{}}
+"""
+
+
+@component
+class Init:
+    """What `gsl init` is told."""
+
+    urdf: Annotated[str, setting("your robot", min_length=1)]
+    name: Annotated[str, setting("what its world will be called", min_length=1)]
+    out: Annotated[str | None, setting("folder to write; the name by default", min_length=1)] = None
+    joints: Annotated[tuple[str, ...], setting("controlled joints in order; all that turn by default")] = field(
+        default=()
+    )
+    effort: Annotated[float | None, setting("peak torque of all, over the URDF's", unit="N·m", gt=0)] = None
+    velocity: Annotated[float | None, setting("speed without load of all, over the URDF's", unit="rad/s", gt=0)] = None
+
+
+def write_configuration(arguments: Sequence[str], console: Any) -> None:
+    """Write the folder and say what to type next.
+
+    Args:
+        arguments: Of the form key=value, the settings of `Init`.
+        console: Where to say it.
+
+    Raises:
+        InputError: A setting is wrong, the URDF cannot be read, or the folder is there already.
+    """
+    told: Init = make(Init, _settings(arguments))
+    folder, urdf = Path(told.out or told.name), Path(told.urdf)
+    if not re.fullmatch(r"[A-Za-z_][\w-]*", told.name):
+        raise ConfigError(
+            "name", "must be a word of letters, digits, _ and -, not beginning with a digit", given=told.name
+        )
+    if told.name == "urdf":
+        raise ConfigError("name", "is that of the world that yours is made from; take another", given=told.name)
+    if folder.exists():
+        raise InputError(f"{folder}: exists; choose another folder with out=")
+    description = read_description(urdf)
+    known = JointSettings(effort=told.effort, velocity=told.velocity)
+    try:
+        robot = from_description(description, dict.fromkeys(told.joints or drivable(description.hinges), known), {}, {})
+    except ConfigError as error:
+        raise InputError(f"{urdf}: {error}") from error
+    _write(folder, told.name, urdf, robot)
+    _tell(folder, told.name, robot, console)
+
+
+def _settings(arguments: Sequence[str]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for argument in arguments:
+        key, equals, value = argument.partition("=")
+        if not equals or not value:
+            raise ConfigError(argument, "has no value; write key=value")
+        found[key] = value.strip("[]").split(",") if key == "joints" else value
+    return found
+
+
+def _write(folder: Path, name: str, urdf: Path, robot: Robot) -> None:
+    """Write the folder whole or not at all."""
+    place = folder.with_name(f".{folder.name}.tmp-{os.getpid()}")
+    world = place / WORLD.format(name)
+    with explained(folder):
+        try:
+            world.parent.mkdir(parents=True)
+            (place / ROBOT).write_text(_robot_text(robot, Path(os.path.relpath(urdf, folder))), encoding="utf-8")
+            world.write_text(_WORLD_TEXT.format(name=name, robot=(folder / ROBOT).as_posix()), encoding="utf-8")
+            os.rename(place, folder)
+        finally:
+            shutil.rmtree(place, ignore_errors=True)
+
+
+def _robot_text(robot: Robot, urdf: Path) -> str:
+    joints = "".join(f"  {_plain(name)}: {_flow(_servo(robot, name))}\n" for name in robot.controlled)
+    held = "".join(f"# {remark}\n" for remark in robot.remarks)
+    units = "  # kp [N·m/rad], kd [N·m·s/rad], effort [N·m], velocity without load [rad/s], armature [kg·m²]\n"
+    return (
+        _ROBOT_HEAD.format(urdf=urdf.name)
+        + held
+        + f"urdf: {_plain(urdf.as_posix())}   # as seen from this file\njoints:\n{units}{joints}"
+        + "held: {}   # where the other joints stand [rad]: 0 or as near as they go if nothing is said\n"
+        + "groups: {}   # names for several joints, scopes of effects: {wrist: [roll, pitch]}\n"
+        + "ranges: {}   # where effects may be larger on your robot: {backlash: {width: [0, 0.05]}}\n"
+    )
+
+
+def _servo(robot: Robot, name: str) -> dict[str, float]:
+    joint, (kp, kd) = robot.joint(name), robot.gains[name]
+    told = {"kp": kp, "kd": kd, "effort": joint.effort, "velocity": joint.max_velocity, "armature": joint.armature}
+    return {key: float(f"{value:.4g}") for key, value in told.items()}
+
+
+def _flow(values: Mapping[str, float]) -> str:
+    return yaml.safe_dump(dict(values), default_flow_style=True, sort_keys=False, width=1000).strip()
+
+
+def _plain(text: str) -> str:
+    return yaml.safe_dump(text, allow_unicode=True, width=1000).splitlines()[0]
+
+
+def _tell(folder: Path, name: str, robot: Robot, console: Any) -> None:
+    files = [(folder / part).as_posix() for part in (ROBOT, WORLD.format(name))]
+    mine = shlex.quote(folder.as_posix())
+    following = [
+        f"gsl robot {shlex.quote(files[0])}   # a picture",
+        f"gsl collect --config-dir {mine} world={name} task=excite name={name}   # safe motions, in simulation",
+        f"gsl diagnose --config-dir {mine} sim={name} real=LOG name={name}   # a log of the real one",
+    ]
+    joints = f"{robot.name}: {len(robot.controlled)} controlled joints, {', '.join(robot.controlled)}"
+    lines = [joints, *(f"remark: {remark}" for remark in robot.remarks), *files, "", "what to type next:"]
+    document = {"files": files, "joints": list(robot.controlled), "remarks": list(robot.remarks), "next": following}
+    console.result(document, text="\n".join([*lines, *(f"  {line}" for line in following)]))

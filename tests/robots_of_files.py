@@ -1,0 +1,46 @@
+"""Bullet's own word on a URDF: what the file says, by another reader and another engine than ours."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from gsl.worlds.engine import quiet
+
+
+class Told:
+    """A URDF as Bullet reads it, its base fixed."""
+
+    def __init__(self, bullet, client: int, path: Path) -> None:
+        self._bullet, self._client = bullet, client
+        self._body = bullet.loadURDF(
+            str(path), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client
+        )
+        bullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
+        rows = [bullet.getJointInfo(self._body, i, client) for i in range(bullet.getNumJoints(self._body, client))]
+        self.joints = [row[1].decode() for row in rows if row[2] != bullet.JOINT_FIXED]
+
+    def holding(self, angles: Mapping[str, float]) -> dict[str, float]:
+        """Torques [N·m] that hold a pose [rad]."""
+        pose, still = [angles.get(name, 0.0) for name in self.joints], [0.0] * len(self.joints)
+        torques = self._bullet.calculateInverseDynamics(self._body, pose, still, still, self._client)
+        return dict(zip(self.joints, torques, strict=True))
+
+    def inertia(self, angles: Mapping[str, float]) -> np.ndarray:
+        """Mass matrix in a pose [rad]."""
+        pose = [angles.get(name, 0.0) for name in self.joints]
+        return np.array(self._bullet.calculateMassMatrix(self._body, pose, physicsClientId=self._client))
+
+
+@contextmanager
+def as_bullet_reads(path: Path) -> Iterator[Told]:
+    with quiet():
+        import pybullet
+
+        client = pybullet.connect(pybullet.DIRECT)
+        told = Told(pybullet, client, path)
+    try:
+        yield told
+    finally:
+        pybullet.disconnect(client)
