@@ -1,4 +1,4 @@
-"""Bullet's own word on a URDF: what the file says, by another reader and another engine than ours."""
+"""Independent words on a robot: sums of textbook Jacobians, and what Bullet itself reads in a URDF."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -6,7 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
+from gsl.core.body import Robot, lumped
+from gsl.core.dynamics import forward_kinematics, jacobian
 from gsl.worlds.engine import quiet
+
+
+def holding(body: Robot, angles: dict[str, float]) -> np.ndarray:
+    """Torques that hold a pose against gravity [N·m], as sums of textbook Jacobians."""
+    body = lumped(body)
+    frames, total = forward_kinematics(body, angles), np.zeros(len(body.motors))
+    for link in body.links.values():
+        total += 9.81 * link.mass * jacobian(body, frames, link.name, link.com)[1][2, 6:]
+    return total
 
 
 class Told:

@@ -98,6 +98,10 @@ def test_an_edited_urdf_is_noticed_and_a_moved_one_is_not(place: Path) -> None:
             "the arm has no feet to stand on; say floating=",
         ),
         ("world=nao_ideal world.robot=models/arm.urdf", "the arm has no feet to stand on; say floating=false"),
+        (
+            "world=so101 preset=toy workers=1",
+            "needs foot_force, which this world does not observe; a robot without feet",
+        ),
         ("world=nao_ideal world.robot=models/arm", "no robot called 'models/arm'"),
     ],
 )
@@ -111,3 +115,24 @@ def test_a_log_that_lacks_a_joint(place: Path) -> None:
     (place / "more.urdf").write_text(EXAMPLE.read_text().replace('"elbow"', '"wrist"'))
     line = refused("diagnose", "real=log", "sim=urdf", "sim.robot=more.urdf", "out=runs/refused", folder=place)
     assert "It lacks wrist; choose the simulator with sim=, or hold the joint in a robot file (docs/robots.md)" in line
+
+
+PAGE = (Path(__file__).parents[1] / "docs/robots.md").read_text()
+TYPED = [line.partition("#")[0].split()[2:] for line in PAGE.splitlines() if line.startswith("$ gsl ")]
+WRITTEN = [part.partition("```")[0] for part in PAGE.split("```yaml\n")[1:]]
+
+
+@pytest.mark.parametrize("words", TYPED, ids=" ".join)
+def test_what_the_page_types_can_be_typed(words: list[str], tmp_path: Path) -> None:
+    (tmp_path / "examples").mkdir()
+    shutil.copy(EXAMPLE, tmp_path / "examples/arm.urdf")
+    done(*words, *([] if words[0] in ("robot", "init") else ["--cfg", "job"]), folder=tmp_path)
+
+
+@pytest.mark.parametrize("number", range(len(WRITTEN)))
+def test_the_robot_files_of_the_page_are_robots(number: int, tmp_path: Path) -> None:
+    for folder in ("examples", "arm"):
+        (tmp_path / folder).mkdir()
+    shutil.copy(EXAMPLE, tmp_path / "examples/arm.urdf")
+    (tmp_path / "arm/robot.yaml").write_text(WRITTEN[number])
+    assert len(robot(str(tmp_path / "arm/robot.yaml")).controlled) == 2

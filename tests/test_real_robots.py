@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 from bodies import followed
-from test_robot_files import holding
+from robots_of_files import holding
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import lumped
 from gsl.core.dynamics import forward_kinematics, mass_matrix
 from gsl.core.layout import Layout
 from gsl.core.plant import nominal
@@ -106,9 +106,5 @@ def test_a_robot_without_feet_tells_no_foot_force() -> None:
     assert "foot_force" not in layout.sizes and layout.size == 2 * 6 + 3 + 10
 
 
-def widened(one: Robot) -> set[str]:
-    return set(one.ranges)
-
-
 def test_a_robot_may_widen_what_an_effect_documents() -> None:
-    assert {"command_latency", "backlash"} <= widened(robot("so101")) and not widened(robot("nao"))
+    assert {"command_latency", "backlash"} <= robot("so101").ranges.keys() and not robot("nao").ranges

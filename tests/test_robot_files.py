@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from robots_of_files import as_bullet_reads
+from robots_of_files import as_bullet_reads, holding
 
 from gsl.core.body import Robot, lumped
-from gsl.core.dynamics import forward_kinematics, jacobian, mass_matrix
+from gsl.core.dynamics import forward_kinematics, mass_matrix
 from gsl.core.plant import nominal
 from gsl.diagnosis.candidates import library
 from gsl.errors import GslError
@@ -24,15 +24,6 @@ def poses(body: Robot, count: int = 5) -> list[dict[str, float]]:
     rng = np.random.default_rng(0)
     joints = [body.joint(name) for name in body.motors]
     return [{joint.name: rng.uniform(joint.lower, joint.upper) for joint in joints} for _ in range(count)]
-
-
-def holding(body: Robot, angles: dict[str, float]) -> np.ndarray:
-    """Torques that hold a pose against gravity [N·m], as sums of textbook Jacobians."""
-    body = lumped(body)
-    frames, total = forward_kinematics(body, angles), np.zeros(len(body.motors))
-    for link in body.links.values():
-        total += 9.81 * link.mass * jacobian(body, frames, link.name, link.com)[1][2, 6:]
-    return total
 
 
 def chain_acceleration(body: Robot, angles: dict[str, float]) -> np.ndarray:
@@ -232,6 +223,10 @@ def test_a_urdf_that_describes_no_robot(text: str, line: str, tmp_path: Path) ->
         ("urdf: arm.urdf\njoints: {slide: {}}", "joints.slide: is prismatic; only joints that turn can be controlled"),
         ("urdf: arm.urdf\njoints: {right_finger: }", "joints.right_finger: follows left_finger (<mimic>); control"),
         ("urdf: arm.urdf\nheld: {wrist: 1}", "held.wrist: the URDF has no such joint"),
+        ("urdf: arm.urdf\nheld: {elbow: 1}", "held.elbow: the joint is controlled; leave it out"),
+        ("urdf: arm.urdf\nheld: {table: 1}", "held.table: the joint is fixed; leave it out"),
+        ("urdf: arm.urdf\njoints: {elbow: {inertia: 1}}", "joints.elbow.inertia: is for servos without a body"),
+        ("urdf: arm.urdf\nencoder_side: left", "encoder_side = left: must be one of 'output' or 'motor'"),
         ("urdf: arm.urdf\ngroups: {hand: [finger]}", "groups.hand: 'finger' is no controlled joint; did you mean"),
         ("urdf: arm.urdf\nranges: {backlash: {size: [0, 1]}}", "ranges.backlash.size: the effect has no parameter"),
         ("urdf: arm.urdf\nranges: {slack: {}}", "effects.slack: no effect of this name"),

@@ -118,8 +118,14 @@ def _check(chosen: Mapping[str, JointSettings], held: Mapping[str, float], known
         if name not in known:
             role = "joints" if name in chosen else "held"
             raise ConfigError(f"{role}.{name}", f"the URDF has no such joint{did_you_mean(name, known, listed=True)}")
-    for name in chosen:
+    for name in held:
+        if name in chosen or known[name].kind == "fixed":
+            why = "is controlled" if name in chosen else "is fixed"
+            raise ConfigError(f"held.{name}", f"the joint {why}; leave it out")
+    for name, told in chosen.items():
         hinge = known[name]
+        if told.inertia is not None:
+            raise ConfigError(f"joints.{name}.inertia", "is for servos without a body; the URDF says it of the links")
         if hinge.kind not in TURNING:
             problem = f"is {hinge.kind}; only joints that turn can be controlled, others are held"
             raise ConfigError(f"joints.{name}", problem)
@@ -176,7 +182,7 @@ def _place(hinge: Hinge, held: Mapping[str, float]) -> float:
 
 def _remark(hinge: Hinge, place: float) -> str:
     why = f"{hinge.kind}, which cannot be driven" if hinge.kind not in TURNING else "not controlled"
-    if hinge.follows:
+    if hinge.follows and abs(hinge.follows[1]) != 1.0:
         why = f"follows {hinge.follows[0]} by a factor of {hinge.follows[1]:g}; only 1 and -1 can be driven"
     return f"joint {hinge.name} is held at {place:g} {'m' if hinge.kind == 'prismatic' else 'rad'} ({why})"
 

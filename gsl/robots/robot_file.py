@@ -15,7 +15,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import yaml
 
@@ -48,7 +48,7 @@ class RobotSettings:
         default_factory=dict
     )
     encoder_step: Annotated[float, setting("resolution of the encoders", unit="rad", ge=0)] = 2.0 * math.pi / 4096
-    encoder_side: Annotated[str, setting("output or motor", pattern="^(output|motor)$")] = "output"
+    encoder_side: Annotated[Literal["output", "motor"], setting("side of the gear that the encoder sees")] = "output"
     supply_voltage: Annotated[float, setting("without load", unit="V", gt=0)] = 12.0
     no_load_speed: Annotated[float, setting("factor on the joints' velocity", gt=0)] = 1.0
     ranges: Annotated[

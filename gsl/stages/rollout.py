@@ -63,7 +63,8 @@ def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed
         policy = scenario.policy.start(parameters, layout)
         task = scenario.task.start(layout, observation, scenario.role)
     except KeyError as error:
-        hint = "a gymnasium environment goes with task=own_reward and policy=mlp"
+        robot, other = "a robot without feet goes with task=excite", "task=own_reward and policy=mlp"
+        hint = f"a gymnasium environment goes with {other}" if layout.states else robot
         raise ConfigError(
             "task or policy", f"needs {error.args[0]}, which this world does not observe; {hint}"
         ) from error
