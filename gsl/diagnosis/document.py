@@ -22,7 +22,7 @@ from gsl.effects.effect import effect_class
 
 RANKED = 12  # hypotheses that are listed
 ASKED, STUCK = 0.05, 0.1  # command [rad], and share of it, below which a joint that moves less does not move
-ROUGH = 4.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
+ROUGH = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
 FAR_OFF = 5.0  # spreads of the calibration beyond which it is told
 WIDER = 2.0  # than white noise makes them: what is left of a joint hangs together in time and over nuisances. Estimate
 REPLAYS, SHOWN = 6, 400  # pictures of replays, and their ticks at most
@@ -178,7 +178,7 @@ def _caveats(found: Findings) -> list[str]:
         said.append("No self-test was made (duels=0): probabilities are those of the fit alone, and too sure.")
     if found.tolerance:
         said.append(
-            f"Differences below {1e3 * found.tolerance:.0f} mrad count as noise (tolerance): smaller causes cannot show."
+            f"Differences of {1e3 * found.tolerance:.0f} mrad count as noise (tolerance): smaller causes cannot show."
         )
     elif found.verdict.word == "unknown" and found.verdict.remaining > ROUGH:
         said.append(

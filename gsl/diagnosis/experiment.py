@@ -30,6 +30,7 @@ LEAST = {
     "yaw": 2e-3,
 }  # floor of the base [m], [rad]: estimate
 FIT_WINDOWS = 32  # windows that a fit uses, spread over the training records
+CHECKS = 400  # and a check, over the others
 STILL = 1e-6  # a command that moves less rests [rad]
 
 
@@ -85,7 +86,7 @@ class Experiment:
         """Return the windows of a part, `train` (thinned), `held_out` or `all`, with a simulator."""
         chosen = {
             "train": _spread(self.train, FIT_WINDOWS),
-            "held_out": self.held_out,
+            "held_out": _spread(self.held_out, CHECKS),
             "all": np.arange(len(self.pieces)),
         }
         return Bench(simulator, self.pieces.chosen(chosen[part]), self.comparison)

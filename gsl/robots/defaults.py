@@ -23,12 +23,18 @@ FULL_AT = 0.2  # [rad]: .02 (NAO) to .9 (XL330 at factory gains)
 DAMPING = 0.7  # of an oscillator: hardly any overshoot
 LOAD_MASS = 1.0  # of a lone servo's load [kg]; what of it is off the axis is the effect centre_of_mass
 WORTH = 0.5  # of a lone servo's torque that an unknown load may take
+NAO = 3.35  # peak torque of a NAO's legs, of which the torque unit is 1 [N·m]
 _GRAVITY = 9.81  # [m/s²]
 
 
 def armature_of(effort: float, velocity: float) -> float:
     """Return the rotor inertia at the output [kg·m²] of a motor of some peak torque [N·m] and speed [rad/s]."""
     return TIME_CONSTANT * effort / velocity
+
+
+def torque_unit(effort: float) -> float:
+    """Return the size of servos of some peak torque [N·m] against the NAO's, see `Robot.torque_unit`."""
+    return effort / NAO
 
 
 def with_gains(robot: Robot, given: Mapping[str, tuple[float | None, float | None]]) -> Robot:
@@ -46,7 +52,8 @@ def with_gains(robot: Robot, given: Mapping[str, tuple[float | None, float | Non
         kp = joint.effort / FULL_AT if kp is None else kp
         kd = 2.0 * DAMPING * float(np.sqrt(kp * (inertia + joint.armature))) if kd is None else kd
         gains[name] = (kp, kd)
-    return replace(robot, gains=gains)
+    peak = max(robot.joint(name).effort for name in robot.motors)
+    return replace(robot, gains=gains, torque_unit=torque_unit(peak))
 
 
 def lone_servos(

@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gsl.core.body import Joint, Link, Robot, Shape, with_mass
+from gsl.robots.defaults import torque_unit
 
 STALL = ((5.0, 0.52), (6.0, 0.60))  # [V], [N·m] E
 NO_LOAD = ((5.0, 10.786), (6.0, 12.881))  # [V], [rad/s] E
@@ -106,6 +107,7 @@ def bench(servo: Xl330, *, mass: float = 0.49, length: float = 0.10, arm_mass: f
         supply_voltage=servo.voltage,
         torque_constant={"joint": servo.voltage / servo.no_load},
         encoder_step=ENCODER_STEP,
+        torque_unit=torque_unit(servo.stall),
     )
 
 

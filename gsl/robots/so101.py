@@ -33,6 +33,7 @@ import math
 import numpy as np
 
 from gsl.core.body import Joint, Link, Robot
+from gsl.robots.defaults import torque_unit
 from gsl.robots.frames import Mount, aligned, euler
 from gsl.robots.so101_shapes import SHAPES
 
@@ -104,6 +105,7 @@ def so101() -> Robot:
         torque_constant=dict.fromkeys(names, TORQUE_CONSTANT),
         encoder_step=ENCODER_STEP,
         ranges=RANGES,
+        torque_unit=torque_unit(TORQUE),
     )
 
 

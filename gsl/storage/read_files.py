@@ -9,7 +9,7 @@ from typing import Any
 
 
 def read_files(thing: Any) -> dict[str, Path]:
-    """Return the files of a component and of all components in it that have `files`, by dotted name of the setting."""
+    """Return the `read_files` of a component and of all components in it, by dotted name of the setting."""
     return dict(_found(thing, ""))
 
 
@@ -20,7 +20,7 @@ def _found(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
         parts = {str(index): value for index, value in enumerate(thing)}
     elif is_dataclass(thing) and not isinstance(thing, type):
         parts = {field.name: getattr(thing, field.name) for field in fields(thing)}
-        own: Mapping[str, Path] = getattr(thing, "files", {})
+        own: Mapping[str, Path] = getattr(thing, "read_files", {})
         yield from ((f"{where}{name}", path) for name, path in own.items())
     else:
         return

@@ -49,7 +49,7 @@ class BulletWorld:
         check_base(self.plant.robot, floating=self.floating)
 
     @property
-    def files(self) -> Mapping[str, Path]:
+    def read_files(self) -> Mapping[str, Path]:
         """What it is read from, by the setting that names it: a robot's files are part of what a world is."""
         first, *others = files(self.robot) or (None,)
         named = {} if first is None else {"robot": first}

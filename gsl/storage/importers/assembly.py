@@ -11,6 +11,7 @@ import numpy as np
 
 from gsl.core.series import SAME, held, interpolated, pieces
 from gsl.core.trajectory import Trajectory
+from gsl.effects.effect import together
 from gsl.errors import ConfigError, InputError
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.reading import Raw, Series
@@ -106,7 +107,13 @@ def labelled(raw: Raw, mapping: LogMapping) -> dict[str, Any]:
     """
     name = _filled(mapping.name, raw.fields, "mapping.name") if mapping.name else raw.name
     about = {key: _filled(value, raw.fields, f"mapping.about.{key}") for key, value in mapping.about.items()}
-    return {**about, "policy": str(name), "file": raw.name}
+    known = together(
+        effects
+        for label, values in mapping.conditions.items()
+        for value, effects in values.items()
+        if str(value) == str(about[label])
+    )
+    return {**about, "policy": str(name), "file": raw.name, **({"conditions": known} if known else {})}
 
 
 def _filled(value: Any, fields: Mapping[str, Any], where: str) -> Any:

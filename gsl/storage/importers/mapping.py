@@ -10,6 +10,7 @@ from pydantic import BeforeValidator
 
 from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
+from gsl.effects.effect import built
 from gsl.errors import ConfigError
 from gsl.storage.importers.signal import KNOWN, Signal, Time
 from gsl.storage.importers.units import factor
@@ -77,6 +78,10 @@ class Mapping:
     about: Annotated[dict[str, Any], setting("what else is known of an episode: values, or {field} of its file")] = (
         field(default_factory=dict)
     )
+    conditions: Annotated[
+        dict[str, dict[Any, dict[str, Any]]],
+        setting("effects that are known of an episode: {kp: {100: {servo_gain: {kp: 0.25}}}}, by what `about` says"),
+    ] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse what does not fit together."""
@@ -86,6 +91,12 @@ class Mapping:
         for name in ("action", "position"):
             if name not in self.signals:
                 raise ConfigError(f"signals.{name}", "has no value; say in which column it is")
+        for label, known in self.conditions.items():
+            if label not in self.about:
+                given = ", ".join(self.about) or "nothing"
+                raise ConfigError(f"conditions.{label}", f"`about` says nothing of it; it says {given}")
+            for value, effects in known.items():
+                _check_effects(f"conditions.{label}.{value}", effects)
         for name, signal in self.signals.items():
             self._check_file(f"signals.{name}.file", signal.file)
             _check_unit(name, signal)
@@ -97,6 +108,13 @@ class Mapping:
                 raise ConfigError(where, f"must be one of {', '.join(self.files)}", given=file or "(none)")
         elif file and not file.startswith("/"):
             raise ConfigError(where, "is no topic of a bag, and `files` names no such role", given=file)
+
+
+def _check_effects(where: str, effects: dict[str, Any]) -> None:
+    try:
+        built(effects)
+    except ConfigError as error:
+        raise error.under(where) from error
 
 
 def _check_unit(name: str, signal: Signal) -> None:
