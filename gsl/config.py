@@ -93,13 +93,13 @@ def run(
 def execute(command: str, line: str, config: Mapping[str, Any], console: Console, *, level: str = "") -> dict[str, Any]:
     """Build the artifact that a resolved configuration describes and return what there is to say about it.
 
-    A stage with a setting `check` that is true only looks and builds nothing.
+    A stage that `only_looks` says what it would do and builds nothing.
     """
     from gsl.stages.account import account
     from gsl.storage.artifact import build as build_artifact
 
     stage, settings, own = prepared(config)
-    if getattr(stage, "check", False):
+    if getattr(stage, "only_looks", False):
         return dict(stage.look(console))
     out = own.folder(command, level)
     artifact = build_artifact(stage, config=settings, out=out, command=line, force=own.force, console=console)

@@ -67,7 +67,10 @@ def test_a_setting_that_does_not_fit(arguments: str, line: str, tmp_path: Path) 
         ),
         (("evaluate", "policies=chain/collect_real"), "runs/chain/collect_real: holds collect, which has no policies"),
         (("evaluate", "policies=chain/optimize", "policy=linear"), "runs/chain/optimize: its policies are others: "),
-        (("train-forward", "data=chain/optimize"), "runs/chain/optimize: holds optimize, but collect is needed"),
+        (
+            ("train-forward", "data=chain/optimize"),
+            "runs/chain/optimize: holds optimize, but collect or import is needed",
+        ),
         (
             ("train-forward", "data=chain"),
             "several artifacts fit, name one of them: chain/collect_real, chain/collect_sim",

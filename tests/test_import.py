@@ -13,6 +13,7 @@ import yaml
 from commands import done
 
 from gsl.core.trajectory import Batch
+from gsl.stages.logs import read_logs
 from gsl.storage.trajectories import read
 
 JOINTS = ("shoulder", "elbow")
@@ -234,6 +235,18 @@ def test_the_same_log_twice_is_the_same_bytes_and_no_work(tmp_path: Path) -> Non
     assert "(unchanged)" in done("import", f"source={source}", chosen, "name=a", folder=tmp_path).out
     done("import", f"source={source}", chosen, "name=b", folder=tmp_path)
     assert (tmp_path / "runs/b/import/trajectories.parquet").read_bytes() == first
+
+
+def test_a_run_of_import_is_a_log_for_a_diagnosis(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    batch = imported(tmp_path, csv(tmp_path / "log.csv", plain()), mapping(tmp_path / "m.yaml"))
+    monkeypatch.chdir(tmp_path)
+    assert read_logs("log").metadata == batch.metadata
+
+
+def test_a_mapping_may_lie_anywhere(tmp_path: Path) -> None:
+    place = tmp_path / "my lab's" / "arm = 1"
+    place.mkdir(parents=True)
+    check_same(imported(tmp_path, csv(tmp_path / "log.csv", plain()), mapping(place / "m.v2.yaml")))
 
 
 def test_a_check_writes_nothing_and_finds_the_lag(tmp_path: Path) -> None:

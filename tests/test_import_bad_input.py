@@ -225,6 +225,10 @@ SETTINGS = {
         {"signals": {"action": "a", "position": "q", "velocty": "v"}},
         "mapping.signals.velocty: no such signal, did you mean velocity?",
     ),
+    "a name that is taken": (
+        {"signals": {"action": "goal_{joint}", "position": "q_{joint}", "reward": {"column": "t", "unit": "1"}}},
+        "mapping.signals.reward: is a name of the contract that no log fills; call it otherwise",
+    ),
     "no positions": ({"signals": {"action": "a"}}, "mapping.signals.position: has no value"),
     "a sign": (
         {"signals": {"action": "goal_{joint}", "position": {"column": "q_{joint}", "sign": 2}}},
@@ -292,7 +296,7 @@ def test_files_of_other_joints_are_not_one_log(tmp_path: Path) -> None:
         for group, values in (("action", ACTION), ("position", POSITION)):
             columns |= {f"{group}.{joint}": column for joint, column in zip(joints, values.T, strict=True)}
         csv(tmp_path / f"{name}.csv", columns)
-    assert "b: has other joints than a" in refused("import", "source=.", folder=tmp_path)
+    assert "b: has other joints or signals than a" in refused("import", "source=.", folder=tmp_path)
 
 
 def test_rates_that_differ_are_told(tmp_path: Path) -> None:

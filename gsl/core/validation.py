@@ -28,6 +28,7 @@ _RULES = {
     "missing_argument": "has no value",
 }
 _KINDS = {"int": "a whole number", "float": "a number", "bool": "true or false", "string": "a text", "tuple": "a list"}
+_KINDS |= {"list": "a list", "dict": "settings by name"}
 
 
 def make(target: Callable[..., T], values: Mapping[str, Any], *, where: str = "") -> T:

@@ -37,16 +37,21 @@ class Import:
     accept: Annotated[bool, setting("take what looks swapped or in another unit as it is")] = False
     memory: Annotated[float, setting("that reading one file may take", unit="GB", gt=0)] = 2.0
 
+    @property
+    def only_looks(self) -> bool:
+        """Whether nothing is to be written."""
+        return self.check
+
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""
         paths = {f"{one.name}/{role}".rstrip("/"): path for one in self._places() for role, path in one.files.items()}
-        files = {name: path for name, path in paths.items() if path.is_file()}
-        files |= {
-            f"{n}/{one.name}": one for n, path in paths.items() if path.is_dir() for one in sorted(path.iterdir())
+        files = {
+            name if file == path else f"{name}/{file.name}": file
+            for name, path in paths.items()
+            for file in ([path] if path.is_file() else sorted(path.iterdir()))
         }
-        return (
-            {"source": next(iter(files.values()))} if len(files) == 1 else {f"source {n}": p for n, p in files.items()}
-        )
+        alone = len(files) == 1
+        return {"source" if alone else f"source {name}": file for name, file in files.items()}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write one parquet file, and what was found as a document."""
@@ -120,10 +125,9 @@ class Import:
     def _told(self, found: list[Episode], chosen: list[Place]) -> dict[str, Any]:
         first = found[0]
         for one in found:
-            if one.joints != first.joints:
-                raise TrajectoryError(
-                    one.label["file"], f"has other joints than {first.label['file']}; import it alone"
-                )
+            if one.joints != first.joints or one.trajectory.sensors.keys() != first.trajectory.sensors.keys():
+                problem = f"has other joints or signals than {first.label['file']}; import it alone"
+                raise TrajectoryError(one.label["file"], problem)
         files, period = sum(len(place.files) for place in chosen), self.mapping.period
         kept = f"resampled to {period:g} s (positions linearly, commands held)" if period else "rows kept as logged"
         derived = sum(one.derived for one in found)

@@ -36,7 +36,7 @@ class JsonTable:
         if not isinstance(first, dict):
             raise TrajectoryError(path, "has no rows of named values; say in the mapping where they are: records=...")
         self.names: Sequence[str] = [
-            name for name, value in _flat(first).items() if self.rows or self.lines or _listed(value)
+            name for name, value in _flat(first).items() if self.rows or self.lines or isinstance(value, list)
         ]
         self.place = place
 
@@ -44,16 +44,15 @@ class JsonTable:
         """Return the wanted columns."""
         if self.rows is None and not self.lines:
             return {name: numbers(self.path, name, self._list(name)) for name in wanted}
+        for name in wanted:
+            if name not in self.names:
+                raise missing_column(self, name)
         found: dict[str, list[Any]] = {name: [] for name in wanted}
         for row, record in enumerate(_records(self.path, self.memory) if self.lines else self.rows or []):
             for name, values in found.items():
                 value = _at(record, name)
                 if value is None and name not in _flat(record):
-                    raise (
-                        missing_column(self, name)
-                        if row == 0
-                        else TrajectoryError(self.path, "is missing here", column=name, row=row)
-                    )
+                    raise TrajectoryError(self.path, "is missing here", column=name, row=row)
                 values.append(value)
             if row % 10_000 == 0:
                 check_need(self.path, 50.0 * row * len(found), self.memory)
@@ -107,10 +106,6 @@ def _flat(value: Any, prefix: str = "") -> dict[str, Any]:
     return {
         key: one for name, part in value.items() for key, one in _flat(part, f"{prefix}.{name}".lstrip(".")).items()
     }
-
-
-def _listed(value: Any) -> bool:
-    return isinstance(value, list)
 
 
 def _fields(document: Any) -> dict[str, Any]:

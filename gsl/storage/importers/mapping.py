@@ -14,9 +14,10 @@ from gsl.effects.effect import built
 from gsl.errors import ConfigError
 from gsl.storage.importers.signal import KNOWN, Signal, Time
 from gsl.storage.importers.units import factor
-from gsl.storage.trajectory_contract import UNITS, suggestion
+from gsl.storage.trajectory_contract import INTEGERS, UNITS, suggestion
 
 T = TypeVar("T")
+TAKEN = (*INTEGERS, "time", "reward", "fell", "terminated", "state", "next_state")
 
 
 def _time(value: Any) -> Time:
@@ -119,6 +120,8 @@ def _check_effects(where: str, effects: dict[str, Any]) -> None:
 
 def _check_unit(name: str, signal: Signal) -> None:
     where = f"signals.{name}"
+    if name.partition(".")[0] in TAKEN:
+        raise ConfigError(where, "is a name of the contract that no log fills; call it otherwise")
     if name not in KNOWN and not signal.unit:
         near = f"no such signal{suggestion(name, KNOWN)}; " if suggestion(name, KNOWN) else ""
         raise ConfigError(where, f"{near}a signal of your own needs a unit; the contract has {', '.join(KNOWN)}")
