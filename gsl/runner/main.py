@@ -1,0 +1,148 @@
+"""The runner: plays the episodes of a request on a robot, one after the other, and writes the answer beside it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gsl.errors import GslError
+from gsl.runner import journal
+from gsl.runner.episode import Stage
+from gsl.runner.request import due, read_request
+from gsl.runner.robots import PerfectRobot, robot_of
+from gsl.runner.senses import RobotError
+
+
+def main(folder: Path, words: Sequence[str]) -> int:
+    """Run the command line of the runner in a request's folder and return its exit code."""
+    parser = argparse.ArgumentParser(prog="runner.py", description=__doc__)
+    parser.add_argument("--robot", type=Path, default=folder / "robot.py", help="file with read() and send()")
+    parser.add_argument("--log", type=Path, default=folder / journal.ANSWER, help="the answer")
+    parser.add_argument("--episode", action="append", metavar="NAME", help="run this one only, again if it was run")
+    parser.add_argument("--dry-run", action="store_true", help="play against a perfect robot; nothing is written")
+    parser.add_argument("--most", type=int, default=0, metavar="N", help="episodes of this sitting, at most")
+    parser.add_argument("--yes", action="store_true", help="ask nothing")
+    parser.add_argument("--unpaced", action="store_true", help="do not wait for the clock: for a simulated robot")
+    asked = parser.parse_args(words)
+    try:
+        request = read_request(folder)
+        return dry_run(request) if asked.dry_run else Sitting(request, asked).run()
+    except GslError as error:
+        say(f"runner.py: {error}")
+        return 2
+    except KeyboardInterrupt:
+        say("runner.py: interrupted; what was complete is kept")
+        return 130
+
+
+def say(text: str) -> None:
+    """Tell a person something."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def dry_run(request: Mapping[str, Any]) -> int:
+    """Play every episode against a perfect robot and tell rates and extremes; return 1 if a target is refused."""
+    robot = PerfectRobot(request)
+    stage, ticks, stops = Stage(request, robot, paced=False), 0, 0
+    begin = time.perf_counter()
+    for episode in request["episodes"]:
+        stage.approach(episode)
+        played = stage.play(episode)
+        ticks, stops = ticks + len(played.rows), stops + bool(played.stopped)
+        if played.stopped:
+            say(f"{episode['name']}: refused: {played.stopped}")
+        stage.leave(episode, hold=bool(played.stopped))
+    each = (time.perf_counter() - begin) / ticks
+    say("\n".join(robot.rows()))
+    needed = request["control_period"]
+    say(f"{ticks} steps, {1e3 * each:.2f} ms each of the {1e3 * needed:g} ms there are ({1 / needed:g} Hz)")
+    told = f"{stops} of {len(request['episodes'])} episodes were refused" if stops else "no target was refused"
+    say(f"{told}; nothing was written. A real robot feels its feet and sways: its targets will differ.")
+    return 1 if stops else 0
+
+
+class Sitting:
+    """What is run of a request in one go."""
+
+    def __init__(self, request: Mapping[str, Any], asked: argparse.Namespace) -> None:
+        self._request, self._asked = request, asked
+        self._returns = asked.log.with_name(journal.RETURNS)
+        if asked.log.exists() and journal.marked(asked.log) != request["hash"]:
+            raise RobotError(f"{asked.log} answers another request; move it away or choose another --log")
+        names = [episode["name"] for episode in request["episodes"]]
+        for name in asked.episode or ():
+            if name not in names:
+                raise RobotError(f"there is no episode {name}; there is {', '.join(names)}")
+        self._stage = Stage(request, robot_of(asked.robot), paced=not asked.unpaced)
+
+    def run(self) -> int:
+        """Run the episodes that are missing, or those that were named."""
+        say(self._request["about"])
+        for name in self._asked.episode or ():
+            self._forget(name)
+        for episode in self._sitting():
+            if not self._ask(f"{episode['name']} ({self._seconds(episode):g} s): Enter ramps in, q ends"):
+                break
+            self._one(episode)
+        missing = self._due()
+        say(f"{len(missing)} episodes are missing" if missing else f"all is answered: {self._asked.log}")
+        return 0
+
+    def _one(self, episode: Mapping[str, Any]) -> None:
+        stage = self._stage
+        stage.approach(episode)
+        if not self._ask("it stands at the start: Enter begins, q goes on to nothing else"):
+            stage.leave(episode, hold=False)
+            raise KeyboardInterrupt
+        try:
+            played = stage.play(episode)
+        except BaseException:
+            stage.leave(episode, hold=True)
+            raise
+        late = f", {1e3 * stage.clock.worst:.0f} ms late at worst" if stage.clock.worst > 0.002 else ""
+        stage.leave(episode, hold=played.fell or bool(played.stopped))
+        journal.append(self._asked.log, self._request["hash"], played.columns, played.rows)
+        ended = f"refused: {played.stopped}; held, then ramped out" if played.stopped else ""
+        say(f"{episode['name']}: {len(played.rows) - 1} steps{late}{', fell' * played.fell}{'; ' * bool(ended)}{ended}")
+        if self._request["distance"] and "base.position.x" not in played.columns:
+            self._measure(episode, fell=played.fell or bool(played.stopped))
+
+    def _measure(self, episode: Mapping[str, Any], *, fell: bool) -> None:
+        """Ask a person for what the robot cannot tell."""
+        if self._asked.yes:
+            return
+        told = input("distance walked forward [m], f if it fell, Enter to write it into returns.csv later: ").strip()
+        if told:
+            fallen = told.lower() == "f"
+            journal.add_return(
+                self._returns, self._request["hash"], episode["name"], "" if fallen else told, fell=fell or fallen
+            )
+
+    def _forget(self, name: str) -> None:
+        numbers = {one["name"]: index for index, one in enumerate(self._request["episodes"])}
+        journal.without(self._asked.log, numbers[name])
+
+    def _sitting(self) -> Iterator[Mapping[str, Any]]:
+        """Yield what is due now, again and again, since a fall may spare what would have followed."""
+        count = 0
+        while (missing := self._due()) and not count >= self._asked.most > 0:
+            yield missing[0]
+            count += 1
+
+    def _due(self) -> list[Mapping[str, Any]]:
+        episodes = self._request["episodes"]
+        ends = {episodes[number]["name"]: down for number, down in journal.ends(self._asked.log).items()}
+        told = {name for name, row in journal.returned(self._returns).items() if row["fell"].lower() in journal.YES}
+        missing = due(self._request, ends, {name for name, down in ends.items() if down} | told)
+        return [one for one in missing if not self._asked.episode or one["name"] in self._asked.episode]
+
+    def _ask(self, question: str) -> bool:
+        return self._asked.yes or input(f"{question}: ").strip().lower() != "q"
+
+    def _seconds(self, episode: Mapping[str, Any]) -> float:
+        return float(episode["steps"] * self._request["control_period"])
