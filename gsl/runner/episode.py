@@ -41,16 +41,25 @@ class Clock:
 
 
 class Played(NamedTuple):
-    """An episode that is over: columns, rows, and why it ended early, if it did."""
+    """An episode that is over: columns, rows, and why it ended early, if it did; `broken` is Ctrl-C.
+
+    A person breaks it off, most often, because the robot falls.
+    """
 
     columns: list[str]
     rows: list[list[Any]]
     fell: bool
     stopped: str
+    broken: bool = False
+
+    def as_a_fall(self) -> Played:
+        """Return the same episode, ended by a fall."""
+        *rows, last = self.rows
+        return self._replace(rows=[*rows, [*last[:-2], True, False]], fell=True)
 
 
-class Stage:
-    """A robot with all that is needed to run the episodes of a request on it."""
+class Player:
+    """Plays the episodes of a request on a robot."""
 
     def __init__(self, request: Mapping[str, Any], robot: Any, *, paced: bool) -> None:
         self.request, self.robot, self.period = request, robot, request["control_period"]
@@ -81,22 +90,27 @@ class Stage:
         self._senses = Senses(self._layout)
         getattr(self.robot, "begin", lambda episode: None)(episode)
         self.clock.begin()
-        for tick in range(episode["steps"] + 1):
-            now = self.clock.wait(tick)
-            seen = self._read()
-            fell = seen.fell
-            if fell or tick == episode["steps"]:
-                break
-            action, sent = actor.act(seen.observation)
-            if stopped := self.guard.refusal(sent):
-                stopped = f"{stopped} (at {now:.2f} s)"
-                break
-            self.robot.send(sent.copy())
-            self.guard.take(sent)
-            rows.append(self._row(episode, tick, now, seen, action, sent))
+        tick, now, seen, broken = 0, 0.0, self._read(), False
+        if seen.fell:
+            raise RobotError(f"the robot lies down before {episode['name']} has begun")
+        try:
+            while not (fell := seen.fell) and tick < episode["steps"]:
+                action, sent = actor.act(seen.observation)
+                if stopped := self.guard.refusal(sent):
+                    stopped = f"{stopped} (at {now:.2f} s)"
+                    break
+                self._send(sent)
+                self.guard.take(sent)
+                rows.append(self._row(episode, tick, now, seen, action, sent))
+                tick += 1
+                now, seen = self.clock.wait(tick), self._read()
+        except KeyboardInterrupt:
+            broken = True
+            rows = [row for row in rows if row[2] < now]  # the state after the last action may not have been read yet
+            tick = len(rows)
         nothing = np.full(len(self.guard.joints), np.nan)
         rows.append(self._row(episode, tick, now, seen, nothing, nothing, fell=fell, stopped=bool(stopped)))
-        return Played(self._columns(seen), rows, fell, stopped)
+        return Played(self._columns(seen), rows, fell, stopped, broken)
 
     def leave(self, episode: Mapping[str, Any], *, hold: bool) -> None:
         """Bring the robot back to the start posture, first holding the last safe target where it had to stop."""
@@ -106,7 +120,17 @@ class Stage:
         getattr(self.robot, "end", lambda: None)()
 
     def _read(self) -> Seen:
-        return self._senses.seen(self.robot.read())
+        try:
+            told = self.robot.read()
+        except Exception as error:
+            raise RobotError(f"read() failed: {type(error).__name__}: {error}") from error
+        return self._senses.seen(told)
+
+    def _send(self, targets: np.ndarray) -> None:
+        try:
+            self.robot.send(targets.copy())
+        except Exception as error:
+            raise RobotError(f"send() failed: {type(error).__name__}: {error}") from error
 
     def _ramp(self, start: np.ndarray, end: np.ndarray) -> None:
         self._follow(list(ramp(start, end, self.request["ramp"], self.period)))
@@ -115,7 +139,7 @@ class Stage:
         self.clock.begin()
         for tick, target in enumerate(targets):
             self.clock.wait(tick)
-            self.robot.send(target.copy())
+            self._send(target)
         self.guard.start(targets[-1])
 
     def _columns(self, seen: Seen) -> list[str]:

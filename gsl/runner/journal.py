@@ -26,8 +26,8 @@ def marked(path: Path) -> str:
     return first.removeprefix(MARK).strip() if first.startswith(MARK) else ""
 
 
-def append(path: Path, request: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Add the rows of a complete episode; floats come back as they were, to the bit.
+def keep(path: Path, request: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Add the rows of a complete episode, in place of an earlier run of it; floats come back as they were, to the bit.
 
     Raises:
         ArtifactError: The file answers another request, or has other columns.
@@ -36,11 +36,12 @@ def append(path: Path, request: str, columns: Sequence[str], rows: Sequence[Sequ
     writer = csv.writer(text, lineterminator="\n")
     before = ""
     if path.exists():
-        before = path.read_text(encoding="utf-8")
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
         if marked(path) != request:
             raise ArtifactError(path, "answers another request; move it away or choose another --log")
-        if before.splitlines()[1] != ",".join(columns):
+        if lines[1].strip() != ",".join(columns):
             raise ArtifactError(path, "has other columns than the robot tells now; choose another --log")
+        before = "".join([*lines[:2], *(line for line in lines[2:] if not line.startswith(f"{rows[0][0]},"))])
     else:
         before = f"{MARK}{request}\n{','.join(columns)}\n"
     writer.writerows([_cell(value) for value in row] for row in rows)
@@ -54,13 +55,6 @@ def ends(path: Path) -> dict[int, bool]:
         for row in _rows(path):
             found[int(row["episode"])] = row["fell"] in YES or row["stopped"] in YES
     return found
-
-
-def without(path: Path, episode: int) -> None:
-    """Take an episode out of an answer, so that it can be run again."""
-    if path.exists():
-        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-        _replace(path, "".join([*lines[:2], *(line for line in lines[2:] if not line.startswith(f"{episode},"))]))
 
 
 def returned(path: Path) -> dict[str, Mapping[str, str]]:

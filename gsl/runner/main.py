@@ -11,10 +11,12 @@ from typing import Any
 
 from gsl.errors import GslError
 from gsl.runner import journal
-from gsl.runner.episode import Stage
+from gsl.runner.episode import Played, Player
 from gsl.runner.request import due, read_request
 from gsl.runner.robots import PerfectRobot, robot_of
 from gsl.runner.senses import RobotError
+
+LATE = 0.002  # of a tick, that is worth telling [s]
 
 
 def main(folder: Path, words: Sequence[str]) -> int:
@@ -48,7 +50,7 @@ def say(text: str) -> None:
 def dry_run(request: Mapping[str, Any]) -> int:
     """Play every episode against a perfect robot and tell rates and extremes; return 1 if a target is refused."""
     robot = PerfectRobot(request)
-    stage, ticks, stops = Stage(request, robot, paced=False), 0, 0
+    stage, ticks, stops = Player(request, robot, paced=False), 0, 0
     begin = time.perf_counter()
     for episode in request["episodes"]:
         stage.approach(episode)
@@ -78,13 +80,11 @@ class Sitting:
         for name in asked.episode or ():
             if name not in names:
                 raise RobotError(f"there is no episode {name}; there is {', '.join(names)}")
-        self._stage = Stage(request, robot_of(asked.robot), paced=not asked.unpaced)
+        self._player = Player(request, robot_of(asked.robot), paced=not asked.unpaced)
 
     def run(self) -> int:
         """Run the episodes that are missing, or those that were named."""
         say(self._request["about"])
-        for name in self._asked.episode or ():
-            self._forget(name)
         for episode in self._sitting():
             if not self._ask(f"{episode['name']} ({self._seconds(episode):g} s): Enter ramps in, q ends"):
                 break
@@ -94,23 +94,34 @@ class Sitting:
         return 0
 
     def _one(self, episode: Mapping[str, Any]) -> None:
-        stage = self._stage
-        stage.approach(episode)
-        if not self._ask("it stands at the start: Enter begins, q goes on to nothing else"):
-            stage.leave(episode, hold=False)
+        player = self._player
+        player.approach(episode)
+        if not self._ask("it stands at the start: Enter begins, q ends"):
+            player.leave(episode, hold=False)
             raise KeyboardInterrupt
         try:
-            played = stage.play(episode)
+            played = player.play(episode)
         except BaseException:
-            stage.leave(episode, hold=True)
+            player.leave(episode, hold=True)
             raise
-        late = f", {1e3 * stage.clock.worst:.0f} ms late at worst" if stage.clock.worst > 0.002 else ""
-        stage.leave(episode, hold=played.fell or bool(played.stopped))
-        journal.append(self._asked.log, self._request["hash"], played.columns, played.rows)
-        ended = f"refused: {played.stopped}; held, then ramped out" if played.stopped else ""
-        say(f"{episode['name']}: {len(played.rows) - 1} steps{late}{', fell' * played.fell}{'; ' * bool(ended)}{ended}")
+        late = f", {1e3 * player.clock.worst:.0f} ms late at worst" if player.clock.worst > LATE else ""
+        player.leave(episode, hold=played.fell or played.broken or bool(played.stopped))
+        if played.broken:
+            played = self._broken(played)
+        if len(played.rows) > 1:
+            journal.keep(self._asked.log, self._request["hash"], played.columns, played.rows)
+        else:  # its first target was refused: there is nothing to log
+            journal.add_return(self._returns, self._request["hash"], episode["name"], "", fell=True)
+        ended = f"; refused: {played.stopped}; held, then ramped out" if played.stopped else ""
+        say(f"{episode['name']}: {len(played.rows) - 1} steps{late}{', fell' * played.fell}{ended}")
         if self._request["distance"] and "base.position.x" not in played.columns:
             self._measure(episode, fell=played.fell or bool(played.stopped))
+
+    def _broken(self, played: Played) -> Played:
+        """Ask why a person broke an episode off: a fall is a result and must not be lost, anything else is none."""
+        if len(played.rows) > 1 and not self._asked.yes and self._yes("was it a fall? y keeps it, n runs it again"):
+            return played.as_a_fall()
+        raise KeyboardInterrupt
 
     def _measure(self, episode: Mapping[str, Any], *, fell: bool) -> None:
         """Ask a person for what the robot cannot tell."""
@@ -123,12 +134,11 @@ class Sitting:
                 self._returns, self._request["hash"], episode["name"], "" if fallen else told, fell=fell or fallen
             )
 
-    def _forget(self, name: str) -> None:
-        numbers = {one["name"]: index for index, one in enumerate(self._request["episodes"])}
-        journal.without(self._asked.log, numbers[name])
-
     def _sitting(self) -> Iterator[Mapping[str, Any]]:
-        """Yield what is due now, again and again, since a fall may spare what would have followed."""
+        """Yield those that are named, or what is due, asked again and again: a fall may spare what would follow."""
+        if self._asked.episode:
+            yield from (one for one in self._request["episodes"] if one["name"] in self._asked.episode)
+            return
         count = 0
         while (missing := self._due()) and not count >= self._asked.most > 0:
             yield missing[0]
@@ -137,12 +147,15 @@ class Sitting:
     def _due(self) -> list[Mapping[str, Any]]:
         episodes = self._request["episodes"]
         ends = {episodes[number]["name"]: down for number, down in journal.ends(self._asked.log).items()}
-        told = {name for name, row in journal.returned(self._returns).items() if row["fell"].lower() in journal.YES}
-        missing = due(self._request, ends, {name for name, down in ends.items() if down} | told)
-        return [one for one in missing if not self._asked.episode or one["name"] in self._asked.episode]
+        told = journal.returned(self._returns).items()
+        fallen = {name for name, row in told if (row["fell"] or "").lower() in journal.YES}
+        return list(due(self._request, {*ends, *fallen}, {name for name, down in ends.items() if down} | fallen))
 
     def _ask(self, question: str) -> bool:
         return self._asked.yes or input(f"{question}: ").strip().lower() != "q"
+
+    def _yes(self, question: str) -> bool:
+        return input(f"{question}: ").strip().lower() in ("y", "yes")
 
     def _seconds(self, episode: Mapping[str, Any]) -> float:
         return float(episode["steps"] * self._request["control_period"])

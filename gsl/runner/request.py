@@ -13,6 +13,7 @@ from gsl.errors import ArtifactError
 
 NAME = "request.json"
 SCHEMA_VERSION = 1
+GROUND, HELD = "on the ground", "held in the air"
 
 
 def hash_of(request: Mapping[str, Any]) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.core.layout import check_alike
+from gsl.core.observation import placed
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
@@ -168,7 +169,7 @@ class Iterate:
         scenario = settled(Scenario(self.sim, self.task, self.policy, SIM, ready), search.metrics)
         heldout = read(place / "train_forward" / HELDOUT)
         walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
-        if not isinstance(scenario.world, BulletWorld):
-            return  # there are no joints to draw
+        if not isinstance(scenario.world, BulletWorld) or not placed(walk):
+            return  # there are no joints to draw, or nobody knows where the body was
         write_trace(folder, scenario.world, scenario.grounding, walk)
         walk_strip(scenario.world.plant.robot, walk, folder / "walk.png")

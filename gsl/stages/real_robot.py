@@ -14,7 +14,7 @@ from gsl.grounding.ane import ActionNoise
 from gsl.grounding.grounding import Grounding
 from gsl.policies.programme import OpenLoopRun
 from gsl.runner.guard import Guard
-from gsl.runner.request import NAME, due, read_request
+from gsl.runner.request import GROUND, HELD, NAME, due, read_request
 from gsl.stages.judging import Verdict, by_distance, judged
 from gsl.stages.population import Job, trajectories
 from gsl.stages.rollout import Scenario
@@ -142,7 +142,7 @@ def _request(scenario: Scenario, orders: Sequence[Order], errand: Errand) -> dic
         {
             "about": errand.about,
             "robot": world.robot,
-            "place": "on the ground" if world.floating else "held in the air",
+            "place": GROUND if world.floating else HELD,
             "joints": layout.joints,
             "control_period": layout.control_period,
             "observes": layout.sizes,

@@ -18,7 +18,7 @@ from gsl.core.setting import component, setting
 from gsl.errors import ArtifactError, ConfigError, GslError
 from gsl.runner import bridge
 from gsl.runner.journal import ANSWER, RETURNS, add_return, ends
-from gsl.runner.request import NAME, read_request
+from gsl.runner.request import HELD, NAME, read_request
 from gsl.storage.requests import files_of
 from gsl.worlds.world import World
 
@@ -51,6 +51,8 @@ class Rehearse:
         layout = self.world.layout
         if list(layout.joints) != request["joints"] or layout.control_period != request["control_period"]:
             raise ConfigError("world", f"is no stand-in for {request['robot']}: it has other joints or another rate")
+        if getattr(self.world, "floating", True) == (request["place"] == HELD):
+            raise ConfigError("world.floating", f"the request is for a robot {request['place']}")
         env = self.world.make()
         try:
             surrogate = Surrogate(request, env, layout, blind=self.tape)
