@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scenarios import QUIET
 
 from gsl.errors import Waiting
 from gsl.grounding.ane import ActionNoise
@@ -17,7 +18,6 @@ from gsl.stages.real_robot import Errand, Order, asked
 from gsl.stages.rollout import Scenario
 from gsl.tasks.task import REAL, Task
 from gsl.worlds.external import ExternalRobot
-from scenarios import QUIET
 
 
 def requested(

@@ -78,7 +78,7 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
             "no world called wrn; did you mean worn? There is cliff_walking, cliff_walking_noisy, gymnasium, "
             "half_cheetah, half_cheetah_noisy, hopper, hopper_heavy, ideal, inverted_pendulum, "
             "inverted_pendulum_heavy, inverted_pendulum_noisy, nao_drawn_a, nao_drawn_b, nao_harsh, nao_ideal, "
-            "nao_uneven, nao_weak, nao_worn, plain, walker2d, walker2d_heavy, worn",
+            "nao_uneven, nao_weak, nao_worn, plain, robot, walker2d, walker2d_heavy, worn",
         ),
         (
             ["experiment=lng"],
@@ -206,7 +206,12 @@ OF_ENVIRONMENTS = {  # what is for gymnasium environments, and goes with no robo
     "grounding": ("random_choice",),
     "trial": ("gymnasium",),
 }
-NEEDED = {"diagnose": ("real=logs",), "identify": ("real=logs",)}  # what has no default
+NEEDED = {  # what has no default
+    "diagnose": ("real=logs",),
+    "identify": ("real=logs",),
+    "rehearse": ("request=asked",),
+    "answer": ("request=asked",),
+}
 
 
 def _choices() -> Iterator[tuple[str, ...]]:
@@ -227,7 +232,9 @@ def _choices() -> Iterator[tuple[str, ...]]:
         yield "iterate", f"experiment={name}", *(cart if name == "gymnasium" else ())
     for grounding in ("none", "ane", "gat", "sgat"):
         yield "iterate", "experiment=gymnasium", f"grounding={grounding}", *cart
-    for world in sorted((conf / "world").glob("[!n]*.yaml")):
+    for command in ("collect world", "evaluate world", "iterate real"):
+        yield command.split()[0], f"{command.split()[1]}=robot"
+    for world in sorted((conf / "world").glob("[!nr]*.yaml")):
         place = ("world.env_id=examples.cart:Cart",) if world.stem == "gymnasium" else ()
         policy = "action_table" if world.stem.startswith("cliff") else "mlp"
         for command in ("collect", "optimize"):

@@ -1,4 +1,4 @@
-"""The runner beside a robot: acts as gsl's policies do, to the bit, with numpy alone, and lets nothing unsafe through."""
+"""The runner beside a robot acts as gsl's policies do, to the bit, with numpy alone, and sends nothing unsafe."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from gsl.runner.acting import Actor
 from gsl.runner.journal import RETURNS
 from gsl.runner.request import NAME, layout_of, read_request
 from gsl.storage import trajectories
-from gsl.storage.answers import check_lengths, csv_episodes, read_log, read_returns
+from gsl.storage.answers import STOPPED, check_lengths, csv_episodes, read_log, read_returns
 from gsl.storage.references import resolve
 
 FILE = "answer.parquet"
@@ -43,8 +43,8 @@ class Answer:
 
     def parents(self) -> Mapping[str, Path]:
         """Return the request and the files that answer it."""
-        files = {name: resolve(file) for name, file in (("logs", self.logs), ("returns", self.returns)) if file}
         read_request(Path(self.request))
+        files = {name: resolve(file) for name, file in (("logs", self.logs), ("returns", self.returns)) if file}
         return {**files, "request": Path(self.request) / NAME}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
@@ -91,7 +91,18 @@ class Answer:
 
 
 def _csv(source: Path, request: Mapping[str, Any]) -> list[Trajectory]:
-    return [episode for _, episode in csv_episodes(source, request)]
+    """Return the episodes of a file; of the runner's own ones, a stop for safety is a fall."""
+    found = [episode for _, episode in csv_episodes(source, request)]
+    return [replace(one, fell=_down(one), sensors=_without(one.sensors, STOPPED)) for one in found]
+
+
+def _down(episode: Trajectory) -> np.ndarray:
+    down = np.zeros(len(episode) + 1, dtype=bool) if episode.fell is None else episode.fell
+    return down | np.asarray(episode.sensors.get(STOPPED, down), dtype=bool)
+
+
+def _without(sensors: Mapping[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
+    return {key: values for key, values in sensors.items() if key != name}
 
 
 def _parquet(source: Path, request: Mapping[str, Any]) -> list[Trajectory]:

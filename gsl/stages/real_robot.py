@@ -18,6 +18,7 @@ from gsl.runner.request import GROUND, HELD, NAME, due, read_request
 from gsl.stages.judging import Verdict, by_distance, judged
 from gsl.stages.population import Job, trajectories
 from gsl.stages.rollout import Scenario
+from gsl.storage import manifest
 from gsl.storage.answers import Answered, answer_files, read_answers
 from gsl.storage.requests import sealed, write_request
 from gsl.worlds.bullet import BulletWorld
@@ -25,6 +26,7 @@ from gsl.worlds.external import ExternalRobot
 from gsl.worlds.world import World
 
 SHOWN = 6  # names of missing episodes
+REHEARSAL = "rehearse"
 
 
 class Order(NamedTuple):
@@ -82,6 +84,9 @@ def asked(
     missing = [one["name"] for one in due(request, done, {name for name, one in done.items() if one.episode.fell})]
     if missing:
         raise Waiting(_told(folder, request, missing, answers), folder, missing)
+    for path in sorted({one.path.parent for one in answers.values()}):
+        if (path / manifest.NAME).is_file() and manifest.read(path).kind == REHEARSAL:
+            console.status(f"{path.as_posix()}: this is a rehearsal: no real robot has acted")
     return [done.get(episode["name"]) for episode in request["episodes"]]
 
 

@@ -19,6 +19,7 @@ from gsl.errors import ArtifactError, ConfigError, GslError
 from gsl.runner import bridge
 from gsl.runner.journal import ANSWER, RETURNS, add_return, ends
 from gsl.runner.request import HELD, NAME, read_request
+from gsl.stages.real_robot import REHEARSAL
 from gsl.storage.requests import files_of
 from gsl.worlds.world import World
 
@@ -32,7 +33,7 @@ class Rehearse:
     What the surrogate sees of its base goes into the log, unless a tape measure is to be rehearsed as well.
     """
 
-    kind: ClassVar[str] = "rehearse"
+    kind: ClassVar[str] = REHEARSAL
 
     request: Annotated[str, setting("folder of the request", min_length=1)]
     world: Annotated[World, setting("what plays the robot's part")]

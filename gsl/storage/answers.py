@@ -226,6 +226,8 @@ def _csv_columns(path: Path, request: Mapping[str, Any]) -> dict[str, np.ndarray
         table = pc.read_csv(path, read_options=pc.ReadOptions(skip_rows=above))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise TrajectoryError(path, f"is no CSV file with a row of names: {' '.join(str(error).split())}") from error
+    if not table.num_rows:
+        raise TrajectoryError(path, "has no rows; nothing was logged")
     return {name: _values(path, name, table.column(name)) for name in table.column_names}
 
 
