@@ -52,7 +52,14 @@ def direct(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def loop(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
     folder = tmp_path_factory.mktemp("loop")
     first = _asked(*LOOP, "name=loop", folder=folder)
-    done("rehearse", f"request={first}", "world=nao_worn", "most=4", "name=day_1", folder=folder)
+    done(
+        "rehearse",
+        f"request={first}",
+        "world=nao_worn",
+        "episodes=[pi0_01,pi0_02,pi0_03,pi0_04]",
+        "name=day_1",
+        folder=folder,
+    )
     again = gsl(*LOOP, "name=loop", folder=folder)
     assert "2 of 6 episodes are missing, 3 s in all (neighbour_01, neighbour_02)" in again.err
     done("answer", f"request={first}", f"logs={_rest(folder, first)}", "episodes=[neighbour_01,neighbour_02]",
@@ -190,6 +197,11 @@ def _changed(lines: list[str], column: str, value: str, row: int = 5) -> list[st
         (lambda lines: [lines[0]], "is no CSV file with a row of names: "),
         (lambda lines: lines[:2], "has no rows"),
         (lambda lines: lines[: 2 + 40], "must be empty (NaN) in the last row of an episode"),
+        (
+            lambda lines: [line.replace("gyro.x", "gyro.y") for line in lines],
+            "column gyro.y: there are 2 columns of th",
+        ),
+        (lambda lines: ["\x80\x04K\x01.", *lines[2:]], "does not say which request it answers"),
         (lambda lines: _changed(lines, "gyro.x", "fast"), "column gyro.x: holds what is not a number"),
         (lambda lines: _changed(lines, "position.LKneePitch", ""), "column position.LKneePitch, row 3: is not a fini"),
         (lambda lines: _changed(lines, "fell", "maybe"), "column fell: must be true or false"),
@@ -212,6 +224,7 @@ def test_a_bad_answer_is_refused_in_one_line(
     ("rows", "problem"),
     [
         ("pi0_99,0.1,no", "the request has no episode 'pi0_99'; did you mean pi0_0"),
+        ("name,metres\npi0_01,0.1", "needs the columns episode, distance (or value) and fell; it has name, metres"),
         ("pi0_01,far,no", "row 1: distance is 'far', not a number"),
         ("pi0_01,nan,no", "row 1: distance is not a finite number"),
         ("pi0_01,140,no", "row 1: a distance of 140 m; is it in metres?"),
@@ -220,7 +233,8 @@ def test_a_bad_answer_is_refused_in_one_line(
     ],
 )
 def test_bad_returns_are_refused_in_one_line(place: Path, rows: str, problem: str) -> None:
-    (place / ASKED / RETURNS).write_text(f"episode,distance,fell\n{rows}\n")
+    head = "" if rows.startswith("name") else "episode,distance,fell\n"
+    (place / ASKED / RETURNS).write_text(f"{head}{rows}\n")
     said = refused(*COLLECT, folder=place)
     assert said.startswith(f"{ASKED}/{RETURNS}") and problem in said
 
@@ -266,13 +280,15 @@ def test_the_log_of_another_episode_is_noticed(place: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "problem"),
     [
+        (("episodes=[pi0_09]",), "the runner ended with exit code 2: runner.py: there is no episode pi0_09; there is"),
         (("world.floating=false",), "world.floating: the request is for a robot on the ground"),
         (("world.period=0.01",), "world: is no stand-in for nao: it has other joints or another rate"),
         (("world=robot",), "world: a real robot somewhere else cannot be simulated; it serves as real= of iterate"),
     ],
 )
 def test_a_rehearsal_that_cannot_be_is_refused_in_one_line(place: Path, words: tuple[str, ...], problem: str) -> None:
-    assert refused("rehearse", f"request={ASKED}", *words, folder=place).startswith(problem)
+    code = 1 if "runner" in problem else 2
+    assert refused("rehearse", f"request={ASKED}", *words, folder=place, code=code).startswith(problem)
 
 
 def test_a_rehearsal_runs_no_code_that_gsl_did_not_write(place: Path) -> None:
@@ -294,6 +310,18 @@ def test_a_robot_that_cannot_be_asked_is_refused_in_one_line(
     tmp_path: Path, words: tuple[str, ...], problem: str
 ) -> None:
     assert problem in refused(*COLLECT, *words, folder=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (("iterate", "sim=robot"), "sim: is a real robot, which cannot play the simulator's part"),
+        (("collect", "role=sim", "world=robot"), "world: is a real robot, which cannot play the simulator's part"),
+        (("optimize", "world=robot", "grounding=none"), "world: a real robot somewhere else cannot be simulated; it"),
+    ],
+)
+def test_a_real_robot_is_no_simulator(tmp_path: Path, words: tuple[str, ...], problem: str) -> None:
+    assert refused(*words, *SMALL, "name=one", folder=tmp_path).startswith(problem)
 
 
 def test_an_excitation_in_the_air_goes_out_as_a_table_of_commands(tmp_path: Path) -> None:

@@ -203,8 +203,34 @@ def test_an_answer_in_two_sittings(walk: Path, tmp_path: Path) -> None:
     assert (rows["two"]["distance"], rows["two"]["fell"]) == ("", "yes")
 
 
+BROKEN = """
+reads, plain = 0, read
+def read():
+    global reads
+    reads += 1
+    if reads == 20:
+        raise KeyboardInterrupt
+    return plain()
+"""
+
+
+@pytest.mark.parametrize(("typed", "kept"), [("y", {0: True}), ("n", {})])
+def test_an_episode_broken_off_is_a_fall_if_a_person_says_so_and_else_nothing(
+    walk: Path, tmp_path: Path, typed: str, kept: dict[int, bool]
+) -> None:
+    path = Path(_robot(tmp_path).removeprefix("--robot="))
+    path.write_text(path.read_text() + BROKEN)
+    log = tmp_path / "answer.csv"
+    done = run(walk, f"--robot={path}", f"--log={log}", "--unpaced", typed=f"\n\n{typed}\n\nq\n")
+    assert "was it a fall?" in done.stdout
+    assert journal.ends(log) == kept
+    if kept:
+        rows = [line.split(",") for line in log.read_text().splitlines()[2:]]
+        assert len(rows) == 18 and rows[-1][1] == "17" and rows[-1][3] == ""  # the last action has no state
+
+
 def test_a_clock_that_is_real_keeps_the_rate(walk: Path, tmp_path: Path) -> None:
-    run(walk, _robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--yes", "--most=1")
+    run(walk, _robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--yes", "--episode=one")
     times = np.loadtxt(tmp_path / "answer.csv", delimiter=",", skiprows=2, usecols=2, dtype=float)
     assert len(times) == 31 and np.diff(times).min() > 0.0
     assert np.median(np.diff(times)) == pytest.approx(PERIOD, rel=0.1)

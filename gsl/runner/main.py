@@ -26,7 +26,6 @@ def main(folder: Path, words: Sequence[str]) -> int:
     parser.add_argument("--log", type=Path, default=folder / journal.ANSWER, help="the answer")
     parser.add_argument("--episode", action="append", metavar="NAME", help="run this one only, again if it was run")
     parser.add_argument("--dry-run", action="store_true", help="play against a perfect robot; nothing is written")
-    parser.add_argument("--most", type=int, default=0, metavar="N", help="episodes of this sitting, at most")
     parser.add_argument("--yes", action="store_true", help="ask nothing")
     parser.add_argument("--unpaced", action="store_true", help="do not wait for the clock: for a simulated robot")
     asked = parser.parse_args(words)
@@ -139,10 +138,8 @@ class Sitting:
         if self._asked.episode:
             yield from (one for one in self._request["episodes"] if one["name"] in self._asked.episode)
             return
-        count = 0
-        while (missing := self._due()) and not count >= self._asked.most > 0:
+        while missing := self._due():
             yield missing[0]
-            count += 1
 
     def _due(self) -> list[Mapping[str, Any]]:
         episodes = self._request["episodes"]

@@ -23,7 +23,7 @@ from gsl.stages.programme import command_file, playing
 from gsl.stages.real_robot import Errand, Order, answer_parents, asked
 from gsl.stages.rollout import Scenario
 from gsl.storage.trajectories import write
-from gsl.tasks.task import Task
+from gsl.tasks.task import SIM, Task
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.world import World
 
@@ -56,6 +56,8 @@ class Collect:
     def __post_init__(self) -> None:
         """Tell the policy its world."""
         object.__setattr__(self, "policy", sized(self.policy, self.world))
+        if self.role == SIM and isinstance(self.world, ExternalRobot):
+            raise ConfigError("world", "is a real robot, which cannot play the simulator's part")
         if self.world.layout.choices and self.action_noise > 1.0:
             given = f"{self.action_noise:g}"
             raise ConfigError("action_noise", "is the chance of another choice here, 1 at most", given=given)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -136,12 +137,10 @@ def _written(folder: Path, request: Mapping[str, Any]) -> bool:
 def _request(scenario: Scenario, orders: Sequence[Order], errand: Errand) -> dict[str, Any]:
     world, layout = scenario.world, scenario.world.layout
     assert isinstance(world, ExternalRobot)
-    counts: dict[str, int] = {}
-    several = {order.policy for index, order in enumerate(orders) if order.policy in {o.policy for o in orders[:index]}}
-    episodes = []
+    wanted, so_far, episodes = Counter(order.policy for order in orders), Counter[str](), []
     for order in orders:
-        counts[order.policy] = counts.get(order.policy, 0) + 1
-        name = f"{order.policy}_{counts[order.policy]:02d}" if order.policy in several else order.policy
+        so_far[order.policy] += 1
+        name = f"{order.policy}_{so_far[order.policy]:02d}" if wanted[order.policy] > 1 else order.policy
         episodes.append({"name": name, **_episode(scenario, order)})
     return sealed(
         {

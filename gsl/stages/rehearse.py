@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -38,7 +38,7 @@ class Rehearse:
     request: Annotated[str, setting("folder of the request", min_length=1)]
     world: Annotated[World, setting("what plays the robot's part")]
     tape: Annotated[bool, setting("measure distances with a tape: nothing of the base is logged")] = False
-    most: Annotated[int | None, setting("episodes of this sitting, at most; none for all", ge=1)] = None
+    episodes: Annotated[tuple[str, ...], setting("names of the episodes of this sitting; none for all")] = ()
 
     def parents(self) -> Mapping[str, Path]:
         """Return the request."""
@@ -58,7 +58,7 @@ class Rehearse:
         try:
             surrogate = Surrogate(request, env, layout, blind=self.tape)
             with console.progress(len(request["episodes"]), "rehearsing") as progress:
-                surrogate.serve(place, folder / ANSWER, self.most, progress)
+                surrogate.serve(place, folder / ANSWER, self.episodes, progress)
         finally:
             env.close()
         if self.tape and request["distance"]:
@@ -81,7 +81,7 @@ class Surrogate:
         self._acting, self._fell, self._name = False, False, ""
         self.measured: dict[str, tuple[float, bool]] = {}
 
-    def serve(self, folder: Path, log: Path, most: int | None, progress: Any) -> None:
+    def serve(self, folder: Path, log: Path, episodes: Sequence[str], progress: Any) -> None:
         """Run the runner of a folder until it ends.
 
         Raises:
@@ -89,7 +89,7 @@ class Surrogate:
         """
         (to_us, from_runner), (to_runner, from_us) = os.pipe(), os.pipe()
         words = [sys.executable, "-I", str((folder / "runner.py").resolve()), f"--robot={bridge.__file__}"]
-        words += [f"--log={log.resolve()}", "--yes", "--unpaced", *([f"--most={most}"] if most else [])]
+        words += [f"--log={log.resolve()}", "--yes", "--unpaced", *(f"--episode={name}" for name in episodes)]
         environment = {**os.environ, bridge.PIPES: f"{to_runner},{from_runner}", "PYTHONDONTWRITEBYTECODE": "1"}
         with subprocess.Popen(
             words, env=environment, pass_fds=(to_runner, from_runner), stdout=subprocess.PIPE, stderr=subprocess.STDOUT
@@ -103,7 +103,7 @@ class Surrogate:
             assert process.stdout is not None
             said = process.stdout.read().decode().strip()
         if process.returncode:
-            raise GslError(f"the runner ended with exit code {process.returncode}: {said.splitlines()[-1:] or said}")
+            raise GslError(f"the runner ended with exit code {process.returncode}: {said.rpartition(chr(10))[2]}")
 
     def _answer(self, call: Mapping[str, Any], progress: Any) -> Any:
         match call["do"]:

@@ -124,8 +124,13 @@ def read_returns(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
     if told := marked(path):
         check_marked(path, told, request)
     found: dict[str, Answered] = {}
-    with path.open(encoding="utf-8", newline="") as file:
-        for number, row in enumerate(csv.DictReader(line for line in file if not line.startswith("#")), start=1):
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        table = csv.DictReader(line for line in file if not line.startswith("#"))
+        names = table.fieldnames or ()
+        if not {"episode", "fell"} <= set(names) or not {"distance", "value"} & set(names):
+            needed = "needs the columns episode, distance (or value) and fell"
+            raise ArtifactError(path, f"{needed}; it has {', '.join(names)[:80] or 'none'}")
+        for number, row in enumerate(table, start=1):
             name = _known(path, (row.get("episode") or "").strip(), request)
             _once(found.get(name), path, name)
             found[name] = _measured(path, number, row)
@@ -226,6 +231,9 @@ def _csv_columns(path: Path, request: Mapping[str, Any]) -> dict[str, np.ndarray
         table = pc.read_csv(path, read_options=pc.ReadOptions(skip_rows=above))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise TrajectoryError(path, f"is no CSV file with a row of names: {' '.join(str(error).split())}") from error
+    for name in table.column_names:
+        if (count := table.column_names.count(name)) > 1:
+            raise TrajectoryError(path, f"there are {count} columns of this name; keep one", column=name)
     if not table.num_rows:
         raise TrajectoryError(path, "has no rows; nothing was logged")
     return {name: _values(path, name, table.column(name)) for name in table.column_names}
