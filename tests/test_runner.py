@@ -193,8 +193,10 @@ def test_a_dry_run_plays_everything_and_writes_nothing(walk: Path) -> None:
 
 def test_an_answer_in_two_sittings(walk: Path, tmp_path: Path) -> None:
     words = (_robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--unpaced")
-    first = run(walk, *words, typed="\n\n0.12\nq\n")
+    first = run(walk, *words, typed="\n\n0,12\n0.12\nq\n")
     assert first.returncode == 0 and "1 episodes are missing" in first.stdout
+    assert "'0,12' is no number of metres" in first.stdout
+    assert run(walk, *words).stdout.endswith("runner.py: there is nobody to ask; --yes asks nothing\n")
     second = run(walk, *words, typed="\n\nf\n")
     assert "all is answered" in second.stdout
     assert journal.ends(tmp_path / "answer.csv") == {0: False, 1: False}

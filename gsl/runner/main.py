@@ -17,6 +17,7 @@ from gsl.runner.robots import PerfectRobot, robot_of
 from gsl.runner.senses import RobotError
 
 LATE = 0.002  # of a tick, that is worth telling [s]
+MOST = 100.0  # that a robot may walk in an episode [m]
 
 
 def main(folder: Path, words: Sequence[str]) -> int:
@@ -34,6 +35,9 @@ def main(folder: Path, words: Sequence[str]) -> int:
         return dry_run(request) if asked.dry_run else Sitting(request, asked).run()
     except GslError as error:
         say(f"runner.py: {error}")
+        return 2
+    except EOFError:
+        say("runner.py: there is nobody to ask; --yes asks nothing")
         return 2
     except KeyboardInterrupt:
         say("runner.py: interrupted; what was complete is kept")
@@ -126,9 +130,11 @@ class Sitting:
         """Ask a person for what the robot cannot tell."""
         if self._asked.yes:
             return
-        told = input("distance walked forward [m], f if it fell, Enter to write it into returns.csv later: ").strip()
+        question = "distance walked forward [m], f if it fell, Enter to write it into returns.csv later: "
+        while not _is_distance(told := input(question).strip().lower()):
+            say(f"'{told}' is no number of metres")
         if told:
-            fallen = told.lower() == "f"
+            fallen = told == "f"
             journal.add_return(
                 self._returns, self._request["hash"], episode["name"], "" if fallen else told, fell=fell or fallen
             )
@@ -156,3 +162,10 @@ class Sitting:
 
     def _seconds(self, episode: Mapping[str, Any]) -> float:
         return float(episode["steps"] * self._request["control_period"])
+
+
+def _is_distance(told: str) -> bool:
+    try:
+        return told in ("", "f") or abs(float(told)) < MOST
+    except ValueError:
+        return False
