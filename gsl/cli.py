@@ -115,6 +115,8 @@ stage("reproduce fig13", "A cheetah with noisy actions, as in the paper's figure
 stage("reproduce garat", "The heavier worlds of the GARAT suite (gsl[mujoco,rl]).")
 stage("reproduce budget", "Return and grounding error against the number of real trajectories.")
 stage("survey", "See how far real worlds are from the simulator.")
+stage("answer", "Check logs and measured returns of a real robot, and take them in for a request.")
+stage("rehearse", "Let a simulated world answer a request as the real robot would.")
 stage("iterate", "The whole chain, again and again, until the real return stops improving.")
 
 

@@ -5,6 +5,8 @@ GslError                    exit code 1: a stage failed
     ├── ConfigError         a setting does not exist or has an impossible value
     ├── ArtifactError       an artifact is missing, foreign, incomplete or of another version
     └── TrajectoryError     a trajectory file breaks the contract
+
+Waiting is no error: it ends a command that goes on another day.
 """
 
 from __future__ import annotations
@@ -27,6 +29,16 @@ def _again(kind: type[GslError], args: tuple[Any, ...], state: dict[str, Any]) -
     error = kind.__new__(kind, *args)
     error.__dict__.update(state)
     return error
+
+
+class Waiting(GslError):
+    """Nothing went wrong: a real robot has to act now, and the same command goes on from what it did."""
+
+    exit_code = 0
+
+    def __init__(self, message: str, request: Path, missing: list[str]) -> None:
+        super().__init__(message)
+        self.request, self.missing = request, missing
 
 
 class InputError(GslError):

@@ -15,10 +15,11 @@ MAY_IMPORT = {
     "effects": ("core",),
     **{room: ("core", "effects", *COMPONENTS) for room in COMPONENTS},
     "diagnosis": ("core", "effects", *COMPONENTS),
-    "storage": ("core", "effects", *COMPONENTS),
+    "runner": ("core", "grounding"),
+    "storage": ("core", "effects", *COMPONENTS, "runner"),
     "report": ("core", "effects", *COMPONENTS),
     "blind": ("core", "effects", *COMPONENTS, "diagnosis", "storage", "report"),
-    "stages": ("core", "effects", *COMPONENTS, "diagnosis", "blind", "storage", "report"),
+    "stages": ("core", "effects", *COMPONENTS, "diagnosis", "blind", "runner", "storage", "report"),
 }
 ANYWHERE = ("errors", "console")
 COMPOSING = ("composer", "config_errors", "known_settings", "multirun")

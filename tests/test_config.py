@@ -78,7 +78,8 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
             "no world called wrn; did you mean worn? There is cliff_walking, cliff_walking_noisy, go2_in_air, "
             "gymnasium, half_cheetah, half_cheetah_noisy, hopper, hopper_heavy, ideal, inverted_pendulum, "
             "inverted_pendulum_heavy, inverted_pendulum_noisy, nao_drawn_a, nao_drawn_b, nao_harsh, nao_ideal, "
-            "nao_uneven, nao_weak, nao_worn, plain, so101, urdf, walker2d, walker2d_heavy, worn, xl330_pendulum",
+            "nao_uneven, nao_weak, nao_worn, plain, robot, so101, urdf, walker2d, walker2d_heavy, worn, "
+            "xl330_pendulum",
         ),
         (
             ["experiment=lng"],
@@ -208,7 +209,13 @@ OF_ENVIRONMENTS = {  # what is for gymnasium environments, and goes with no robo
 }
 HELD = ("go2_in_air", "so101", "urdf", "xl330_pendulum")  # robots without feet
 EXAMPLE = Path(__file__).parents[1] / "examples/arm.urdf"
-NEEDED = {"diagnose": ("real=logs",), "identify": ("real=logs",)}  # what has no default
+NEEDED = {  # what has no default
+    "diagnose": ("real=logs",),
+    "identify": ("real=logs",),
+    "cross_validate": ("real=logs", "by=kp"),
+    "rehearse": ("request=asked",),
+    "answer": ("request=asked",),
+}
 
 
 def _choices() -> Iterator[tuple[str, ...]]:
@@ -229,11 +236,13 @@ def _choices() -> Iterator[tuple[str, ...]]:
         yield "iterate", f"experiment={name}", *(cart if name == "gymnasium" else ())
     for grounding in ("none", "ane", "gat", "sgat"):
         yield "iterate", "experiment=gymnasium", f"grounding={grounding}", *cart
+    for command in ("collect world", "evaluate world", "iterate real"):
+        yield command.split()[0], f"{command.split()[1]}=robot"
     for world in HELD:
         mine = (f"robot={EXAMPLE}",) if world == "urdf" else ()
         yield "collect", f"world={world}", *(f"world.{one}" for one in mine), "task=excite"
         yield "diagnose", f"sim={world}", *(f"sim.{one}" for one in mine), "real=logs"
-    others = (one for one in sorted((conf / "world").glob("[!n]*.yaml")) if one.stem not in HELD)
+    others = (one for one in sorted((conf / "world").glob("[!n]*.yaml")) if one.stem not in (*HELD, "robot"))
     for world in others:
         place = ("world.env_id=examples.cart:Cart",) if world.stem == "gymnasium" else ()
         policy = "action_table" if world.stem.startswith("cliff") else "mlp"

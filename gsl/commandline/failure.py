@@ -7,15 +7,19 @@ import sys
 
 from gsl.console import Console
 from gsl.core.interruption import asked
-from gsl.errors import GslError
+from gsl.errors import GslError, Waiting
 
 INTERRUPTED = 130
 
 
 def report(failure: BaseException, console: Console, *, command: str = "gsl") -> int:
-    """Say what ended a command and return its exit code: 2 usage and input, 1 a stage failed, 130 interrupted."""
+    """Say what ended a command and return its exit code: 2 usage, input; 1 a stage failed; 130 interrupted; 0 waits."""
     if isinstance(failure, KeyboardInterrupt) or asked():
         return console.error("interrupted", INTERRUPTED, command=command)
+    if isinstance(failure, Waiting):
+        console.status(str(failure))
+        console.result({"waiting": failure.request, "missing": failure.missing}, text=failure.request.as_posix())
+        return failure.exit_code
     if os.environ.get("GSL_TRACEBACK") == "1":
         raise failure
     message, exit_code = described(failure)

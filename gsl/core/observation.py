@@ -32,6 +32,11 @@ def observations(episode: Trajectory, layout: Layout) -> np.ndarray:
     return states
 
 
+def placed(episode: Trajectory) -> bool:
+    """Tell whether an episode was recorded with anything of the base, so that a simulation may start from it."""
+    return any(name.startswith("base.") for name in episode.sensors)
+
+
 def sensed(episode: Trajectory, sensors: Iterable[str]) -> np.ndarray:
     """Return the body sensors that a window names, shape (T + 1, number of entries); see `observations`."""
     columns = [

@@ -3,6 +3,9 @@
 `values` are the 15 parameters of the paper's Table 1 in its order (the rows below). Six are inert in a straight walk:
 max_left, max_turn, max_left_change, max_turn_change, left_extra_foot_height, and pendulum_height, which in the public
 releases of the engine feeds only a diagnostic model.
+
+Compiled or not it gives the same bits (a robot's runner has no compiler), so squares are products: Python rounds x**2
+otherwise.
 """
 
 from __future__ import annotations
@@ -74,7 +77,7 @@ def step(values: np.ndarray, state: np.ndarray, request: np.ndarray, sensed: np.
 def ramp(u: float) -> float:
     """Acceleration-limited ramp from 0 to 1."""
     u = min(1.0, max(0.0, u))
-    return 2.0 * u * u if u < 0.5 else 1.0 - 2.0 * (1.0 - u) ** 2
+    return 2.0 * u * u if u < 0.5 else 1.0 - 2.0 * ((1.0 - u) * (1.0 - u))
 
 
 @compiled

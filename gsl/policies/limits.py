@@ -62,13 +62,13 @@ class Limits:
 def limits(robot: Robot) -> Limits:
     """Return the limits of a robot; a joint that drives several motors has the narrowest of theirs."""
     motors = [robot.joint(name) for name in robot.motors]
-    lower = -_narrowest(robot, [-joint.lower for joint in motors])
-    upper = _narrowest(robot, [joint.upper for joint in motors])
+    lower = -narrowest(robot, [-joint.lower for joint in motors])
+    upper = narrowest(robot, [joint.upper for joint in motors])
     usual = np.clip([robot.stance.get(name, 0.0) for name in robot.controlled], lower, upper)
     rest = usual + TO_THE_CENTRE * (0.5 * (lower + upper) - usual)
     down, up = _rooms(robot, lower, upper, usual, rest)
-    speed = SPEED_SHARE * _narrowest(robot, [joint.max_velocity for joint in motors])
-    full = _narrowest(robot, [joint.effort / robot.gains[joint.name][0] for joint in motors])
+    speed = SPEED_SHARE * narrowest(robot, [joint.max_velocity for joint in motors])
+    full = narrowest(robot, [joint.effort / robot.gains[joint.name][0] for joint in motors])
     jump = np.minimum(LARGE * full, speed * WINDOW)
     return Limits(
         joints=robot.controlled,
@@ -129,7 +129,7 @@ def _first(bounds: Limits, wrong: np.ndarray, text: str, *told: np.ndarray) -> B
     )
 
 
-def _narrowest(robot: Robot, values: list[float]) -> np.ndarray:
+def narrowest(robot: Robot, values: list[float]) -> np.ndarray:
     """Return the least of a value over the motors that each controlled joint drives, shape (n_joints,)."""
     least = np.full(len(robot.controlled), np.inf)
     np.minimum.at(least, robot.drive, values)

@@ -36,10 +36,10 @@ def leg_angles(ankle: np.ndarray, hip_yaw_pitch: float, side: float, angles: np.
     y = r01 * ankle[0] + r11 * ankle[1] + r21 * ankle[2]
     z = r02 * ankle[0] + r12 * ankle[1] + r22 * ankle[2]
     roll = math.atan2(y, -z)
-    down = math.hypot(y, z)
-    reach = min(math.hypot(down, x), THIGH + TIBIA)
-    bend = (THIGH**2 + TIBIA**2 - reach**2) / (2 * THIGH * TIBIA)
-    lean = (THIGH**2 + reach**2 - TIBIA**2) / (2 * THIGH * reach)
+    down = np.hypot(y, z)  # Python's math.hypot rounds otherwise than a compiled one
+    reach = min(np.hypot(down, x), THIGH + TIBIA)
+    bend = (THIGH * THIGH + TIBIA * TIBIA - reach * reach) / (2 * THIGH * TIBIA)
+    lean = (THIGH * THIGH + reach * reach - TIBIA * TIBIA) / (2 * THIGH * reach)
     knee = math.pi - math.acos(min(1.0, max(-1.0, bend)))
     pitch = -math.atan2(x, down) - math.acos(min(1.0, max(-1.0, lean)))
     # the torso's vertical seen from the tibia: (R0 Rx(roll) Ry(pitch + knee))^T e_z

@@ -27,6 +27,7 @@ from gsl.stages.train_inverse import TrainInverse
 from gsl.stages.values import Values
 from gsl.storage.artifact import Artifact
 from gsl.tasks.task import REAL, SIM, Task
+from gsl.worlds.external import asking
 from gsl.worlds.world import World
 
 MEMBERS = 5  # of the ensemble behind a gate, where nothing else is said
@@ -96,7 +97,7 @@ class Chain:
         }
         for role, (episodes, neighbours) in counts.items():
             stage = Collect(
-                world=self.real if role == REAL else self.sim,
+                world=asking(self.real, home / f"collect_{role}") if role == REAL else self.sim,
                 task=self.task,
                 policy=self.policy,
                 role=role,
@@ -145,7 +146,7 @@ class Chain:
     def measure(self, out: Path, found: Artifact, seed: int, console: Any) -> Artifact:
         """Measure what a search found in the real world."""
         stage = Evaluate(
-            world=self.real,
+            world=asking(self.real, out),
             task=self.task,
             policy=self.policy,
             policies=str(found.folder),

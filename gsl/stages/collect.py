@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -20,9 +20,11 @@ from gsl.policies.programme import Piece, Programmed
 from gsl.stages.choices import PolicyChoice
 from gsl.stages.population import Job, Workers, trajectories
 from gsl.stages.programme import command_file, playing
+from gsl.stages.real_robot import Errand, Order, answer_parents, asked
 from gsl.stages.rollout import Scenario
 from gsl.storage.trajectories import write
-from gsl.tasks.task import Task
+from gsl.tasks.task import SIM, Task
+from gsl.worlds.external import ExternalRobot
 from gsl.worlds.world import World
 
 FILE = "trajectories.parquet"
@@ -54,13 +56,16 @@ class Collect:
     def __post_init__(self) -> None:
         """Tell the policy its world."""
         object.__setattr__(self, "policy", sized(self.policy, self.world))
+        if self.role == SIM and isinstance(self.world, ExternalRobot):
+            raise ConfigError("world", "is a real robot, which cannot play the simulator's part")
         if self.world.layout.choices and self.action_noise > 1.0:
             given = f"{self.action_noise:g}"
             raise ConfigError("action_noise", "is the chance of another choice here, 1 at most", given=given)
 
     def parents(self) -> Mapping[str, Path]:
-        """Return the artifact that the parameters come from and the file that is played, if any."""
-        return {**PolicyChoice(self.policy, self.initial).parents("initial"), **command_file(self.policy)}
+        """Return the artifact that the parameters come from, the file that is played, a robot's answer, if any."""
+        chosen = PolicyChoice(self.policy, self.initial).parents("initial")
+        return {**chosen, **command_file(self.policy), **answer_parents(self.world)}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write one parquet file."""
@@ -68,12 +73,7 @@ class Collect:
         policy = playing(self.policy, layout)
         scenario = Scenario(self.world, self.task, policy, self.role, exploration(self.action_noise, layout))
         pieces = policy.programme if isinstance(policy, Programmed) else self._pieces()
-        jobs = [
-            Job(piece.parameters, derived_seed(self.seed, self.kind, self.role, index))
-            for index, piece in enumerate(pieces)
-        ]
-        with console.progress(len(jobs), f"collecting in the {self.role} world") as progress:
-            episodes = trajectories(scenario, jobs, workers=self.workers, progress=progress)
+        episodes = self._played(scenario, pieces, console)
         about = {
             "robot": getattr(self.world, "robot", getattr(self.world, "env_id", "")),
             "role": self.role,
@@ -90,13 +90,25 @@ class Collect:
         write(folder / FILE, Batch(_alike(episodes), layout.joints, layout.control_period, about))
         steps, own = sum(map(len, episodes)), [one.value for one in episodes[: self.episodes]]
         return {
-            "episodes": len(jobs),
-            "real_episodes": len(jobs) if self.role == "real" else 0,
+            "episodes": len(pieces),
+            "real_episodes": len(pieces) if self.role == "real" else 0,
             "steps": steps,
             "seconds": steps * layout.control_period,
             "falls": sum(episode.ended_in_a_fall for episode in episodes),
             "value": None if isinstance(policy, Programmed) else float(np.mean(own)),
         }
+
+    def _played(self, scenario: Scenario, pieces: Sequence[Piece], console: Any) -> list[Trajectory]:
+        """Return the episodes, of a robot somewhere else from its answer."""
+        seeds = [derived_seed(self.seed, self.kind, self.role, index) for index in range(len(pieces))]
+        jobs = [Job(piece.parameters, seed) for piece, seed in zip(pieces, seeds, strict=True)]
+        if not isinstance(self.world, ExternalRobot):
+            with console.progress(len(jobs), f"collecting in the {self.role} world") as progress:
+                return trajectories(scenario, jobs, workers=self.workers, progress=progress)
+        orders = [Order(piece.label, job) for piece, job in zip(pieces, jobs, strict=True)]
+        errand = Errand("", f"Trajectories to learn from: {len(jobs)} episodes.", until_fall=False, logs=True)
+        found = asked(scenario, orders, errand, workers=self.workers, console=console)
+        return [one.trajectory for one in found if one is not None and one.trajectory is not None]
 
     def _pieces(self) -> tuple[Piece, ...]:
         """Return the episodes of the policy itself, then those of its neighbours."""

@@ -21,6 +21,7 @@ from gsl.storage.artifact import Artifact
 from gsl.tasks.excite import Excite
 from gsl.tasks.task import REAL
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.external import ExternalRobot, asking
 from gsl.worlds.world import World
 
 EXCITATION = "collect_excitation"
@@ -44,10 +45,10 @@ class DiagnosisPlan:
         Raises:
             ConfigError: One of the two worlds is not of a kind that is diagnosed.
         """
-        if not isinstance(real, BulletWorld) or not isinstance(sim, BulletWorld):
+        if not isinstance(real, BulletWorld | ExternalRobot) or not isinstance(sim, BulletWorld):
             raise ConfigError("grounding", "only robots in Bullet worlds are diagnosed; take another grounding")
         played = Collect(
-            world=replace(real, floating=False),
+            world=asking(replace(real, floating=False), home / EXCITATION),
             task=Excite(duration=self.excitation.duration),
             policy=self.excitation,
             role=REAL,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -13,15 +14,22 @@ from gsl.policies.policy import Policy, sized
 from gsl.stages.choices import FILE, policies, records, vector
 from gsl.stages.measured import falls, gain, mean, row, summary
 from gsl.stages.population import Episode, Job, Workers, episodes
+from gsl.stages.real_robot import Errand, Order, answer_parents, asked
 from gsl.stages.rollout import Scenario
 from gsl.storage.documents import write_json
 from gsl.storage.policies import PolicyRecord, write_policies
 from gsl.storage.references import resolve
 from gsl.tasks.task import REAL, Task
+from gsl.worlds.external import ExternalRobot
 from gsl.worlds.world import World
 
 TABLE = "evaluation.json"
 _CHOICE, _CHECK, _REPORT = "choice", "check", "report"  # their seeds never meet
+_ERRANDS = {
+    _CHOICE: "To choose a policy: {} of them, {} episodes each, of one that falls none after its fall.",
+    _CHECK: "To check the fastest policy that did not fall: {1} episodes more, until it falls.",
+    _REPORT: "To report: {1} fresh episodes of the chosen policy and of the one it is compared with, falls and all.",
+}
 
 
 @component
@@ -52,18 +60,20 @@ class Evaluate:
         object.__setattr__(self, "policy", sized(self.policy, self.world))
 
     def parents(self) -> Mapping[str, Path]:
-        """Return where the policies come from."""
-        return {"policies": resolve(self.policies)}
+        """Return where the policies come from, and what a robot somewhere else has answered."""
+        return {"policies": resolve(self.policies), **answer_parents(self.world)}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the table of all policies and the chosen one."""
         found = records(self.policy, self.policies)
         total = self.episodes * len(found) + self.check + 2 * self.confirmation
         with console.progress(total, "measuring in the real world") as progress:
-            tried = [self._measured(theta, _CHOICE, self.episodes, progress) for theta in found]
-            checked = dict(self._checked(found, tried, progress))
+            measure = partial(self._measured, progress=progress, console=console)
+            tried = measure(found, _CHOICE, self.episodes)
+            checked = dict(self._checked(found, tried, measure))
             best = next((index for index, done in checked.items() if self._stable(done)), 0)
-            fresh = {i: self._measured(found[i], _REPORT, self.confirmation, progress) for i in sorted({0, best})}
+            reported = sorted({0, best})
+            fresh = dict(zip(reported, measure([found[i] for i in reported], _REPORT, self.confirmation), strict=True))
         rows = [row(theta, done) for theta, done in zip(found, tried, strict=True)]
         again = [[row(found[index], done) for index, done in phase.items()] for phase in (checked, fresh)]
         write_json(folder / TABLE, {"policies": rows, "check": again[0], "confirmation": again[1]})
@@ -85,7 +95,7 @@ class Evaluate:
         }
 
     def _checked(
-        self, found: Sequence[PolicyRecord], tried: Sequence[list[Episode]], progress: Any
+        self, found: Sequence[PolicyRecord], tried: Sequence[list[Episode]], measure: Callable[..., list[list[Episode]]]
     ) -> Iterator[tuple[int, list[Episode]]]:
         """Yield the checks of stable policies that beat the baseline, up to the first that stays stable.
 
@@ -93,7 +103,7 @@ class Evaluate:
         """
         better = [index for index, done in enumerate(tried) if self._stable(done) and mean(done) > mean(tried[0])]
         for index in sorted(better, key=lambda index: (falls(tried[index]), -mean(tried[index]))):
-            done = self._measured(found[index], _CHECK, self.check, progress)
+            (done,) = measure([found[index]], _CHECK, self.check)
             yield index, done
             if self._stable(done):
                 return
@@ -101,13 +111,35 @@ class Evaluate:
     def _stable(self, done: Sequence[Episode]) -> bool:
         return falls(done) <= self.tolerated * len(done)
 
-    def _measured(self, theta: PolicyRecord, purpose: str, count: int, progress: Any) -> list[Episode]:
-        """Run the episodes of one purpose; but for a report, none after a fall that is not tolerated."""
+    def _measured(
+        self, thetas: Sequence[PolicyRecord], purpose: str, count: int, *, progress: Any, console: Any
+    ) -> list[list[Episode]]:
+        """Return the episodes of some policies; but for a report, none after a fall that is not tolerated."""
         scenario = Scenario(self.world, self.task, self.policy, REAL, NoGrounding())
-        parameters = vector(self.policy, theta)
-        jobs = [Job(parameters, derived_seed(self.seed, self.kind, purpose, theta.name, n)) for n in range(count)]
-        done = episodes(scenario, jobs, workers=self.workers, progress=progress)
-        if purpose == _REPORT or self.tolerated:
-            return done
-        first_fall = next((number for number, episode in enumerate(done) if episode.fell), count)
-        return done[: first_fall + 1]
+        jobs = [
+            Job(vector(self.policy, theta), derived_seed(self.seed, self.kind, purpose, theta.name, n))
+            for theta in thetas
+            for n in range(count)
+        ]
+        to_the_end = purpose == _REPORT or self.tolerated > 0.0
+        done: Sequence[Episode | None]
+        if isinstance(self.world, ExternalRobot):
+            orders = [Order(thetas[index // count].name, job) for index, job in enumerate(jobs)]
+            name = f"{purpose}_{thetas[0].name}" if purpose == _CHECK else purpose
+            errand = Errand(name, _ERRANDS[purpose].format(len(thetas), count), not to_the_end, logs=False)
+            found = asked(scenario, orders, errand, workers=self.workers, console=console)
+            done = [None if one is None else one.episode for one in found]
+        else:
+            done = episodes(scenario, jobs, workers=self.workers, progress=progress)
+        groups = [list(done[first : first + count]) for first in range(0, len(done), count)]
+        return [_until_fall(group, to_the_end=to_the_end) for group in groups]
+
+
+def _until_fall(done: Sequence[Episode | None], *, to_the_end: bool) -> list[Episode]:
+    """Return the episodes that count: where a fall ends a policy's chances, those up to its first one."""
+    kept: list[Episode] = []
+    for one in done:
+        if one is None or (kept and kept[-1].fell and not to_the_end):
+            break
+        kept.append(one)
+    return kept

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from gsl.core.observation import placed
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import InputError
@@ -33,7 +34,8 @@ class GroundingReport:
     """What is known of a grounding.
 
     Attributes:
-        deviations: By group (pi0, off_pi0), simulator (grounded, ungrounded, no_change) and ticks.
+        deviations: By group (pi0, off_pi0), simulator (grounded, ungrounded, no_change) and ticks; nothing where the
+            real robot did not tell where its base was.
         joints: Names of the joints.
         episodes: Of pi0 in the grounded simulator.
         falls: How many of them ended in a fall.
@@ -55,15 +57,19 @@ class GroundingReport:
     @property
     def problems(self) -> tuple[str, ...]:
         """Why nothing should be optimised in this grounding, in words."""
+        found = self._farther() if self.deviations else []
+        if self.falls > self.allowed:
+            found.append(f"π0 falls in {self.falls} of {self.episodes} episodes of the grounded simulator")
+        return tuple(found)
+
+    def _farther(self) -> list[str]:
         group = OFF if OFF in self.deviations else PI0
         errors = {name: degrees(self.deviations[group][name][TICKS].joints) for name in (GROUNDED, BARE)}
         found = [] if group == OFF else ["off π0 nothing was held out to measure it on (collect neighbours)"]
         if errors[GROUNDED] > errors[BARE]:
             against = f"{errors[GROUNDED]:.2f}°, without grounding {errors[BARE]:.2f}°"
             found.append(f"after {TICKS} ticks the joints {_named(group)} are farther from the real ones: {against}")
-        if self.falls > self.allowed:
-            found.append(f"π0 falls in {self.falls} of {self.episodes} episodes of the grounded simulator")
-        return tuple(found)
+        return found
 
     @property
     def acceptable(self) -> bool:
@@ -147,13 +153,14 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
     if not np.isclose(heldout.control_period, layout.control_period):
         periods = f"{heldout.control_period:g} s, not the world's {layout.control_period:g} s"
         raise InputError(f"the held-out trajectories have a control period of {periods}")
-    env = scenario.world.make()
+    env, told = scenario.world.make(), any(map(placed, heldout.episodes))
     try:
         deviations = {
             group: _compared(env, scenario.grounding, of_policy(heldout, pi0=group == PI0), seed)
             for group in (PI0, OFF)
+            if told
         }
-        reach = _reach(env, scenario.grounding, heldout.episodes, seed)
+        reach = _reach(env, scenario.grounding, heldout.episodes, seed) if told else None
     except KeyError as error:
         raise InputError(f"the real trajectories lack {error.args[0]}: no simulation can start from them") from error
     finally:

@@ -11,7 +11,7 @@ import numpy as np
 
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
-from gsl.errors import GslError, InputError, TrajectoryError
+from gsl.errors import ConfigError, GslError, InputError, TrajectoryError
 from gsl.grounding.effects import DiagnosedEffects, switched_on
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.none import NoGrounding
@@ -140,8 +140,12 @@ class Gate:
                 raise
             raise TrajectoryError(folder / HELDOUT, str(error)) from error
         write_json(self.folder / REPORT, report.metrics())
-        grounding_errors(self.folder / FIGURE, report.by_joint())
-        self.console.table("grounded simulator against held-out real trajectories", TITLES, report.rows())
+        if report.deviations:
+            grounding_errors(self.folder / FIGURE, report.by_joint())
+            self.console.table("grounded simulator against held-out real trajectories", TITLES, report.rows())
+        else:
+            problem = "the real robot does not tell where its base is, so no simulation can start from its trajectories"
+            self.console.status(f"warning: {problem}: of the grounding only the falls of π0 in it were checked")
         if report.reach:
             self.console.status(report.reach.told)
         self._judge(report.problems, "Collect more data")
@@ -163,7 +167,11 @@ class Gate:
     def _chosen(self, scenario: Scenario, loaded: LoadedTransformation, validation: Batch) -> tuple[str, ...]:
         """Return the joints to ground, and tell them."""
         env = scenario.world.make()
-        starts = places(validation.episodes, scenario.world.layout, REPLAYS)
+        try:
+            starts = places(validation.episodes, scenario.world.layout, REPLAYS)
+        except KeyError as error:
+            problem = f"needs {error.args[0]} in the real trajectories, to try joints out; name the joints"
+            raise ConfigError("grounding.x", problem, given="auto") from error
         joints = fewest(env, loaded, starts, derived_seed(self.seed, "x"))
         env.close()
         self.console.status(f"grounding {len(joints)} of {len(loaded.forward.joints)} joints: {', '.join(joints)}")

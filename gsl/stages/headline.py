@@ -144,6 +144,10 @@ def _survey(metrics: Metrics, unit: Unit) -> str:
     return ", ".join(f"{name}: π0 {unit.shown(one['pi0'])}, rank {one['rank']:.2f}" for name, one in metrics.items())
 
 
+def _answer(metrics: Metrics, unit: Unit) -> str:
+    return f"{metrics['episodes']} of {metrics['asked']} episodes, {falls(metrics['falls'])}"
+
+
 _TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
     "collect": _collect,
     "import": _import,
@@ -158,4 +162,6 @@ _TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
     "reproduce": _compare,
     "survey": _survey,
     "values": _values,
+    "answer": _answer,
+    "rehearse": _answer,
 }

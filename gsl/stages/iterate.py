@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.core.layout import check_alike
+from gsl.core.observation import placed
 from gsl.core.setting import component, setting
+from gsl.errors import ConfigError
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
@@ -34,6 +36,7 @@ from gsl.storage.policies import write_policies
 from gsl.storage.trajectories import read
 from gsl.tasks.task import SIM, Task
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.external import ExternalRobot
 from gsl.worlds.world import World
 
 FIRST = "iteration_01"
@@ -69,6 +72,8 @@ class Iterate:
 
     def __post_init__(self) -> None:
         """Tell the policy its world; refuse two worlds that no policy could act in both of."""
+        if isinstance(self.sim, ExternalRobot):
+            raise ConfigError("sim", "is a real robot, which cannot play the simulator's part")
         object.__setattr__(self, "policy", sized(self.policy, self.sim))
         check_alike(self.sim.layout, self.real.layout)
 
@@ -168,7 +173,7 @@ class Iterate:
         scenario = settled(Scenario(self.sim, self.task, self.policy, SIM, ready), search.metrics)
         heldout = read(place / "train_forward" / HELDOUT)
         walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
-        if not isinstance(scenario.world, BulletWorld):
-            return  # there are no joints to draw
+        if not isinstance(scenario.world, BulletWorld) or not placed(walk):
+            return  # there are no joints to draw, or nobody knows where the body was
         write_trace(folder, scenario.world, scenario.grounding, walk)
         walk_strip(scenario.world.plant.robot, walk, folder / "walk.png")

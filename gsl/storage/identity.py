@@ -47,7 +47,7 @@ class Identity:
         return {name: value for name, value in named.items() if isinstance(value, int)}
 
 
-WITHOUT_EFFECT = ("workers",)  # settings on which no result depends
+WITHOUT_EFFECT = ("workers", "requests")  # settings on which no result depends
 
 
 def identify(kind: str, config: Mapping[str, Any], parents: Mapping[str, Path]) -> Identity:

@@ -10,7 +10,7 @@ import numpy as np
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
-from gsl.tasks.task import REAL, Step
+from gsl.tasks.task import REAL, Judged, Step
 
 
 @component
@@ -32,7 +32,14 @@ class Distance:
     def outcome(self, layout: Layout, trajectory: Trajectory) -> Mapping[str, float]:
         """Return the distance, a fall notwithstanding."""
         x = trajectory.sensors["base.position.x"]
-        return {"distance [cm]": 100.0 * float(x[-1] - x[0])}
+        return self._told(float(x[-1] - x[0]))
+
+    def measured(self, distance: float, *, fell: bool) -> Judged:
+        """Return what a distance [m] is worth in the real world."""
+        return Judged(0.0 if fell else distance, self._told(distance))
+
+    def _told(self, distance: float) -> Mapping[str, float]:
+        return {"distance [cm]": 100.0 * distance}
 
 
 class DistanceRun:

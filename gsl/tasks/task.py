@@ -28,6 +28,21 @@ class TaskRun(Protocol):
         """Judge the step between two observations."""
 
 
+class Judged(NamedTuple):
+    """What an episode is worth, and what is reported of it, by name with unit."""
+
+    value: float
+    outcome: Mapping[str, float]
+
+
+@runtime_checkable
+class ByDistance(Protocol):
+    """A task whose value follows from a distance, so that a tape measure will do."""
+
+    def measured(self, distance: float, *, fell: bool) -> Judged:
+        """Return what a real episode is worth in which the robot got so far forward [m]."""
+
+
 @runtime_checkable
 class Task(Protocol):
     """What we want of a body.

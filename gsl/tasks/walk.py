@@ -10,7 +10,7 @@ import numpy as np
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
-from gsl.tasks.task import REAL, Step
+from gsl.tasks.task import REAL, Judged, Step
 
 EXACT = 2.0**40  # rewards are multiples of its inverse, so that taking all of them back leaves exactly 0
 
@@ -35,7 +35,14 @@ class Walk:
     def outcome(self, layout: Layout, trajectory: Trajectory) -> Mapping[str, float]:
         """Return the mean forward speed over the planned time, the fall notwithstanding."""
         x = trajectory.sensors["base.position.x"]
-        return {"speed [cm/s]": 100.0 * float(x[-1] - x[0]) / self.duration}
+        return self._told(float(x[-1] - x[0]))
+
+    def measured(self, distance: float, *, fell: bool) -> Judged:
+        """Return what a real walk over a distance [m] is worth."""
+        return Judged(0.0 if fell else distance / self.duration, self._told(distance))
+
+    def _told(self, distance: float) -> Mapping[str, float]:
+        return {"speed [cm/s]": 100.0 * distance / self.duration}
 
 
 class WalkRun:

@@ -8,9 +8,8 @@ import gymnasium
 import numpy as np
 
 from gsl.core.layout import Layout
+from gsl.core.seeds import grounding_generator
 from gsl.grounding.grounding import Grounding
-
-_STREAM = 7  # sets the grounding's randomness apart from that of the world, whose seed is the same
 
 
 class GroundedEnv(gymnasium.Wrapper):
@@ -32,7 +31,7 @@ class GroundedEnv(gymnasium.Wrapper):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Start anew; `seed` is of the world and of the grounding."""
         if seed is not None:
-            self._rng = np.random.default_rng([seed, _STREAM])
+            self._rng = grounding_generator(seed)
         self._seen, info = self.env.reset(seed=seed, options=options)
         self._run = self._grounding.start(self.layout, self._rng)
         return self._seen, info

@@ -1,0 +1,46 @@
+"""What acts in an episode of a request: a policy of gsl, its source unchanged, or a table of commands."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gsl.core.seeds import grounding_generator
+from gsl.grounding.ane import ActionNoise
+from gsl.runner.request import layout_of
+
+
+class Actor:
+    """A policy in one episode, with the noise that its actions get.
+
+    Args:
+        request: What is asked for.
+        episode: One of its episodes.
+    """
+
+    def __init__(self, request: Mapping[str, Any], episode: Mapping[str, Any]) -> None:
+        self._table = np.array(episode["commands"], dtype=float) if "commands" in episode else None
+        self._next, layout = 0, layout_of(request)
+        if self._table is None:
+            self._run = policy_of(request).start(np.array(episode["parameters"], dtype=float), layout)
+        noise = ActionNoise(sd=request["action_noise"])
+        self._noise = noise.start(layout, grounding_generator(episode["seed"]))
+
+    def act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what the policy wants and what is to be sent: with noise [rad], shape (n_joints,) each."""
+        if self._table is None:
+            action = self._run.act(observation)
+        else:
+            action = self._table[min(self._next, len(self._table) - 1)]
+            self._next += 1
+        return action, self._noise.transform(observation, action)
+
+
+def policy_of(request: Mapping[str, Any]) -> Any:
+    """Return the policy that a request names, built from the modules beside it."""
+    settings = dict(request["policy"])
+    place, _, name = settings.pop("_target_").rpartition(".")
+    return getattr(importlib.import_module(place), name)(**settings)

@@ -1,0 +1,171 @@
+"""The runner: plays the episodes of a request on a robot, one after the other, and writes the answer beside it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gsl.errors import GslError
+from gsl.runner import journal
+from gsl.runner.episode import Played, Player
+from gsl.runner.request import due, read_request
+from gsl.runner.robots import PerfectRobot, robot_of
+from gsl.runner.senses import RobotError
+
+LATE = 0.002  # of a tick, that is worth telling [s]
+MOST = 100.0  # that a robot may walk in an episode [m]
+
+
+def main(folder: Path, words: Sequence[str]) -> int:
+    """Run the command line of the runner in a request's folder and return its exit code."""
+    parser = argparse.ArgumentParser(prog="runner.py", description=__doc__)
+    parser.add_argument("--robot", type=Path, default=folder / "robot.py", help="file with read() and send()")
+    parser.add_argument("--log", type=Path, default=folder / journal.ANSWER, help="the answer")
+    parser.add_argument("--episode", action="append", metavar="NAME", help="run this one only, again if it was run")
+    parser.add_argument("--dry-run", action="store_true", help="play against a perfect robot; nothing is written")
+    parser.add_argument("--yes", action="store_true", help="ask nothing")
+    parser.add_argument("--unpaced", action="store_true", help="do not wait for the clock: for a simulated robot")
+    asked = parser.parse_args(words)
+    try:
+        request = read_request(folder)
+        return dry_run(request) if asked.dry_run else Sitting(request, asked).run()
+    except GslError as error:
+        say(f"runner.py: {error}")
+        return 2
+    except EOFError:
+        say("runner.py: there is nobody to ask; --yes asks nothing")
+        return 2
+    except KeyboardInterrupt:
+        say("runner.py: interrupted; what was complete is kept")
+        return 130
+
+
+def say(text: str) -> None:
+    """Tell a person something."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def dry_run(request: Mapping[str, Any]) -> int:
+    """Play every episode against a perfect robot and tell rates and extremes; return 1 if a target is refused."""
+    robot = PerfectRobot(request)
+    stage, ticks, stops = Player(request, robot, paced=False), 0, 0
+    begin = time.perf_counter()
+    for episode in request["episodes"]:
+        stage.approach(episode)
+        played = stage.play(episode)
+        ticks, stops = ticks + len(played.rows), stops + bool(played.stopped)
+        if played.stopped:
+            say(f"{episode['name']}: refused: {played.stopped}")
+        stage.leave(episode, hold=bool(played.stopped))
+    each = (time.perf_counter() - begin) / ticks
+    say("\n".join(robot.rows()))
+    needed = request["control_period"]
+    say(f"{ticks} steps, {1e3 * each:.2f} ms each of the {1e3 * needed:g} ms there are ({1 / needed:g} Hz)")
+    told = f"{stops} of {len(request['episodes'])} episodes were refused" if stops else "no target was refused"
+    say(f"{told}; nothing was written. A real robot feels its feet and sways: its targets will differ.")
+    return 1 if stops else 0
+
+
+class Sitting:
+    """What is run of a request in one go."""
+
+    def __init__(self, request: Mapping[str, Any], asked: argparse.Namespace) -> None:
+        self._request, self._asked = request, asked
+        self._returns = asked.log.with_name(journal.RETURNS)
+        if asked.log.exists() and journal.marked(asked.log) != request["hash"]:
+            raise RobotError(f"{asked.log} answers another request; move it away or choose another --log")
+        names = [episode["name"] for episode in request["episodes"]]
+        for name in asked.episode or ():
+            if name not in names:
+                raise RobotError(f"there is no episode {name}; there is {', '.join(names)}")
+        self._player = Player(request, robot_of(asked.robot), paced=not asked.unpaced)
+
+    def run(self) -> int:
+        """Run the episodes that are missing, or those that were named."""
+        say(self._request["about"])
+        for episode in self._sitting():
+            if not self._ask(f"{episode['name']} ({self._seconds(episode):g} s): Enter ramps in, q ends"):
+                break
+            self._one(episode)
+        missing = self._due()
+        say(f"{len(missing)} episodes are missing" if missing else f"all is answered: {self._asked.log}")
+        return 0
+
+    def _one(self, episode: Mapping[str, Any]) -> None:
+        player = self._player
+        player.approach(episode)
+        if not self._ask("it stands at the start: Enter begins, q ends"):
+            player.leave(episode, hold=False)
+            raise KeyboardInterrupt
+        try:
+            played = player.play(episode)
+        except BaseException:
+            player.leave(episode, hold=True)
+            raise
+        late = f", {1e3 * player.clock.worst:.0f} ms late at worst" if player.clock.worst > LATE else ""
+        player.leave(episode, hold=played.fell or played.broken or bool(played.stopped))
+        if played.broken:
+            played = self._broken(played)
+        if len(played.rows) > 1:
+            journal.keep(self._asked.log, self._request["hash"], played.columns, played.rows)
+        else:  # its first target was refused: there is nothing to log
+            journal.add_return(self._returns, self._request["hash"], episode["name"], "", fell=True)
+        ended = f"; refused: {played.stopped}; held, then ramped out" if played.stopped else ""
+        say(f"{episode['name']}: {len(played.rows) - 1} steps{late}{', fell' * played.fell}{ended}")
+        if self._request["distance"] and "base.position.x" not in played.columns:
+            self._measure(episode, fell=played.fell or bool(played.stopped))
+
+    def _broken(self, played: Played) -> Played:
+        """Ask why a person broke an episode off: a fall is a result and must not be lost, anything else is none."""
+        if len(played.rows) > 1 and not self._asked.yes and self._yes("was it a fall? y keeps it, n runs it again"):
+            return played.as_a_fall()
+        raise KeyboardInterrupt
+
+    def _measure(self, episode: Mapping[str, Any], *, fell: bool) -> None:
+        """Ask a person for what the robot cannot tell."""
+        if self._asked.yes:
+            return
+        question = "distance walked forward [m], f if it fell, Enter to write it into returns.csv later: "
+        while not _is_distance(told := input(question).strip().lower()):
+            say(f"'{told}' is no number of metres")
+        if told:
+            fallen = told == "f"
+            journal.add_return(
+                self._returns, self._request["hash"], episode["name"], "" if fallen else told, fell=fell or fallen
+            )
+
+    def _sitting(self) -> Iterator[Mapping[str, Any]]:
+        """Yield those that are named, or what is due, asked again and again: a fall may spare what would follow."""
+        if self._asked.episode:
+            yield from (one for one in self._request["episodes"] if one["name"] in self._asked.episode)
+            return
+        while missing := self._due():
+            yield missing[0]
+
+    def _due(self) -> list[Mapping[str, Any]]:
+        episodes = self._request["episodes"]
+        ends = {episodes[number]["name"]: down for number, down in journal.ends(self._asked.log).items()}
+        told = journal.returned(self._returns).items()
+        fallen = {name for name, row in told if (row["fell"] or "").lower() in journal.YES}
+        return list(due(self._request, {*ends, *fallen}, {name for name, down in ends.items() if down} | fallen))
+
+    def _ask(self, question: str) -> bool:
+        return self._asked.yes or input(f"{question}: ").strip().lower() != "q"
+
+    def _yes(self, question: str) -> bool:
+        return input(f"{question}: ").strip().lower() in ("y", "yes")
+
+    def _seconds(self, episode: Mapping[str, Any]) -> float:
+        return float(episode["steps"] * self._request["control_period"])
+
+
+def _is_distance(told: str) -> bool:
+    try:
+        return told in ("", "f") or abs(float(told)) < MOST
+    except ValueError:
+        return False

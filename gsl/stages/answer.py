@@ -1,0 +1,140 @@
+"""An answer from elsewhere: logs and measurements that the runner has not written, taken in for a request."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from gsl.core.observation import observations
+from gsl.core.setting import component, setting
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.errors import ArtifactError, InputError, TrajectoryError
+from gsl.runner.acting import Actor
+from gsl.runner.journal import RETURNS
+from gsl.runner.request import NAME, layout_of, read_request
+from gsl.storage import trajectories
+from gsl.storage.answers import STOPPED, check_lengths, csv_episodes, read_log, read_returns
+from gsl.storage.references import resolve
+
+FILE = "answer.parquet"
+OFF = 0.05  # by which half of an episode's actions may differ from the policy's before it is told [rad]
+
+
+@component
+class Answer:
+    """Checks logs with the columns of the contract, and measured returns, and puts them into the request's folder.
+
+    The logged episodes are those of the request in order, unless `episodes` names them.
+    """
+
+    kind: ClassVar[str] = "answer"
+
+    request: Annotated[str, setting("folder of the request", min_length=1)]
+    logs: Annotated[str | None, setting("parquet or CSV file with the columns of the contract", min_length=1)] = None
+    returns: Annotated[
+        str | None, setting("CSV file: episode, distance in m or value, fell (yes or no)", min_length=1)
+    ] = None
+    episodes: Annotated[tuple[str, ...], setting("names of the logged episodes, in order; none for all of them")] = ()
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the request and the files that answer it."""
+        read_request(Path(self.request))
+        files = {name: resolve(file) for name, file in (("logs", self.logs), ("returns", self.returns)) if file}
+        return {**files, "request": Path(self.request) / NAME}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write the answer in the form that a request's folder is searched for."""
+        request = read_request(Path(self.request))
+        files = {role: path for role, path in self.parents().items() if role != "request"}
+        if not files:
+            raise ArtifactError(self.request, "there is nothing to take in: say logs=, returns= or both")
+        told = {}
+        if self.returns:
+            told = read_returns(files["returns"], request)
+            shutil.copyfile(files["returns"], folder / RETURNS)
+        if self.logs:
+            for name, off in self._logged(files["logs"], folder / FILE, request):
+                if off > OFF:
+                    console.status(
+                        f"warning: {name}: half of its actions are {off:.2g} rad or more off what the policy does on "
+                        "what was observed; is it the log of another episode, or late?"
+                    )
+            logs = read_log(folder / FILE, request)
+            check_lengths(files["logs"], request, logs, {name for name, one in told.items() if one.fell})
+            told = {**told, **logs}
+        missing = [one["name"] for one in request["episodes"] if one["name"] not in told]
+        falls = sum(one.fell for one in told.values())
+        return {"episodes": len(told), "asked": len(request["episodes"]), "falls": falls, "missing": missing}
+
+    def _logged(self, source: Path, out: Path, request: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+        """Write the logged episodes by the names that the request has for them; yield how far off each one is."""
+        found = _csv(source, request) if source.suffix == ".csv" else _parquet(source, request)
+        asked = {episode["name"]: episode for episode in request["episodes"]}
+        names = self.episodes or tuple(asked)
+        for name in names:
+            if name not in asked:
+                raise ArtifactError(source, f"the request has no episode '{name}'; there is {', '.join(asked)}")
+        if len(found) != len(names):
+            problem = f"holds {len(found)} episodes, but {len(names)} are named"
+            raise ArtifactError(source, f"{problem}; say which they are, in order: episodes=[{names[0]},...]")
+        about = {"robot": request["robot"], "role": "real", "source": source.name, "request": request["hash"]}
+        told = [{"name": name, "policy": asked[name]["policy"]} for name in names]
+        joints, period = tuple(request["joints"]), request["control_period"]
+        trajectories.write(out, Batch(tuple(found), joints, period, {**about, "episodes": told}))
+        for name, episode in zip(names, found, strict=True):
+            yield name, _off(source, request, asked[name], episode)
+
+
+def _csv(source: Path, request: Mapping[str, Any]) -> list[Trajectory]:
+    """Return the episodes of a file; of the runner's own ones, a stop for safety is a fall."""
+    found = [episode for _, episode in csv_episodes(source, request)]
+    return [replace(one, fell=_down(one), sensors=_without(one.sensors, STOPPED)) for one in found]
+
+
+def _down(episode: Trajectory) -> np.ndarray:
+    down = np.zeros(len(episode) + 1, dtype=bool) if episode.fell is None else episode.fell
+    return down | np.asarray(episode.sensors.get(STOPPED, down), dtype=bool)
+
+
+def _without(sensors: Mapping[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
+    return {key: values for key, values in sensors.items() if key != name}
+
+
+def _parquet(source: Path, request: Mapping[str, Any]) -> list[Trajectory]:
+    """Return the episodes of a file with the joints in the request's order."""
+    batch = trajectories.read(source, joints=tuple(request["joints"]))
+    if missing := [joint for joint in request["joints"] if joint not in batch.joints]:
+        raise TrajectoryError(source, f"the joint {missing[0]} was asked for, but is not in it")
+    if abs(batch.control_period - request["control_period"]) > 1e-9:
+        rates = f"a row every {batch.control_period:g} s, but {request['control_period']:g} s were asked for"
+        raise TrajectoryError(source, f"has {rates}; resample it")
+    order = [batch.joints.index(joint) for joint in request["joints"]]
+    return [
+        replace(
+            one,
+            action=one.action[:, order],
+            position=one.position[:, order],
+            velocity=one.velocity[:, order],
+            grounded_action=None if one.grounded_action is None else one.grounded_action[:, order],
+        )
+        for one in batch.episodes
+    ]
+
+
+def _off(source: Path, request: Mapping[str, Any], asked: Mapping[str, Any], episode: Trajectory) -> float:
+    """Return by how much the policy's actions, on what was observed, differ from the logged ones: the median [rad]."""
+    layout = layout_of(request)
+    try:
+        seen = observations(episode, layout)
+    except KeyError as error:
+        raise TrajectoryError(source, "is missing, but was asked for", column=str(error.args[0])) from error
+    actor = Actor(request, asked)
+    wanted = np.array([actor.act(observation)[0] for observation in seen[:-1]])
+    if wanted.shape != episode.action.shape:
+        raise InputError(f"{source}: {asked['name']}: its actions are of another number of joints")
+    return float(np.median(np.abs(wanted - episode.action).max(axis=1)))

@@ -1,0 +1,151 @@
+"""A rehearsal of a request: a surrogate plays the robot's part at the other end of the very same files."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import gymnasium
+import numpy as np
+
+from gsl.core.layout import Layout
+from gsl.core.setting import component, setting
+from gsl.errors import ArtifactError, ConfigError, GslError
+from gsl.runner import bridge
+from gsl.runner.journal import ANSWER, RETURNS, add_return, ends
+from gsl.runner.request import HELD, NAME, read_request
+from gsl.stages.real_robot import REHEARSAL
+from gsl.storage.requests import files_of
+from gsl.worlds.world import World
+
+_BODY = ("base.position", "base.orientation", "base.velocity")
+
+
+@component
+class Rehearse:
+    """Starts the request's runner as the robot's computer would, with a robot.py whose robot is a simulated world.
+
+    What the surrogate sees of its base goes into the log, unless a tape measure is to be rehearsed as well.
+    """
+
+    kind: ClassVar[str] = REHEARSAL
+
+    request: Annotated[str, setting("folder of the request", min_length=1)]
+    world: Annotated[World, setting("what plays the robot's part")]
+    tape: Annotated[bool, setting("measure distances with a tape: nothing of the base is logged")] = False
+    episodes: Annotated[tuple[str, ...], setting("names of the episodes of this sitting; none for all")] = ()
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the request."""
+        return {"request": Path(self.request) / NAME} if (Path(self.request) / NAME).is_file() else {}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write the answer."""
+        place = Path(self.request)
+        request = read_request(place)
+        _check_runner(place, request)
+        layout = self.world.layout
+        if list(layout.joints) != request["joints"] or layout.control_period != request["control_period"]:
+            raise ConfigError("world", f"is no stand-in for {request['robot']}: it has other joints or another rate")
+        if getattr(self.world, "floating", True) == (request["place"] == HELD):
+            raise ConfigError("world.floating", f"the request is for a robot {request['place']}")
+        env = self.world.make()
+        try:
+            surrogate = Surrogate(request, env, layout, blind=self.tape)
+            with console.progress(len(request["episodes"]), "rehearsing") as progress:
+                surrogate.serve(place, folder / ANSWER, self.episodes, progress)
+        finally:
+            env.close()
+        if self.tape and request["distance"]:
+            for name, (distance, fell) in surrogate.measured.items():
+                add_return(folder / RETURNS, request["hash"], name, repr(distance), fell=fell)
+        done = ends(folder / ANSWER)
+        return {"episodes": len(done), "asked": len(request["episodes"]), "falls": sum(done.values())}
+
+
+class Surrogate:
+    """Answers the runner's `read`, `send` and `begin` with an environment; outside of an episode it obeys perfectly."""
+
+    def __init__(self, request: Mapping[str, Any], env: gymnasium.Env, layout: Layout, *, blind: bool) -> None:
+        self._env, self._layout = env, layout
+        parts = [part for part in layout.sizes if not (blind and part in _BODY)]
+        self._parts = {part: layout[part] for part in parts}
+        self._sizes = request["observes"]
+        self._observation = np.zeros(layout.size)
+        self._observation[layout["position"]] = request["episodes"][0]["posture"]
+        self._acting, self._fell, self._name = False, False, ""
+        self.measured: dict[str, tuple[float, bool]] = {}
+
+    def serve(self, folder: Path, log: Path, episodes: Sequence[str], progress: Any) -> None:
+        """Run the runner of a folder until it ends.
+
+        Raises:
+            GslError: It ended with an error.
+        """
+        (to_us, from_runner), (to_runner, from_us) = os.pipe(), os.pipe()
+        words = [sys.executable, "-I", str((folder / "runner.py").resolve()), f"--robot={bridge.__file__}"]
+        words += [f"--log={log.resolve()}", "--yes", "--unpaced", *(f"--episode={name}" for name in episodes)]
+        environment = {**os.environ, bridge.PIPES: f"{to_runner},{from_runner}", "PYTHONDONTWRITEBYTECODE": "1"}
+        with subprocess.Popen(
+            words, env=environment, pass_fds=(to_runner, from_runner), stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        ) as process:
+            os.close(to_runner)
+            os.close(from_runner)
+            with os.fdopen(to_us, encoding="utf-8") as requests, os.fdopen(from_us, "w", encoding="utf-8") as answers:
+                for line in requests:
+                    answers.write(json.dumps(self._answer(json.loads(line), progress)) + "\n")
+                    answers.flush()
+            assert process.stdout is not None
+            said = process.stdout.read().decode().strip()
+        if process.returncode:
+            raise GslError(f"the runner ended with exit code {process.returncode}: {said.rpartition(chr(10))[2]}")
+
+    def _answer(self, call: Mapping[str, Any], progress: Any) -> Any:
+        match call["do"]:
+            case "begin":
+                episode = call["episode"]
+                self._begin(episode, progress)
+            case "send":
+                self._send(np.array(call["targets"]))
+            case "end":
+                self._acting = False
+            case "read":
+                return self._read()
+        return None
+
+    def _begin(self, episode: Mapping[str, Any], progress: Any) -> None:
+        posture = np.array(episode["posture"])
+        self._observation, _ = self._env.reset(seed=episode["seed"], options={"posture": posture})
+        self._start, self._left, self._name = self._observation, episode["steps"], episode["name"]
+        self._acting, self._fell = True, False
+        progress.advance()
+
+    def _send(self, targets: np.ndarray) -> None:
+        if not self._acting:
+            self._observation = self._observation.copy()
+            self._observation[self._layout["position"]] = targets
+            return
+        self._observation, _, self._fell, _, _ = self._env.step(targets)
+        self._left -= 1
+        if "base.position" in self._layout.sizes:
+            forward = self._layout["base.position"].start
+            way = float(self._observation[forward] - self._start[forward])
+            self.measured[self._name] = way, bool(self._fell)
+        self._acting = self._left > 0 and not self._fell
+
+    def _read(self) -> dict[str, Any]:
+        told = {part: self._observation[place].tolist() for part, place in self._parts.items()}
+        return {**told, "fell": bool(self._fell)}
+
+
+def _check_runner(folder: Path, request: Mapping[str, Any]) -> None:
+    """Refuse to run what gsl did not write."""
+    for name, content in files_of(request).items():
+        path = folder / name
+        if not path.is_file() or path.read_bytes() != content:
+            raise ArtifactError(path, "is not what this gsl writes, and is not run here; make the request anew")

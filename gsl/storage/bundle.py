@@ -1,0 +1,72 @@
+"""The modules that a runner takes along: the source of a policy and all that it imports, unchanged, for numpy alone."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from gsl.errors import ConfigError
+
+RUNNER = "gsl.runner.main"
+_STAND_INS = {f"gsl.core.{name}": f"gsl.runner.stand_in.{name}" for name in ("setting", "compiled", "validation")}
+_THERE = {*sys.stdlib_module_names, "numpy"}
+
+
+def bundled(modules: tuple[str, ...]) -> dict[str, bytes]:
+    """Return the sources that some modules need, by path below the bundle.
+
+    Raises:
+        ConfigError: One of them needs a library beside numpy.
+    """
+    files: dict[str, bytes] = {}
+    waiting, known = list(modules), set()
+    while waiting:
+        name = waiting.pop()
+        if name in known:
+            continue
+        known.add(name)
+        path = _source(_STAND_INS.get(name, name), modules[-1])
+        below = "/__init__.py" if path.name == "__init__.py" else ".py"
+        files[name.replace(".", "/") + below] = path.read_bytes()
+        waiting += [*_needed(path, name), *([name.rpartition(".")[0]] if "." in name else [])]
+    return dict(sorted(files.items()))
+
+
+def _needed(path: Path, module: str) -> Iterator[str]:
+    """Yield the modules that a source imports, those that are there anyway left out."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            names = [name for name in names if name == node.module or _is_module(name)]
+        else:
+            continue
+        for name in names:
+            top = name.partition(".")[0]
+            if top in _THERE:
+                continue
+            if top not in ("gsl", module.partition(".")[0]):
+                problem = f"{module} needs {top}, but beside a robot there is numpy alone"
+                raise ConfigError("policy", problem)
+            yield name
+
+
+def _is_module(name: str) -> bool:
+    top = name.partition(".")[0]
+    if top in _THERE:
+        return False
+    try:
+        return importlib.util.find_spec(name) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def _source(module: str, wanted: str) -> Path:
+    found = importlib.util.find_spec(module)
+    if found is None or found.origin is None or not found.origin.endswith(".py"):
+        raise ConfigError("policy", f"{wanted} needs {module}, which has no Python source to take along")
+    return Path(found.origin)

@@ -1,0 +1,125 @@
+"""Request folders: what a real robot is asked to run, with a runner and all its modules, written whole."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gsl.errors import ArtifactError
+from gsl.runner.request import NAME, SCHEMA_VERSION, hash_of
+from gsl.storage import documents
+from gsl.storage.answers import answer_files
+from gsl.storage.bundle import RUNNER, bundled
+from gsl.storage.whole import explained, flush_tree
+
+MODULES, README, ROBOT = "modules", "README.txt", "robot.py"
+_ENTRY = '''"""Plays the episodes of request.json on a robot; needs Python 3.10 or newer and numpy."""
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE / "modules"))
+
+from gsl.runner.main import main  # noqa: E402
+
+sys.exit(main(HERE, sys.argv[1:]))
+'''
+_TEMPLATE = '''"""Your robot: fill in read and send, or name another file of this kind with --robot."""
+
+
+def read():
+    """Return what the robot measures now, SI units, joints in the order of request.json.
+
+    "position" and, if there are any, "velocity" of the joints; {observes}.
+    More if you have it: "base.position" (3), "base.orientation" (x, y, z, w), "base.velocity" (3), "acceleration" (3),
+    "torque", "temperature" (one a joint), "voltage"; "fell": True once the robot lies down, which ends the episode.
+    """
+    raise NotImplementedError
+
+
+def send(targets):
+    """Hand desired joint positions [rad] to the servos, joints in the order of request.json; return at once."""
+    raise NotImplementedError
+
+
+# def begin(episode): called when the robot stands at the start, just before the first step
+# def end(): called when it is back there
+'''
+
+
+def files_of(request: Mapping[str, Any]) -> dict[str, bytes]:
+    """Return the runner of a request and its modules, by path below the folder.
+
+    Raises:
+        ConfigError: The policy needs a library beside numpy.
+    """
+    tables = all("commands" in episode for episode in request["episodes"])
+    policy = () if tables else (str(request["policy"]["_target_"]).rpartition(".")[0],)
+    modules = {f"{MODULES}/{name}": source for name, source in bundled((RUNNER, *policy)).items()}
+    return {"runner.py": _ENTRY.encode(), **modules}
+
+
+def sealed(request: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a request in the types of JSON with its version and its hash."""
+    plain = documents.plain({**request, "schema_version": SCHEMA_VERSION})
+    return {**plain, "hash": hash_of(plain)}
+
+
+def write_request(folder: Path, request: Mapping[str, Any], warnings: Sequence[str]) -> None:
+    """Write the folder of a sealed request in place of one that nobody has answered; a robot.py in it stays.
+
+    Raises:
+        ArtifactError: There is an answer to another request in it.
+        ConfigError: The policy needs a library beside numpy.
+        GslError: The folder cannot be written.
+    """
+    if found := answer_files(folder):
+        raise ArtifactError(found[0], "answers another request, which has changed since; move it away")
+    files = files_of(request)
+    with explained(folder.parent):
+        temporary = folder.with_name(f".{folder.name}.tmp-{os.getpid()}")
+        shutil.rmtree(temporary, ignore_errors=True)
+        try:
+            _write(temporary, request, files, warnings)
+            kept = folder / ROBOT
+            if kept.is_file():
+                shutil.copy2(kept, temporary / ROBOT)
+            flush_tree(temporary)
+            shutil.rmtree(folder, ignore_errors=True)
+            os.rename(temporary, folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _write(folder: Path, request: Mapping[str, Any], files: Mapping[str, bytes], warnings: Sequence[str]) -> None:
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    own = [f'"{name}" ({size})' for name, size in request["observes"].items() if name not in ("position", "velocity")]
+    (folder / ROBOT).write_text(_TEMPLATE.format(observes=", ".join(own) or "nothing else is needed"), encoding="utf-8")
+    (folder / README).write_text(_readme(request, warnings), encoding="utf-8")
+    text = json.dumps(request, indent=1, ensure_ascii=False, allow_nan=False)  # a policy may care for the order
+    (folder / NAME).write_text(text + "\n", encoding="utf-8")
+
+
+def _readme(request: Mapping[str, Any], warnings: Sequence[str]) -> str:
+    joints = ", ".join(request["joints"])
+    lines = [
+        request["about"],
+        "",
+        f"Robot: {request['robot']}, {request['place']}; {1.0 / request['control_period']:g} targets a second.",
+        f"Joints in order: {joints}",
+        "",
+        "1. fill in read() and send() of robot.py",
+        "2. python runner.py --dry-run      plays against a perfect robot: rates and extremes",
+        "3. python runner.py                plays on the robot, asks before every movement, writes answer.csv",
+        "4. bring answer.csv (and returns.csv) back into this folder and type the gsl command again",
+        "",
+        *(["Beware:", *(f"- {one}" for one in warnings), ""] if warnings else []),
+    ]
+    return "\n".join(lines)

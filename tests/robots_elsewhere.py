@@ -1,0 +1,41 @@
+"""Requests for tests, and their runner as the robot's computer starts it: a Python with numpy, without gsl."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scenarios import QUIET
+
+from gsl.errors import Waiting
+from gsl.grounding.ane import ActionNoise
+from gsl.policies.policy import Policy
+from gsl.stages.population import Job
+from gsl.stages.real_robot import Errand, Order, asked
+from gsl.stages.rollout import Scenario
+from gsl.tasks.task import REAL, Task
+from gsl.worlds.external import ExternalRobot
+
+
+def requested(
+    folder: Path, policy: Policy, task: Task, thetas: dict[str, np.ndarray], *, noise: float = 0.0, **settings: Any
+) -> Path:
+    """Write a request of one episode for each policy and return its folder."""
+    world = ExternalRobot(robot="nao", requests=str(folder / "asked"), **settings)
+    scenario = Scenario(world, task, policy, REAL, ActionNoise(sd=noise))
+    orders = [Order(name, Job(theta, index)) for index, (name, theta) in enumerate(thetas.items())]
+    errand = Errand("", "A test.", until_fall=False, logs=True)
+    try:
+        asked(scenario, orders, errand, workers=1, console=QUIET)
+    except Waiting as waiting:
+        return waiting.request
+    raise AssertionError("nobody has answered")
+
+
+def run(folder: Path, *words: str, typed: str = "") -> subprocess.CompletedProcess[str]:
+    """Run a request's runner, `typed` on its keyboard."""
+    line = [sys.executable, "-I", str(folder / "runner.py"), *words]
+    return subprocess.run(line, input=typed, capture_output=True, text=True, timeout=60, check=False)

@@ -1,0 +1,298 @@
+"""The runner beside a robot acts as gsl's policies do, to the bit, with numpy alone, and sends nothing unsafe."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from omegaconf import OmegaConf
+from robots_elsewhere import requested, run
+
+from gsl.config import build
+from gsl.core.described import described
+from gsl.core.seeds import grounding_generator
+from gsl.errors import ConfigError
+from gsl.grounding.ane import ActionNoise
+from gsl.policies.excitation import Excitation
+from gsl.policies.policy import Policy, neighbour
+from gsl.policies.walk_engine import WalkEngine
+from gsl.runner import journal
+from gsl.runner.guard import Guard, ramp
+from gsl.runner.request import due, layout_of, read_request
+from gsl.storage.bundle import bundled
+from gsl.tasks.excite import Excite
+from gsl.tasks.walk import Walk
+from gsl.worlds.external import ExternalRobot
+
+CONF = Path(__file__).parents[1] / "conf"
+TASK = Walk(duration=0.6)
+STEPS = 40
+ACTS = """
+import json, sys
+sys.path.insert(0, sys.argv[1] + "/modules")
+import numpy as np
+from pathlib import Path
+from gsl.runner.acting import Actor
+from gsl.runner.request import read_request
+request = read_request(Path(sys.argv[1]))
+seen = np.array(json.load(sys.stdin))
+told = []
+for episode in request["episodes"]:
+    actor = Actor(request, episode)
+    told.append([[part.tolist() for part in actor.act(observation)] for observation in seen])
+strange = [name for name in ("numba", "pydantic", "gymnasium", "hydra", "scipy") if name in sys.modules]
+print(json.dumps({"acted": told, "strange": strange}))
+"""
+
+
+def _policy(name: str) -> Policy:
+    if name == "excitation":
+        return Excitation(robot="nao", motions=("steps_large", "chirp"), duration=1.5)
+    return build(OmegaConf.to_container(OmegaConf.load(CONF / f"policy/{name}.yaml")))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("name", ["walk_engine", "linear", "linear_walk", "excitation"])
+def test_the_runner_acts_as_the_policy_does_to_the_bit(name: str, noise: float, tmp_path: Path) -> None:
+    policy, rng = _policy(name), np.random.default_rng(5)
+    thetas = {str(n): neighbour(policy, policy.initial, 0.05, rng) for n in range(3)}
+    held = {"floating": False} if name in ("linear", "excitation") else {}
+    task = Excite(duration=1.5) if name == "excitation" else TASK
+    folder = requested(tmp_path, policy, task, thetas, noise=noise, **held)
+    layout = layout_of(read_request(folder))
+    seen = rng.normal(size=(STEPS, layout.size))
+    seen[:, layout["foot_force"]] = 30.0 * np.abs(seen[:, layout["foot_force"]])
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", ACTS, str(folder)],
+        input=json.dumps(seen.tolist()), capture_output=True, text=True, timeout=60, check=True,
+    )  # fmt: skip
+    told = json.loads(done.stdout)
+    assert told["strange"] == []
+    for index, theta in enumerate(thetas.values()):
+        run = policy.start(theta, layout)
+        own = ActionNoise(sd=noise).start(layout, grounding_generator(index))
+        actions = np.array([run.act(observation) for observation in seen])
+        sent = np.array([own.transform(seen[0], action) for action in actions])
+        np.testing.assert_array_equal(np.array(told["acted"][index])[:, 0], actions)
+        np.testing.assert_array_equal(np.array(told["acted"][index])[:, 1], sent)
+
+
+def test_a_policy_that_needs_more_than_numpy_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"gsl\.worlds\.mujoco needs mujoco, but beside a robot there is numpy"):
+        bundled(("gsl.worlds.mujoco",))
+
+
+LIMITS = ExternalRobot(robot="nao").limits
+JOINTS = ExternalRobot(robot="nao").layout.joints
+PERIOD = 0.02
+
+
+def _guard() -> Guard:
+    guard = Guard(JOINTS, LIMITS, PERIOD)
+    guard.start(np.zeros(15))
+    return guard
+
+
+def test_the_guard_lets_through_what_moves_within_the_limits() -> None:
+    guard, time = _guard(), np.arange(0.0, 4.0, PERIOD)
+    for target in np.outer(np.sin(time), 0.05 * np.ones(15)):
+        assert guard.refusal(target) == ""
+        guard.take(target)
+
+
+@pytest.mark.parametrize(
+    ("joint", "value", "problem"),
+    [
+        (3, np.nan, "LKneePitch: the target is not a finite number"),
+        (3, -0.2, "LKneePitch: the target of -0.2 rad is below the limit of -0.09233 rad"),
+        (2, 0.5, "LHipPitch: the target of 0.5 rad is above the limit of 0.484 rad"),
+        (3, 0.2, "LKneePitch: the target jumps by 0.2 rad, more than the 0.1612 rad allowed"),
+    ],
+)
+def test_the_guard_refuses_and_says_which_joint(joint: int, value: float, problem: str) -> None:
+    target = np.zeros(15)
+    target[joint] = value
+    assert _guard().refusal(target) == problem
+
+
+def test_the_guard_refuses_what_is_too_fast_for_too_long() -> None:
+    guard, told = _guard(), ""
+    for tick in range(1, 20):
+        told = guard.refusal(np.full(15, 0.14 * tick * (np.arange(15) == 3)))
+        if told:
+            break
+        guard.take(np.full(15, 0.14 * tick * (np.arange(15) == 3)))
+    assert told == "LKneePitch: the target moves 1.4 rad in 0.2 s, more than the 1.28 rad allowed"
+
+
+def test_the_guard_refuses_another_number_of_joints() -> None:
+    assert _guard().refusal(np.zeros(3)) == "15 targets are due, one a joint, not 3"
+
+
+def test_a_ramp_begins_gently_ends_where_it_should_and_keeps_its_speed() -> None:
+    start, end = np.zeros(2), np.array([1.5, -0.2])
+    way = np.array([start, *ramp(start, end, {"seconds": 1.0, "speed": 0.5}, PERIOD)])
+    np.testing.assert_array_equal(way[-1], end)
+    speed = np.abs(np.diff(way, axis=0)) / PERIOD
+    assert speed.max() <= 0.5 * 1.001 and speed[0].max() < 0.02 and speed[-1].max() < 0.02
+
+
+def test_after_a_fall_no_more_of_a_policy_is_due_where_that_is_said() -> None:
+    episodes = [{"name": f"{policy}{n}", "policy": policy} for policy in "ab" for n in range(3)]
+    left = {
+        stop: [one["name"] for one in due({"until_fall": stop, "episodes": episodes}, {"a0", "a1"}, {"a1"})]
+        for stop in (True, False)
+    }
+    assert left == {True: ["b0", "b1", "b2"], False: ["a2", "b0", "b1", "b2"]}
+
+
+def test_what_a_journal_keeps_comes_back_and_an_episode_run_again_takes_its_place(tmp_path: Path) -> None:
+    path, columns = tmp_path / "answer.csv", ["episode", "step", "time", "fell", "stopped"]
+    for episode, fell in ((0, False), (10, False), (1, True), (0, True)):
+        journal.keep(path, "h", columns, [[episode, 0, 0.1, False, False], [episode, 1, 1 / 3, fell, False]])
+    assert journal.ends(path) == {10: False, 1: True, 0: True}
+    assert journal.marked(path) == "h" and path.read_text().count("0.3333333333333333") == 3
+
+
+ROBOT = """
+import numpy as np
+at = np.array({start})
+def read():
+    return {{"position": at, "gyro": [0, 0, 0], "foot_force": [20, 20], {more}}}
+def send(targets):
+    global at
+    at = targets
+"""
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    fast = {"ramp": 1.0, "ramp_speed": 2.0}
+    return requested(
+        tmp_path_factory.mktemp("walk"), WalkEngine(), TASK, {n: WalkEngine().initial for n in ("one", "two")}, **fast
+    )
+
+
+def _robot(folder: Path, more: str = "", start: str = "[0.0] * 15") -> str:
+    path = folder / "mine.py"
+    path.write_text(ROBOT.format(more=more, start=start))
+    return f"--robot={path}"
+
+
+def test_a_dry_run_plays_everything_and_writes_nothing(walk: Path) -> None:
+    before = sorted(walk.rglob("*"))
+    done = run(walk, "--dry-run")
+    assert done.returncode == 0 and "no target was refused; nothing was written" in done.stdout
+    assert "ms each of the 20 ms there are (50 Hz)" in done.stdout
+    assert [path for path in sorted(walk.rglob("*")) if "__pycache__" not in path.parts] == before
+
+
+def test_an_answer_in_two_sittings(walk: Path, tmp_path: Path) -> None:
+    words = (_robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--unpaced")
+    first = run(walk, *words, typed="\n\n0,12\n0.12\nq\n")
+    assert first.returncode == 0 and "1 episodes are missing" in first.stdout
+    assert "'0,12' is no number of metres" in first.stdout
+    assert run(walk, *words).stdout.endswith("runner.py: there is nobody to ask; --yes asks nothing\n")
+    second = run(walk, *words, typed="\n\nf\n")
+    assert "all is answered" in second.stdout
+    assert journal.ends(tmp_path / "answer.csv") == {0: False, 1: False}
+    rows = journal.returned(tmp_path / "returns.csv")
+    assert (rows["one"]["distance"], rows["one"]["fell"]) == ("0.12", "no")
+    assert (rows["two"]["distance"], rows["two"]["fell"]) == ("", "yes")
+
+
+BROKEN = """
+reads, plain = 0, read
+def read():
+    global reads
+    reads += 1
+    if reads == 20:
+        raise KeyboardInterrupt
+    return plain()
+"""
+
+
+@pytest.mark.parametrize(("typed", "kept"), [("y", {0: True}), ("n", {})])
+def test_an_episode_broken_off_is_a_fall_if_a_person_says_so_and_else_nothing(
+    walk: Path, tmp_path: Path, typed: str, kept: dict[int, bool]
+) -> None:
+    path = Path(_robot(tmp_path).removeprefix("--robot="))
+    path.write_text(path.read_text() + BROKEN)
+    log = tmp_path / "answer.csv"
+    done = run(walk, f"--robot={path}", f"--log={log}", "--unpaced", typed=f"\n\n{typed}\n\nq\n")
+    assert "was it a fall?" in done.stdout
+    assert journal.ends(log) == kept
+    if kept:
+        rows = [line.split(",") for line in log.read_text().splitlines()[2:]]
+        assert len(rows) == 18 and rows[-1][1] == "17" and rows[-1][3] == ""  # the last action has no state
+
+
+def test_a_clock_that_is_real_keeps_the_rate(walk: Path, tmp_path: Path) -> None:
+    run(walk, _robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--yes", "--episode=one")
+    times = np.loadtxt(tmp_path / "answer.csv", delimiter=",", skiprows=2, usecols=2, dtype=float)
+    assert len(times) == 31 and np.diff(times).min() > 0.0
+    assert np.median(np.diff(times)) == pytest.approx(PERIOD, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("more", "start", "words", "problem"),
+    [
+        ("'gyroscope': 1", "[0.0] * 15", (), "read() gives 'gyroscope', which is none of acceleration, "),
+        ("'gyro': [1, 2]", "[0.0] * 15", (), "read() gives 2 numbers for 'gyro', not 3"),
+        ("'gyro': [1, 2, float('nan')]", "[0.0] * 15", (), "read() gives for 'gyro' a number that is not finite"),
+        ("'gyro': 'fast'", "[0.0] * 15", (), "read() gives for 'gyro' what is no list of numbers"),
+        ("'fell': True", "[0.0] * 15", (), "the robot lies down before one has begun"),
+        ("'fell': 1 / 0", "[0.0] * 15", (), "read() failed: ZeroDivisionError: division by zero"),
+        ("", "[0.0] * 14 + [3.0]", (), "RShoulderRoll: is at 3 rad, 2.686 rad outside of its range; bring it by hand"),
+        ("", "[0.0] * 15", ("--episode=three",), "there is no episode three; there is one, two"),
+        ("", "[0.0] * 15", ("--robot=none.py",), "none.py does not exist; --robot names the file with read() and send"),
+    ],
+)
+def test_the_runner_refuses_in_one_line(
+    walk: Path, tmp_path: Path, more: str, start: str, words: tuple[str, ...], problem: str
+) -> None:
+    log = tmp_path / "answer.csv"
+    done = run(walk, _robot(tmp_path, more, start), f"--log={log}", "--yes", "--unpaced", *words)
+    assert done.returncode == 2 and done.stderr == ""
+    assert done.stdout.splitlines()[-1].startswith(f"runner.py: {problem}")
+    assert not log.exists()
+
+
+def test_a_request_that_was_changed_is_not_run(walk: Path, tmp_path: Path) -> None:
+    request = json.loads((walk / "request.json").read_text())
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "runner.py").write_text((walk / "runner.py").read_text())
+    (other / "modules").symlink_to(walk / "modules")
+    request["limits"]["upper"][0] = 9.0
+    (other / "request.json").write_text(json.dumps(request))
+    assert "was changed after it was written" in run(other, "--dry-run").stdout
+
+
+def test_an_unsafe_target_stops_the_episode_safely_and_counts_as_a_fall(tmp_path: Path) -> None:
+    theta = dict(zip(WalkEngine().names, WalkEngine().initial, strict=True)) | {"arm_swing": 200.0}
+    wild = np.array(list(theta.values()))
+    folder = requested(tmp_path, WalkEngine(), Walk(duration=1.2), {"wild": wild}, ramp=1.0)
+    assert "wild asks in simulation after" in (folder / "README.txt").read_text()
+    assert run(folder, "--dry-run").returncode == 1
+    lines = ROBOT.format(more="", start="[0.0] * 15") + "    all_sent.append(targets)\nall_sent = []\n"
+    lines += "def end():\n    np.save('sent.npy', np.array(all_sent))\n"
+    (tmp_path / "mine.py").write_text(lines.replace("'sent.npy'", repr(str(tmp_path / "sent.npy"))))
+    done = run(folder, f"--robot={tmp_path / 'mine.py'}", "--yes", "--unpaced")
+    assert "wild: " in done.stdout and "refused: " in done.stdout and "held, then ramped out" in done.stdout
+    assert journal.ends(folder / "answer.csv") == {0: True}
+    sent, guard = np.load(tmp_path / "sent.npy"), Guard(JOINTS, LIMITS, PERIOD)
+    guard.start(sent[0])
+    for target in sent:
+        assert guard.refusal(target) == ""
+        guard.take(target)
+
+
+def test_the_policy_of_a_request_is_all_of_it(walk: Path) -> None:
+    request = read_request(walk)
+    assert request["policy"] == described(WalkEngine())
+    assert request["episodes"][0]["parameters"] == WalkEngine().initial.tolist()
