@@ -2,7 +2,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test iterate check clean FORCE
+.PHONY: help demo test iterate real xl330 so101 go2 check clean FORCE
 
 VENV ?= .venv
 GSL ?= $(VENV)/bin/gsl
@@ -23,6 +23,22 @@ demo: $(INSTALLED) ## Improve a walk for a "real" robot that the optimiser never
 test: $(INSTALLED) ## Check the style, run the tests.
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/python -m pytest -q -n 2
+
+real: xl330 so101 go2 ## Diagnose logs of three real robots (docs/real-robots.md); a quarter of an hour.
+
+xl330: $(INSTALLED)
+	$(GSL) import mapping=xl330_pendulum name=xl330
+	$(GSL) diagnose real=xl330 sim=xl330_pendulum name=xl330 tolerance=0.0175
+	$(GSL) cross-validate real=xl330 sim=xl330_pendulum name=xl330 tolerance=0.0175 by=kp
+
+so101: $(INSTALLED)
+	$(GSL) import mapping=so101_arm name=so101
+	$(GSL) diagnose real=so101 sim=so101 name=so101 'held_out={date: 2026-02-03}'
+	$(GSL) cross-validate real=so101 sim=so101 name=so101 by=date
+
+go2: $(INSTALLED)
+	$(GSL) import mapping=go2_in_air name=go2
+	$(GSL) diagnose real=go2 sim=go2_in_air name=go2
 
 check: $(INSTALLED) ## Check style, format and types.
 	$(VENV)/bin/ruff check

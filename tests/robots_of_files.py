@@ -35,7 +35,7 @@ class Told:
     def holding(self, angles: Mapping[str, float]) -> dict[str, float]:
         """Torques [N·m] that hold a pose [rad]."""
         pose, still = [angles.get(name, 0.0) for name in self.joints], [0.0] * len(self.joints)
-        torques = self._bullet.calculateInverseDynamics(self._body, pose, still, still, self._client)
+        torques = self._bullet.calculateInverseDynamics(self._body, pose, still, still, physicsClientId=self._client)
         return dict(zip(self.joints, torques, strict=True))
 
     def inertia(self, angles: Mapping[str, float]) -> np.ndarray:

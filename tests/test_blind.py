@@ -37,8 +37,8 @@ from gsl.worlds.servo import COMMANDS
 
 PERIOD = 0.02
 TOY = (
-    "sim.robot=blind_arm.arm", "excitation.motions=[steps_large,triangle_fast]", "excitation.repeated=[steps_large]",
-    "excitation.duration=1.6", "programmes=1", "workers=1", "name=toy",
+    "sim.robot=blind_arm.arm", "sim.floating=false", "excitation.motions=[steps_large,triangle_fast]",
+    "excitation.repeated=[steps_large]", "excitation.duration=1.6", "programmes=1", "workers=1", "name=toy",
 )  # fmt: skip
 QUICK = ("nulls=0", "duels=0", "most=1", "workers=1", "name=toy")
 

@@ -223,7 +223,7 @@ def test_the_task_chooses_policy_and_air_but_the_user_has_the_last_word(role: st
         ("policy.variants=[]", "policy.variants = "),
         ("policy.amplitude=2", "policy.amplitude = 2: must be at most 1"),
         ("policy.duration=1", "policy.duration = 1: must be at least 1.5 (s)"),
-        ("policy.robot=pepper", "policy.robot: no robot called 'pepper'; there is nao"),
+        ("policy.robot=pepper", "policy.robot: no robot called 'pepper'; there is go2, nao, pendulum"),
         (f"policy.robot={__name__}.pendulum", f"policy.robot = {__name__}.pendulum: has other joints than the world's"),
     ],
 )
