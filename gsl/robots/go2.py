@@ -15,7 +15,6 @@ from __future__ import annotations
 import numpy as np
 
 from gsl.core.body import Joint, Link, Robot, Shape
-from gsl.robots.defaults import torque_unit
 
 KP, KD = 20.0, 1.5  # [N·m/rad], [N·m·s/rad], B
 ARMATURE = 0.01  # [kg·m²], C
@@ -69,7 +68,6 @@ def go2() -> Robot:
         supply_voltage=29.6,  # nominal, of eight cells
         stance={name: STANCE[name.split("_")[1]] for name in names},
         ranges=RANGES,
-        torque_unit=torque_unit(max(EFFORT.values())),
     )
 
 
