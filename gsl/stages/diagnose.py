@@ -175,7 +175,7 @@ class Diagnose:
         said += [f"reference={self.reference}"] if self.reference else []
         said += [f"without=[{','.join(self.without)}]"] if self.without else []
         said += [f"tolerance={self.tolerance:g}"] if self.tolerance else []
-        held = ", ".join(f"{key}: {value}" for key, value in self.held_out.items())
+        held = ", ".join(f"{key}: {_typed(value)}" for key, value in self.held_out.items())
         said += [f"held_out={{{held}}}"] if held else []
         said += [f"clocks={self.clocks}"] if self.clocks != "synchronised" else []
         return shlex.join(["gsl", "diagnose", *said])
@@ -207,6 +207,11 @@ class Diagnose:
         text = yaml.safe_dump(documents.plain(config), sort_keys=False, allow_unicode=True)
         told = "with it switched on, and calibrated" if found.answer.candidates else "calibrated"
         return f"# {summary}\n# The simulator {told} joint by joint.\n{text}"
+
+
+def _typed(value: Any) -> str:
+    """Return a value, or several, as it is typed."""
+    return f"[{', '.join(map(str, value))}]" if isinstance(value, list | tuple) else str(value)
 
 
 class _Telling:
