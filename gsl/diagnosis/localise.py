@@ -9,7 +9,9 @@ import numpy as np
 
 from gsl.core.body import Robot
 from gsl.diagnosis.experiment import Experiment
+from gsl.diagnosis.records import Pieces
 from gsl.diagnosis.replay import Simulator
+from gsl.effects.effect import applied, built
 
 REST, FAST = 0.01, 0.12  # shares of the no-load speed: slower is rest, faster is fast
 REVERSAL = 0.06  # before and after a change of direction [s]
@@ -85,12 +87,13 @@ def cells(found: Experiment, z: np.ndarray, regimes: Mapping[str, np.ndarray]) -
 
 def regimes(found: Experiment, simulator: Simulator) -> dict[str, np.ndarray]:
     """Return which residuals of all windows belong to which regime, shape (W, scored, n_joints) each."""
-    cut, servo, n = found.pieces, simulator.plant.servo, len(found.joints)
+    cut, n = found.pieces, len(found.joints)
+    kp, limit, no_load = _servos(cut, simulator, n)
     real = cut.real[..., :n]
     speed = np.gradient(real, found.period, axis=1)
     commands = cut.windows.commands[:, : real.shape[1], :n][:, ::-1]
-    wanted = np.abs(servo.kp[:n] * (commands - real)) / servo.limit[:n]
-    share = np.abs(_smooth(speed)) / servo.no_load_speed[:n]
+    wanted = np.abs(kp * (commands - real)) / limit
+    share = np.abs(_smooth(speed)) / no_load
     tick = cut.tick[:, None] + np.arange(real.shape[1])
     length = np.array([len(found.records[k]) for k in cut.record])[:, None]
     masks = {
@@ -108,6 +111,15 @@ def regimes(found: Experiment, simulator: Simulator) -> dict[str, np.ndarray]:
         masks |= _phases(found)
     wide = {key: _widened(mask, len(found.channels), key) for key, mask in masks.items()}
     return {key: _counted(found, mask[:, cut.warm_up :], key) for key, mask in wide.items()}
+
+
+def _servos(cut: Pieces, simulator: Simulator, joints: int) -> np.ndarray:
+    """Return kp, torque limit and no-load speed in each window, shape (3, W, 1, n_joints)."""
+    told = np.empty((3, len(cut), 1, joints))
+    for known, index in cut.alike:
+        servo = applied(simulator.plant, built(known)).servo
+        told[:, index, 0] = np.array([servo.kp, servo.limit, servo.no_load_speed])[:, None, :joints]
+    return told
 
 
 def _counted(found: Experiment, mask: np.ndarray, key: str) -> np.ndarray:

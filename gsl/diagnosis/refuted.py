@@ -101,6 +101,6 @@ def _logged(found: Experiment, name: str) -> np.ndarray | None:
 
 def _torque(plant: Plant, record: Record) -> np.ndarray:
     """Return what servos ask for at each command [N·m], latency and friction apart, shape (T, n_motors)."""
-    servo, drive = plant.servo, plant.robot.drive
+    servo, drive = applied(plant, built(record.conditions)).servo, plant.robot.drive
     error = record.targets + servo.offset - record.position[:-1][:, drive]
     return np.clip(servo.kp * error - servo.kd * record.velocity[:-1][:, drive], -servo.limit, servo.limit)
