@@ -113,4 +113,4 @@ def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
     table = (folder / "table.md").read_text()
     assert "in 18 of 18 trajectories" in table
     said = refused("cross-validate", *line, "by=date", folder=tmp_path)
-    assert said == "by = date: needs a label with two values at least; the log's labels: conditions, gain, policy"
+    assert said == "by = date: needs a label with two values at least; the log's labels: gain, policy"

@@ -99,9 +99,7 @@ def diagnosed(
         reference: A log without the effect, on which the nominal is calibrated first.
         known_nulls: What chance gained on these commands in this world, if it is known already.
     """
-    found = experiment(log, robot, walking=walking, held_out=options.held_out)
-    if options.tolerance:
-        found = found.with_model_error(_tolerated(found, options.tolerance))
+    found = prepared(log, robot, options, walking=walking)
     if not len(found.train) or not len(found.held_out):
         raise InputError(
             "too little to fit and to check: two motions, or one trajectory, of some seconds are the least"
@@ -147,9 +145,11 @@ def diagnosed(
     )  # fmt: skip
 
 
-def _tolerated(found: Experiment, tolerance: float) -> np.ndarray:
-    """Return what does not matter of each channel, shape (n_channels,): of joints alone."""
-    return np.where(np.arange(len(found.channels)) < len(found.joints), tolerance, 0.0)
+def prepared(log: Batch, robot: Robot, options: Options, *, walking: bool = False) -> Experiment:
+    """Return a log ready for counterfactuals, with what does not matter of its joints counted as noise."""
+    found = experiment(log, robot, walking=walking, held_out=options.held_out)
+    ours = np.arange(len(found.channels)) < len(found.joints)
+    return found.with_model_error(np.where(ours, options.tolerance, 0.0)) if options.tolerance else found
 
 
 def _shaking(found: Experiment) -> float:

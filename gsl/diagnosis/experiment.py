@@ -116,7 +116,7 @@ def experiment(
             raise InputError("conditions of a trajectory are for logs in the air; leave them out of its label")
         return _on_ground(found, robot, period, held_out)
     warm_up, scored = round(WARM_UP / period), round(SCORED / period)
-    noise = noise_floor(found, robot.encoder_step)
+    noise = noise_floor(_unchecked(found, held_out), robot.encoder_step)
     cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
     commands = cut.windows.commands[:, : warm_up + scored, : len(robot.controlled)]
     held, by_record = _held_out(found, cut, held_out)
@@ -131,7 +131,7 @@ def _on_ground(
     cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
     cut = cut.chosen(_spread(np.arange(len(cut)), WALKS))
     joints = np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
-    noise = noise_floor(found, robot.encoder_step, np.r_[joints, list(LEAST.values())])
+    noise = noise_floor(_unchecked(found, held_out), robot.encoder_step, np.r_[joints, list(LEAST.values())])
     held, by_record = _held_out(found, cut, held_out)
     how = Comparison(noise.sd, np.zeros(len(noise.sd), dtype=bool), np.zeros(len(noise.sd)))
     return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
@@ -153,6 +153,12 @@ def _held_out(found: Sequence[Record], cut: Pieces, asked: Mapping[str, Any] | N
         held = [index for k, group in enumerate(motions.values()) if k % 2 for index in group]
         return np.isin(cut.record, held), True
     return np.arange(len(cut)) % 2 == 1, False
+
+
+def _unchecked(found: Sequence[Record], asked: Mapping[str, Any] | None) -> Sequence[Record]:
+    """Return the records that the floor is of: what is held out by its label may differ from them and shall tell."""
+    held = labelled(found, asked) if asked else []
+    return [one for k, one in enumerate(found) if k not in held]
 
 
 def labelled(found: Sequence[Record], asked: Mapping[str, Any]) -> list[int]:

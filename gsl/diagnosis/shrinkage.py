@@ -8,6 +8,7 @@ import numpy as np
 
 from gsl.diagnosis.ceiling import CLIP, learned_residual
 from gsl.diagnosis.diagnose import Findings
+from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.localise import regimes
 
 SAMPLES = 1000
@@ -28,14 +29,14 @@ def shrinkage(found: Findings, before: np.ndarray, after: np.ndarray) -> dict[st
     z = {key: exp.comparison.residual(values, exp.pieces) for key, values in told.items()}
     used = exp.comparison.used(z["before"].shape[1])
     mean = {key: _mean_square(values[held], used) for key, values in z.items()}
-    fraction, low, high = _fraction(z["before"][held], z["after"][held], exp.pieces.chosen(held).samples, used)
+    fraction, low, high = removed(exp, z["before"], z["after"])
     return {
         "floor": 1.0,
         **{key: float(np.sqrt(value.mean())) for key, value in mean.items()},
         "fraction": fraction,
         "low": low,
         "high": high,
-        "ceiling_fraction": _ceiling(found, before, z["before"][held], used),
+        "ceiling_fraction": ceiling(exp, before, seed=found.seed),
         "by_joint": [
             {"joint": joint, "before": float(np.sqrt(mean["before"][k])), "after": float(np.sqrt(mean["after"][k]))}
             for k, joint in enumerate(exp.channels)
@@ -52,10 +53,16 @@ def _excess(z: np.ndarray, used: np.ndarray) -> float:
     return float(np.average(_mean_square(z, used), weights=used)) - 1.0
 
 
-def _fraction(
-    before: np.ndarray, after: np.ndarray, sample: np.ndarray, used: np.ndarray
-) -> tuple[float | None, float | None, float | None]:
-    """Return the share of the excess that is gone, with its 95 % interval by bootstrap over samples."""
+def removed(exp: Experiment, before: np.ndarray, after: np.ndarray) -> tuple[float | None, float | None, float | None]:
+    """Return the share of the held-out excess that is gone, with its 95 % interval by bootstrap; None if there is none.
+
+    Args:
+        exp: The log.
+        before: Residuals of all windows without effects, in units of the floor, shape (W, scored, n_channels).
+        after: With them.
+    """
+    used, sample = exp.comparison.used(before.shape[1]), exp.pieces.chosen(exp.held_out).samples
+    before, after = before[exp.held_out], after[exp.held_out]
     if _excess(before, used) < NOTHING:
         return None, None, None
     names = np.unique(sample)
@@ -69,11 +76,19 @@ def _fraction(
     return float(shares[0]), float(low), float(high)
 
 
-def _ceiling(found: Findings, before: np.ndarray, z: np.ndarray, used: np.ndarray) -> float | None:
-    """Return the share of the excess that a learned residual takes away; None if there is none or joints shake."""
-    if _excess(z, used) < NOTHING or found.experiment.comparison.shaking.any() or not np.isfinite(before).all():
+def ceiling(exp: Experiment, before: np.ndarray, *, seed: int = 0) -> float | None:
+    """Return the share of the held-out excess that a learned residual takes away; None without one, or if joints shake.
+
+    Args:
+        exp: The log.
+        before: Replays of all windows by the simulator as it was [rad], shape (W, T, n_joints).
+        seed: Of the fit.
+    """
+    z = exp.comparison.residual(before, exp.pieces)[exp.held_out]
+    used = exp.comparison.used(z.shape[1])
+    if _excess(z, used) < NOTHING or exp.comparison.shaking.any() or not np.isfinite(before).all():
         return None
-    learned = learned_residual(found.experiment, before, seed=found.seed)
+    learned = learned_residual(exp, before, seed=seed)
     return 1.0 - max(0.0, _excess(learned, used)) / _excess(np.clip(z, -CLIP, CLIP), used)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -14,10 +15,13 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Hypothesis
-from gsl.diagnosis.diagnose import Findings, diagnosed
+from gsl.diagnosis.diagnose import Findings, diagnosed, prepared
 from gsl.diagnosis.document import document
-from gsl.diagnosis.experiment import labelled
+from gsl.diagnosis.experiment import Experiment
+from gsl.diagnosis.fit import Fit
 from gsl.diagnosis.options import Options
+from gsl.diagnosis.records import Record
+from gsl.diagnosis.shrinkage import ceiling, removed
 from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import effect_class
 from gsl.errors import ConfigError, InputError
@@ -28,6 +32,7 @@ from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
 
 TABLE, DATA = "table.md", "folds.json"
+SINGLE = (str, int, float, bool)
 SLIGHT = 0.05  # of an effect's range: where a fit of the baseline begins
 
 
@@ -35,7 +40,9 @@ SLIGHT = 0.05  # of an effect's range: where a fit of the baseline begins
 class CrossValidate:
     """A diagnosis for every value of a label, of all trajectories without it; those that have it are replayed whole.
 
-    Beside it stand the simulator as it was, calibrated, and with some usual effects fitted without a diagnosis.
+    What a diagnosis checks its hypotheses on is the value after the one that is held out, or every second motion where
+    there are two values only. Beside it stand the simulator as it was, calibrated, and with some usual effects fitted
+    without a diagnosis.
     """
 
     kind: ClassVar[str] = "cross_validate"
@@ -62,9 +69,13 @@ class CrossValidate:
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def __post_init__(self) -> None:
-        """Refuse effects that do not exist."""
+        """Refuse effects that do not exist, or that are to be left out."""
+        if not self.usual:
+            raise ConfigError("usual", "names at least one effect to compare with")
         for name in self.usual:
             effect_class(name)
+            if name in self.without:
+                raise ConfigError("usual", "is left out of the library by without=", given=name)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""
@@ -77,29 +88,39 @@ class CrossValidate:
         check_log(log, lumped(self.sim.plant.robot), self.real)
         if on_ground(log):
             raise InputError(f"{self.real}: whole replays are for logs in the air")
-        folds = [self._fold(log, value, console) for value in self._values(log)]
+        values = self._values(log)
+        after = [*values[1:], values[0]] if len(values) > 2 else [None] * len(values)
+        folds = [self._fold(log, *pair, console) for pair in zip(values, after, strict=True)]
         documents.write_json(folder / DATA, [one.told() for one in folds])
-        (folder / TABLE).write_text(table(folds, self.by, _names(self.usual)), encoding="utf-8")
-        means = {way: float(np.mean([np.mean(one.errors[way]) for one in folds])) for way in folds[0].errors}
+        (folder / TABLE).write_text(table(folds, self.by), encoding="utf-8")
+        means = {way: float(np.mean(np.concatenate([one.errors[way] for one in folds]))) for way in folds[0].errors}
         return {"folds": len(folds), "mean_error": means, "causes": {str(one.value): one.causes for one in folds}}
 
     def _values(self, log: Batch) -> list[Any]:
         labels = log.metadata.get("episodes") or []
-        found = list(dict.fromkeys(one.get(self.by) for one in labels if one.get(self.by) is not None))
+        found = list(dict.fromkeys(one[self.by] for one in labels if isinstance(one.get(self.by), SINGLE)))
         if len(found) < 2:
-            known = ", ".join(sorted({key for one in labels for key in one})) or "there are none"
+            known = ", ".join(sorted({key for one in labels for key in one if isinstance(one[key], SINGLE)}))
+            known = known or "there are none"
             problem = f"needs a label with two values at least; the log's labels: {known}"
             raise ConfigError("by", problem, given=self.by)
         return sorted(found, key=lambda value: (str(type(value)), value))
 
-    def _fold(self, log: Batch, value: Any, console: Any) -> Fold:
+    def _fold(self, log: Batch, value: Any, inner: Any, console: Any) -> Fold:
+        """Diagnose the trajectories without a value, which know nothing of the others; these are looked at once."""
         console.status(f"{self.by} {value} is held out")
         options = Options(
             self.without, self.most, self.duels, self.nulls, threads(self.workers), self.clocks == "synchronised",
-            seed=self.seed, tolerance=self.tolerance, held_out={self.by: value},
+            seed=self.seed, tolerance=self.tolerance, held_out={} if inner is None else {self.by: inner},
         )  # fmt: skip
-        plant = self.sim.plant
-        found = diagnosed(log, lumped(plant.robot), plant, self.sim.step, options, lambda phase: checkpoint())
+        plant, robot = self.sim.plant, lumped(self.sim.plant.robot)
+        found = diagnosed(self._rest(log, value), robot, plant, self.sim.step, options, lambda phase: checkpoint())
+        exp = prepared(log, robot, replace(options, held_out={self.by: value}))
+        before, after = (
+            found.simulator.told(one.effects, one.fit.nuisances, exp.pieces)
+            for one in (replace(found.selection.none, fit=_untouched(found)), found.selection.chosen)
+        )
+        z = [exp.comparison.residual(told, exp.pieces) for told in (before, after)]
         told = document(found)
         console.status(f"{self.by} {value}: {told['summary']}")
         return Fold(
@@ -107,28 +128,40 @@ class CrossValidate:
             verdict=told["verdict"],
             causes=[one["effect"] for one in told["causes"] or told["suspects"]],
             parameters=found.selection.chosen.effects,
-            removed=told["shrinkage"]["fraction"],
-            ceiling=told["shrinkage"]["ceiling_fraction"],
-            names=[one.name for one in _held_out(found, {self.by: value})],
-            errors=self._errors(found, {self.by: value}),
+            removed=removed(exp, *z)[0],
+            ceiling=ceiling(exp, before, seed=self.seed),
+            names=[one.name for one in _checked(exp)],
+            errors=self._errors(found, _checked(exp)),
         )
 
-    def _errors(self, found: Findings, held: Mapping[str, Any]) -> dict[str, list[float]]:
+    def _rest(self, log: Batch, value: Any) -> Batch:
+        labels = log.metadata["episodes"]
+        kept = [k for k, one in enumerate(labels) if one.get(self.by) != value]
+        about = {**log.metadata, "episodes": [labels[k] for k in kept]}
+        return replace(log, episodes=tuple(log.episodes[k] for k in kept), metadata=about)
+
+    def _errors(self, found: Findings, held: Sequence[Record]) -> dict[str, list[float]]:
         """Return the mean absolute error of every held-out trajectory [rad], by what replays it."""
         n = len(found.experiment.joints)
         ways: dict[str, tuple[Mapping[str, Any], np.ndarray]] = {AS_IT_WAS: ({}, nuisance.none(n))}
         fits = {CALIBRATED: found.selection.none, _names(self.usual): _usual(found, self.usual)}
         for way, fit in {**fits, DIAGNOSED: found.selection.chosen}.items():
             ways[way] = fit.effects, fit.fit.nuisances
-        records, robot = _held_out(found, held), found.experiment.robot
+        robot = found.experiment.robot
         return {
-            way: mean_errors(found.simulator, effects, nuisances, records, robot).mean(axis=1).tolist()
+            way: mean_errors(found.simulator, effects, nuisances, held, robot).mean(axis=1).tolist()
             for way, (effects, nuisances) in ways.items()
         }
 
 
-def _held_out(found: Findings, held: Mapping[str, Any]) -> list[Any]:
-    return [found.experiment.records[k] for k in labelled(found.experiment.records, held)]
+def _checked(exp: Experiment) -> list[Record]:
+    """Return the trajectories that are held out, those too short for a window left out."""
+    return [exp.records[k] for k in np.unique(exp.pieces.record[exp.held_out])]
+
+
+def _untouched(found: Findings) -> Fit:
+    """Return the calibration of the simulator as it was: none."""
+    return replace(found.selection.none.fit, nuisances=nuisance.none(len(found.experiment.joints)))
 
 
 def _usual(found: Findings, effects: Sequence[str]) -> Hypothesis:
