@@ -94,23 +94,45 @@ def test_windows_without_torque_are_left_out() -> None:
     assert len(some) < len(every) and ends.max() <= 75 * PERIOD
 
 
+CAUSE = {"command_latency": {"delay": 0.016}}
+LINE = ("sim.robot=blind_arm.arm", "sim.floating=false", "most=1", "nulls=0", "duels=0", "workers=1", "by=gain")
+SMALL = f"without=[{','.join(sorted(set(names()) - {'command_latency', 'coulomb_friction', 'viscous_friction'}))}]"
+
+
+def written(made: Batch, path: Path) -> None:
+    write(
+        path, replace(made, metadata={"robot": "arm", "role": "imported", "source": "test", "seed": 1, **made.metadata})
+    )
+
+
+def folds(folder: Path) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = json.loads((folder / "folds.json").read_text())
+    return found
+
+
 def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
-    made = both(command_latency={"delay": 0.016})
-    about = {"robot": "arm", "role": "imported", "source": "test", "seed": 1, **made.metadata}
-    write(tmp_path / "logs.parquet", replace(made, metadata=about))
-    line = ("real=logs.parquet", "sim.robot=blind_arm.arm", "sim.floating=false", "most=1", "nulls=0", "duels=0")
-    small = f"without=[{','.join(set(names()) - {'command_latency', 'coulomb_friction', 'viscous_friction'})}]"
-    done("cross-validate", *line, small, "by=gain", "workers=1", "name=c", folder=tmp_path)
+    written(both(**CAUSE), tmp_path / "logs.parquet")
+    done("cross-validate", "real=logs.parquet", *LINE, SMALL, "name=c", folder=tmp_path)
     folder = tmp_path / "runs/c/cross_validate"
-    folds = json.loads((folder / "folds.json").read_text())
-    assert [one["value"] for one in folds] == [0.5, 1.0]
-    assert all(one["causes"] == ["command_latency"] for one in folds)
-    for one in folds:
+    assert [one["value"] for one in folds(folder)] == [0.5, 1.0]
+    assert all(one["causes"] == ["command_latency"] for one in folds(folder))
+    for one in folds(folder):
         errors = {way: np.mean(values) for way, values in one["errors"].items()}
         assert errors["diagnosed"] < 0.3 * errors["coulomb + viscous"]
         assert errors["diagnosed"] < 0.3 * errors["as it was"]
         assert len(one["names"]) == 9
-    table = (folder / "table.md").read_text()
-    assert "in 18 of 18 trajectories" in table
-    said = refused("cross-validate", *line, "by=date", folder=tmp_path)
+    assert "in 18 of 18 trajectories" in (folder / "table.md").read_text()
+    said = refused("cross-validate", "real=logs.parquet", *LINE[:-1], "by=date", folder=tmp_path)
     assert said == "by = date: needs a label with two values at least; the log's labels: gain, policy"
+
+
+def test_what_is_held_out_changes_nothing_of_its_diagnosis(tmp_path: Path) -> None:
+    stiff = labelled(log(CAUSE, jitter=0.0), gain=1.0)
+    for name, other in (("a", CAUSE), ("b", {"coulomb_friction": {"torque": 0.3}})):
+        soft = labelled(log({**other, **SOFT}, jitter=0.0), gain=0.5, conditions=SOFT)
+        written(joined(stiff, soft), tmp_path / f"{name}.parquet")
+        done("cross-validate", f"real={name}.parquet", *LINE, SMALL, f"name={name}", folder=tmp_path)
+    first, second = (folds(tmp_path / f"runs/{name}/cross_validate")[0] for name in "ab")
+    assert first["value"] == second["value"] == 0.5
+    assert first["parameters"] == second["parameters"]
+    assert first["errors"] != second["errors"]
