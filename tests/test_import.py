@@ -162,6 +162,22 @@ def test_units_signs_zeros_and_old_names_are_converted(tmp_path: Path) -> None:
     assert sensors["load"][0] == pytest.approx(-0.1) and batch.metadata["units"]["load"] == "%"
 
 
+@pytest.mark.parametrize("joints", [JOINTS, None])
+def test_signs_and_columns_may_differ_by_joint_and_by_axis(tmp_path: Path, joints: tuple[str, ...] | None) -> None:
+    columns = plain() | {"q_elbow": -POSITION[:, 1], **{f"w{axis}": k + TIME for k, axis in enumerate("abc")}}
+    signals = {
+        "action": "goal_{joint}",
+        "position": {"column": "q_{joint}", "sign": {"elbow": -1}},
+        "gyro": {"column": {"x": "wc", "y": "wb", "z": "wa"}, "sign": {"y": -1}},
+    }
+    chosen = mapping(tmp_path / "m.yaml", signals=signals, joints=list(joints) if joints else None)
+    batch = imported(tmp_path, csv(tmp_path / "log.csv", columns), chosen)
+    check_same(batch)
+    sensors = batch.episodes[0].sensors
+    turned = [sensors[f"gyro.{axis}"][0] for axis in "xyz"]
+    assert turned == pytest.approx([2.0, -1.0, 0.0])
+
+
 def test_two_files_are_joined_by_time_and_a_clock_that_is_ahead_is_set_back(tmp_path: Path) -> None:
     folder = tmp_path / "day_1" / "sweep"
     folder.mkdir(parents=True)
