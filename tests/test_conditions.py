@@ -12,6 +12,7 @@ import pytest
 from commands import done, refused
 from test_diagnosis import PERIOD, QUICK, arm, log
 
+from gsl.core.labels import alike
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import diagnosed
@@ -67,6 +68,29 @@ def test_repeats_under_other_conditions_are_no_noise() -> None:
     exp = experiment(both(), arm())
     assert exp.noise.source == "repeats"
     assert exp.noise.sd.max() < 0.003
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        (1, "1", True),
+        (100, 100.0, True),
+        ("0.50", 0.5, True),
+        ("up", "up", True),
+        ("up", "down", False),
+        (1, True, False),
+        (None, "None", False),
+        ("nan", float("nan"), True),
+    ],
+)
+def test_labels_are_numbers_however_they_are_written(one: Any, other: Any, same: bool) -> None:
+    assert alike(one, other) is alike(other, one) is same
+
+
+def test_a_label_that_is_text_can_be_held_out_by_its_number() -> None:
+    log_of_two = joined(labelled(log({}), repeat="1"), labelled(log({}), repeat="2"))
+    exp = experiment(log_of_two, arm(), held_out={"repeat": 1})
+    assert {exp.records[k].about["repeat"] for k in exp.pieces.record[exp.held_out]} == {"1"}
 
 
 @pytest.mark.parametrize(
