@@ -19,8 +19,11 @@ from gsl.diagnosis.diagnose import diagnosed
 from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.nuisance import none
+from gsl.diagnosis.records import records
+from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import names
 from gsl.errors import InputError
+from gsl.report.cross_validation import AS_IT_WAS, DIAGNOSED, Fold, table
 from gsl.storage.trajectories import write
 
 SOFT = {"servo_gain": {"kp": 0.5}}
@@ -116,6 +119,39 @@ def test_windows_without_torque_are_left_out() -> None:
     every = experiment(whole, arm()).pieces
     ends = (some.tick[some.record == 0] + some.real.shape[1]) * PERIOD
     assert len(some) < len(every) and ends.max() <= 75 * PERIOD
+
+
+def test_a_joint_without_torque_leaves_a_window_out_whichever_joint_it_is() -> None:
+    whole = log({})
+    rows = len(whole.episodes[0]) + 1
+    off = np.arange(rows) < 75
+    one = replace(whole.episodes[0], sensors={"enabled.a": off, "enabled.b": np.ones(rows, dtype=bool)})
+    exp = experiment(replace(whole, episodes=(one, *whole.episodes[1:])), arm())
+    np.testing.assert_array_equal(exp.records[0].driven, off)
+    assert (exp.pieces.tick[exp.pieces.record == 0] + exp.pieces.real.shape[1]).max() <= 75
+    assert exp.records[1].driven.all()
+
+
+def test_a_whole_replay_is_of_what_is_driven() -> None:
+    whole = log({})
+    rows = np.arange(len(whole.episodes[0]) + 1)
+    flags = {"late": rows >= 20, "between": (rows >= 20) & (rows < 90), "first": rows < 90, "never": rows < 0}
+    episodes = tuple(replace(whole.episodes[0], sensors={"enabled": works}) for works in flags.values())
+    every = experiment(whole, arm())
+    found = records(replace(whole, episodes=episodes, metadata={}), arm())
+    errors = mean_errors(every.simulator(nominal(arm()), 0.002, 1, 1.0), {}, none(2), found, arm())
+    assert np.isfinite(errors[:3]).all() and errors[:3].max() < 0.01
+    assert np.isnan(errors[3]).all()
+
+
+def test_a_table_says_what_it_leaves_out_of_its_means() -> None:
+    errors = {AS_IT_WAS: [0.004, 0.006, np.nan], "usual": [0.002, 0.002, np.nan], DIAGNOSED: [0.001, np.nan, np.nan]}
+    fold = Fold(1, "causes", ["backlash"], {}, 0.5, None, ["a", "b", "c"], errors)
+    told = table([fold, replace(fold, value=2, errors=dict.fromkeys(errors, [np.nan] * 3))], "day", "usual")
+    assert "nan" not in told
+    assert "| 4.0 " in told and "in 1 of 1 trajectories" in told
+    assert "5 of 6 trajectories are in no mean" in told
+    assert "(as it was 4, usual 4, diagnosed 5; 4 in every replay)" in told
 
 
 def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
