@@ -24,6 +24,7 @@ from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import names
 from gsl.errors import InputError
 from gsl.report.cross_validation import AS_IT_WAS, DIAGNOSED, Fold, table
+from gsl.stages.logs import other_clocks, read_logs, synchronised
 from gsl.storage.trajectories import write
 
 SOFT = {"servo_gain": {"kp": 0.5}}
@@ -142,6 +143,38 @@ def test_a_whole_replay_is_of_what_is_driven() -> None:
     errors = mean_errors(every.simulator(nominal(arm()), 0.002, 1, 1.0), {}, none(2), found, arm())
     assert np.isfinite(errors[:3]).all() and errors[:3].max() < 0.01
     assert np.isnan(errors[3]).all()
+
+
+def test_a_log_says_whether_its_clocks_are_apart_and_the_command_line_wins(tmp_path: Path) -> None:
+    made, about = (
+        log({"command_latency": {"delay": 0.03}}),
+        {"robot": "arm", "role": "imported", "source": "test", "seed": 1},
+    )
+    (tmp_path / "logs").mkdir()
+    for name, clocks in (("a", {}), ("b", {"clocks": "unsynchronised"})):
+        metadata = {**about, **clocks, **made.metadata}
+        write(tmp_path / f"logs/{name}.parquet", replace(made, metadata=metadata))
+    fine, apart = read_logs(str(tmp_path / "logs/a.parquet")), read_logs(str(tmp_path / "logs"))
+    assert synchronised(fine, None) and not synchronised(fine, "unsynchronised") and other_clocks(fine, None) is None
+    assert not synchronised(apart, None) and other_clocks(apart, None) is None
+    assert synchronised(apart, "synchronised") and not synchronised(apart, "unsynchronised")
+    assert other_clocks(apart, "unsynchronised") is None
+    told = "The log says that its clocks are unsynchronised; clocks=synchronised was asked for and counts."
+    line = (
+        "real=logs/b.parquet",
+        "sim.robot=blind_arm.arm",
+        "sim.floating=false",
+        "most=1",
+        "nulls=0",
+        "duels=0",
+        "workers=1",
+    )
+    small = f"without=[{','.join(set(names()) - {'command_latency', 'coulomb_friction'})}]"
+    for asked, caveats, causes in (("null", 0, []), ("synchronised", 1, ["command_latency"])):
+        done("diagnose", *line, small, f"clocks={asked}", f"name=c_{asked}", folder=tmp_path)
+        report = json.loads((tmp_path / f"runs/c_{asked}/diagnose/report.json").read_text())
+        assert report["caveats"].count(told) == caveats
+        assert [one["effect"] for one in report["causes"]] == causes
 
 
 def test_a_table_says_what_it_leaves_out_of_its_means() -> None:

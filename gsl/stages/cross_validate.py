@@ -22,7 +22,7 @@ from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import effect_class
 from gsl.errors import ConfigError, InputError
 from gsl.report.cross_validation import AS_IT_WAS, CALIBRATED, DIAGNOSED, Fold, table
-from gsl.stages.logs import check_log, log_files, on_ground, read_logs
+from gsl.stages.logs import check_log, log_files, on_ground, read_logs, synchronised
 from gsl.stages.population import Workers, threads
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
@@ -49,9 +49,11 @@ class CrossValidate:
     )
     without: Annotated[tuple[str, ...], setting("effects that are left out of the library")] = ()
     clocks: Annotated[
-        Literal["synchronised", "unsynchronised"],
-        setting("whether commands and measurements share a clock; if not, latency is not claimed"),
-    ] = "synchronised"
+        Literal["synchronised", "unsynchronised"] | None,
+        setting(
+            "whether commands and measurements share a clock, else no latency is claimed; what the log says if null"
+        ),
+    ] = None
     most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
@@ -95,7 +97,7 @@ class CrossValidate:
     def _fold(self, log: Batch, value: Any, console: Any) -> Fold:
         console.status(f"{self.by} {value} is held out")
         options = Options(
-            self.without, self.most, self.duels, self.nulls, threads(self.workers), self.clocks == "synchronised",
+            self.without, self.most, self.duels, self.nulls, threads(self.workers), synchronised(log, self.clocks),
             seed=self.seed, tolerance=self.tolerance, held_out={self.by: value},
         )  # fmt: skip
         plant = self.sim.plant
