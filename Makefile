@@ -29,7 +29,7 @@ real: xl330 so101 go2 ## Diagnose logs of three real robots (docs/real-robots.md
 xl330: $(INSTALLED)
 	$(GSL) import mapping=xl330_pendulum name=xl330
 	$(GSL) diagnose real=xl330 sim=xl330_pendulum name=xl330 tolerance=0.0175
-	$(GSL) cross-validate real=xl330 sim=xl330_pendulum name=xl330 tolerance=0.0175 by=kp
+	$(GSL) cross-validate real=xl330 sim=xl330_pendulum name=xl330 tolerance=0.0175 by=kp checks=values
 
 so101: $(INSTALLED)
 	$(GSL) import mapping=so101_arm name=so101

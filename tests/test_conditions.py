@@ -12,14 +12,19 @@ import pytest
 from commands import done, refused
 from test_diagnosis import PERIOD, QUICK, arm, log
 
+from gsl.core.labels import alike
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import diagnosed
 from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.nuisance import none
+from gsl.diagnosis.records import records
+from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import names
 from gsl.errors import InputError
+from gsl.report.cross_validation import AS_IT_WAS, DIAGNOSED, Fold, table
+from gsl.stages.logs import other_clocks, read_logs, synchronised
 from gsl.storage.trajectories import write
 
 SOFT = {"servo_gain": {"kp": 0.5}}
@@ -70,6 +75,29 @@ def test_repeats_under_other_conditions_are_no_noise() -> None:
 
 
 @pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        (1, "1", True),
+        (100, 100.0, True),
+        ("0.50", 0.5, True),
+        ("up", "up", True),
+        ("up", "down", False),
+        (1, True, False),
+        (None, "None", False),
+        ("nan", float("nan"), True),
+    ],
+)
+def test_labels_are_numbers_however_they_are_written(one: Any, other: Any, same: bool) -> None:
+    assert alike(one, other) is alike(other, one) is same
+
+
+def test_a_label_that_is_text_can_be_held_out_by_its_number() -> None:
+    log_of_two = joined(labelled(log({}), repeat="1"), labelled(log({}), repeat="2"))
+    exp = experiment(log_of_two, arm(), held_out={"repeat": 1})
+    assert {exp.records[k].about["repeat"] for k in exp.pieces.record[exp.held_out]} == {"1"}
+
+
+@pytest.mark.parametrize(
     ("asked", "line"),
     [
         ({"gain": 2.0}, "held_out: no trajectory of the log has {gain: 2.0}; there gain is 0.5, 1.0"),
@@ -92,6 +120,71 @@ def test_windows_without_torque_are_left_out() -> None:
     every = experiment(whole, arm()).pieces
     ends = (some.tick[some.record == 0] + some.real.shape[1]) * PERIOD
     assert len(some) < len(every) and ends.max() <= 75 * PERIOD
+
+
+def test_a_joint_without_torque_leaves_a_window_out_whichever_joint_it_is() -> None:
+    whole = log({})
+    rows = len(whole.episodes[0]) + 1
+    off = np.arange(rows) < 75
+    one = replace(whole.episodes[0], sensors={"enabled.a": off, "enabled.b": np.ones(rows, dtype=bool)})
+    exp = experiment(replace(whole, episodes=(one, *whole.episodes[1:])), arm())
+    np.testing.assert_array_equal(exp.records[0].driven, off)
+    assert (exp.pieces.tick[exp.pieces.record == 0] + exp.pieces.real.shape[1]).max() <= 75
+    assert exp.records[1].driven.all()
+
+
+def test_a_whole_replay_is_of_what_is_driven() -> None:
+    whole = log({})
+    rows = np.arange(len(whole.episodes[0]) + 1)
+    flags = {"late": rows >= 20, "between": (rows >= 20) & (rows < 90), "first": rows < 90, "never": rows < 0}
+    episodes = tuple(replace(whole.episodes[0], sensors={"enabled": works}) for works in flags.values())
+    every = experiment(whole, arm())
+    found = records(replace(whole, episodes=episodes, metadata={}), arm())
+    errors = mean_errors(every.simulator(nominal(arm()), 0.002, 1, 1.0), {}, none(2), found, arm())
+    assert np.isfinite(errors[:3]).all() and errors[:3].max() < 0.01
+    assert np.isnan(errors[3]).all()
+
+
+def test_a_log_says_whether_its_clocks_are_apart_and_the_command_line_wins(tmp_path: Path) -> None:
+    made, about = (
+        log({"command_latency": {"delay": 0.03}}),
+        {"robot": "arm", "role": "imported", "source": "test", "seed": 1},
+    )
+    (tmp_path / "logs").mkdir()
+    for name, clocks in (("a", {}), ("b", {"clocks": "unsynchronised"})):
+        metadata = {**about, **clocks, **made.metadata}
+        write(tmp_path / f"logs/{name}.parquet", replace(made, metadata=metadata))
+    fine, apart = read_logs(str(tmp_path / "logs/a.parquet")), read_logs(str(tmp_path / "logs"))
+    assert synchronised(fine, None) and not synchronised(fine, "unsynchronised") and other_clocks(fine, None) is None
+    assert not synchronised(apart, None) and other_clocks(apart, None) is None
+    assert synchronised(apart, "synchronised") and not synchronised(apart, "unsynchronised")
+    assert other_clocks(apart, "unsynchronised") is None
+    told = "The log says that its clocks are unsynchronised; clocks=synchronised was asked for and counts."
+    line = (
+        "real=logs/b.parquet",
+        "sim.robot=blind_arm.arm",
+        "sim.floating=false",
+        "most=1",
+        "nulls=0",
+        "duels=0",
+        "workers=1",
+    )
+    small = f"without=[{','.join(set(names()) - {'command_latency', 'coulomb_friction'})}]"
+    for asked, caveats, causes in (("null", 0, []), ("synchronised", 1, ["command_latency"])):
+        done("diagnose", *line, small, f"clocks={asked}", f"name=c_{asked}", folder=tmp_path)
+        report = json.loads((tmp_path / f"runs/c_{asked}/diagnose/report.json").read_text())
+        assert report["caveats"].count(told) == caveats
+        assert [one["effect"] for one in report["causes"]] == causes
+
+
+def test_a_table_says_what_it_leaves_out_of_its_means() -> None:
+    errors = {AS_IT_WAS: [0.004, 0.006, np.nan], "usual": [0.002, 0.002, np.nan], DIAGNOSED: [0.001, np.nan, np.nan]}
+    fold = Fold(1, "causes", ["backlash"], {}, 0.5, None, ["a", "b", "c"], errors)
+    told = table([fold, replace(fold, value=2, errors=dict.fromkeys(errors, [np.nan] * 3))], "day")
+    assert "nan" not in told
+    assert "| 4.0 " in told and "in 1 of 1 trajectories" in told
+    assert "5 of 6 trajectories are in no mean" in told
+    assert "(as it was 4, usual 4, diagnosed 5; 4 in every replay)" in told
 
 
 CAUSE = {"command_latency": {"delay": 0.016}}

@@ -162,6 +162,40 @@ def test_units_signs_zeros_and_old_names_are_converted(tmp_path: Path) -> None:
     assert sensors["load"][0] == pytest.approx(-0.1) and batch.metadata["units"]["load"] == "%"
 
 
+@pytest.mark.parametrize("joints", [JOINTS, None])
+def test_signs_and_columns_may_differ_by_joint_and_by_axis(tmp_path: Path, joints: tuple[str, ...] | None) -> None:
+    columns = plain() | {"q_elbow": -POSITION[:, 1], **{f"w{axis}": k + TIME for k, axis in enumerate("abc")}}
+    signals = {
+        "action": "goal_{joint}",
+        "position": {"column": "q_{joint}", "sign": {"elbow": -1}},
+        "gyro": {"column": {"x": "wc", "y": "wb", "z": "wa"}, "sign": {"y": -1}},
+    }
+    chosen = mapping(tmp_path / "m.yaml", signals=signals, joints=list(joints) if joints else None)
+    batch = imported(tmp_path, csv(tmp_path / "log.csv", columns), chosen)
+    check_same(batch)
+    sensors = batch.episodes[0].sensors
+    turned = [sensors[f"gyro.{axis}"][0] for axis in "xyz"]
+    assert turned == pytest.approx([2.0, -1.0, 0.0])
+
+
+def test_conditions_are_of_numbers_however_they_are_written_and_unmatched_ones_are_told(tmp_path: Path) -> None:
+    lists = {"t": TIME.tolist(), "goal": ACTION.tolist(), "q": POSITION.tolist(), "kp": 100.0}
+    (tmp_path / "log.json").write_text(json.dumps(lists))
+    soft = {"servo_gain": {"kp": 0.25}}
+    chosen = mapping(
+        tmp_path / "m.yaml",
+        signals={"action": "goal", "position": "q"},
+        about={"kp": "{kp}"},
+        conditions={"kp": {100: soft, 2000: {"servo_gain": {"kp": 5.0}}}},
+    )
+    batch = imported(tmp_path, tmp_path / "log.json", chosen)
+    assert batch.metadata["episodes"][0]["conditions"] == {"servo_gain": [{"kp": 0.25}]}
+    line = "warning: mapping.conditions.kp.2000: no episode has it; kp is 100.0"
+    source = f"source={tmp_path / 'log.json'}"
+    assert line in done("import", source, chosen, "check=true", folder=tmp_path).out
+    assert line in done("import", source, chosen, "name=again", folder=tmp_path).err
+
+
 def test_two_files_are_joined_by_time_and_a_clock_that_is_ahead_is_set_back(tmp_path: Path) -> None:
     folder = tmp_path / "day_1" / "sweep"
     folder.mkdir(parents=True)

@@ -238,6 +238,27 @@ SETTINGS = {
         {"signals": {"action": "goal_{joint}", "position": {"column": "q_{joint}", "sign": {"elbo": -1}}}},
         "mapping.signals.position.sign.elbo: is no joint; did you mean elbow",
     ),
+    "a joint's name, where joints are found": (
+        {
+            "joints": None,
+            "signals": {"action": "goal_{joint}", "position": {"column": "q_{joint}", "zero": {"elbo": 1}}},
+        },
+        "mapping.signals.position.zero.elbo: is no joint; did you mean elbow",
+    ),
+    "an axis": (
+        {"signals": {"action": "goal_{joint}", "position": "q_{joint}", "gyro": {"column": "g", "sign": {"X": -1}}}},
+        "mapping.signals.gyro.sign.X: is no axis; there is x, y, z",
+    ),
+    "one value by joint": (
+        {
+            "signals": {
+                "action": "goal_{joint}",
+                "position": "q_{joint}",
+                "voltage": {"column": "t", "zero": {"elbow": 1}},
+            }
+        },
+        "mapping.signals.voltage.zero: differs by joint, but the signal is one for all of them; give one value",
+    ),
     "a role": (
         {"signals": {"action": {"file": "cmd", "column": "a"}, "position": "q"}},
         "mapping.signals.action.file = cmd: is no topic of a bag",

@@ -14,6 +14,7 @@ from gsl.core.plant import nominal
 from gsl.policies.excitation import MENU, VARIANTS, Excitation
 from gsl.policies.limits import breach, limits
 from gsl.robots import pendulum as bench
+from gsl.robots import so101 as arm_facts
 from gsl.robots.catalogue import robot
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.drive_train import limited
@@ -50,6 +51,20 @@ def test_the_xl330_is_as_strong_and_fast_as_its_maker_says() -> None:
     assert (bench.Xl330(voltage=6.0).stall, bench.Xl330(voltage=5.0).no_load) == (0.60, 10.786)
     assert bench.Xl330().kp == pytest.approx(0.82, abs=0.01)  # identified from logs by Rhoban/bam, m1
     assert bench.Xl330().stall == pytest.approx(0.712, abs=0.005)  # likewise
+
+
+def test_the_arms_servo_loses_friction_once_at_full_duty_as_at_any_other() -> None:
+    """Duty times the stall torque less the back-EMF, all before friction, which is the world's."""
+    servo = nominal(robot("so101")).servo
+    assert not servo.coulomb.any() and not servo.load_friction.any()
+    for error in np.linspace(-1.5, 1.5, 13):
+        duty = min(1.0, max(-1.0, arm_facts.GAIN * arm_facts.DUTY_PER_RADIAN * error))
+        for speed in (0.0, 0.5, 4.0):
+            wanted = float(servo.kp[0] * error - servo.kd[0] * speed)
+            ours = limited(wanted, speed, float(servo.limit[0]), float(servo.no_load_speed[0]))
+            torque = arm_facts.STALL * (duty - speed / arm_facts.NO_LOAD)
+            if torque > -arm_facts.STALL:
+                assert ours == pytest.approx(torque, abs=1e-12)
 
 
 def test_the_arm_stands_and_weighs_as_published() -> None:

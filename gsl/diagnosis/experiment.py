@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.labels import alike
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.noise_floor import NoiseFloor, noise_floor
@@ -168,7 +169,11 @@ def labelled(found: Sequence[Record], asked: Mapping[str, Any]) -> list[int]:
         InputError: None of them has, or every one.
     """
     wanted = {key: value if isinstance(value, list | tuple) else [value] for key, value in asked.items()}
-    chosen = [k for k, one in enumerate(found) if all(one.about.get(key) in some for key, some in wanted.items())]
+    chosen = [
+        k
+        for k, one in enumerate(found)
+        if all(any(alike(one.about.get(key), value) for value in some) for key, some in wanted.items())
+    ]
     if 0 < len(chosen) < len(found):
         return chosen
     told = ", ".join(f"{key}: {value}" for key, value in asked.items())

@@ -55,6 +55,12 @@ class Record:
         found: Mapping[str, Any] = self.about.get("conditions") or {}
         return found
 
+    @property
+    def driven(self) -> np.ndarray:
+        """Whether the torque of all joints is on, shape (T + 1,); one that is off follows no command."""
+        flags = [values for key, values in self.sensors.items() if key.partition(".")[0] == "enabled"]
+        return np.all([np.ones(len(self) + 1), *flags], axis=0)
+
     def __len__(self) -> int:
         """Control periods T."""
         return len(self.targets)
@@ -219,10 +225,10 @@ def pieces(found: Sequence[Record], robot: Robot, period: float, *, warm_up: int
     conditions = tuple(one.conditions for one in found) if any(one.conditions for one in found) else ()
     for index, one in enumerate(found):
         padded = np.vstack([np.repeat(one.targets[:1], COMMANDS, axis=0), one.targets])
-        works = one.sensors.get("enabled", np.ones(len(one) + 1))
+        works = one.driven
         for start in range(0, len(one) - length + 1, scored):
             if not works[start : start + length].all():
-                continue  # a joint whose torque is off follows no command
+                continue
             commands.append(padded[start + 1 : start + COMMANDS + length][::-1])
             motion.append([one.position[start, drive], one.velocity[start, drive]])
             real.append(one.measured[start + 1 : start + 1 + length])

@@ -18,17 +18,22 @@ from gsl.diagnosis.replay import Effects, Simulator
 def mean_errors(
     simulator: Simulator, effects: Effects, nuisances: np.ndarray, found: Sequence[Record], robot: Robot
 ) -> np.ndarray:
-    """Return the mean absolute error of replays, shape (n_records, n_joints) [rad]; NaN where one diverges.
+    """Return the mean absolute error of replays, shape (n_records, n_joints) [rad].
+
+    It is NaN where a replay diverges, and of trajectories whose torque is never on.
 
     Args:
         simulator: What replays.
         effects: That are switched on.
         nuisances: Shape (7, n_joints).
-        found: Trajectories in the air, each replayed up to where its torque is switched off.
+        found: Trajectories in the air, each replayed from where its torque is first on to where it is switched off.
         robot: Theirs.
     """
     errors = []
     for one in map(_driven, found):
+        if not len(one):
+            errors.append(np.full(one.position.shape[1], np.nan))
+            continue
         whole = pieces([one], robot, simulator.period, warm_up=0, scored=len(one))
         told = simulator.told(effects, nuisances, whole)
         errors.append(np.abs(told - whole.real).mean(axis=(0, 1)))
@@ -36,14 +41,16 @@ def mean_errors(
 
 
 def _driven(one: Record) -> Record:
-    """Return a trajectory up to where its torque is switched off."""
-    works = np.asarray(one.sensors.get("enabled", np.ones(len(one) + 1)), dtype=bool)
-    ticks = len(one) if works.all() else int(np.argmin(works))
-    columns = {key: values[: ticks + 1] for key, values in one.sensors.items()}
+    """Return a trajectory from where its torque is first on to where it is switched off; maybe of no control period."""
+    works = one.driven[: len(one)]
+    first = int(np.argmax(works)) if works.any() else len(one)
+    off = np.flatnonzero(~works[first:])
+    last = first + int(off[0]) if len(off) else len(one)
+    rows = slice(first, last + 1)
     return replace(
         one,
-        targets=one.targets[:ticks],
-        position=one.position[: ticks + 1],
-        velocity=one.velocity[: ticks + 1],
-        sensors=columns,
+        targets=one.targets[first:last],
+        position=one.position[rows],
+        velocity=one.velocity[rows],
+        sensors={key: values[rows] for key, values in one.sensors.items()},
     )

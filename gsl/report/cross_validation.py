@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -26,7 +26,8 @@ class Fold:
         removed: Share of the held-out excess of windows that is gone, if there is any.
         ceiling: The same with a learned residual.
         names: Of the held-out trajectories.
-        errors: Mean absolute error of each of them in a whole replay [rad], by what replays it.
+        errors: Mean absolute error of each of them in a whole replay [rad], by what replays it; NaN where it diverges
+            or where the torque is never on.
     """
 
     value: Any
@@ -37,6 +38,13 @@ class Fold:
     ceiling: float | None
     names: Sequence[str]
     errors: Mapping[str, Sequence[float]]
+
+    @property
+    def replayed(self) -> Mapping[str, np.ndarray]:
+        """Errors of the trajectories that all replays come through, so that means are of the same ones."""
+        errors = {way: np.asarray(values, dtype=float) for way, values in self.errors.items()}
+        through = np.all([np.isfinite(values) for values in errors.values()], axis=0)
+        return {way: values[through] for way, values in errors.items()}
 
     def told(self) -> dict[str, Any]:
         """Return it as a JSON document."""
@@ -50,25 +58,47 @@ def table(folds: Sequence[Fold], by: str) -> str:
     rows = [
         (
             str(one.value),
-            *(f"{1e3 * np.mean(one.errors[way]):.1f}" for way in ways),
+            *(_mean(one.replayed[way]) for way in ways),
             _percent(one.removed),
             _percent(one.ceiling),
             f"{', '.join(one.causes) or '-'}{' (suspected)' if one.verdict == 'unknown' else ''}",
         )
         for one in folds
     ]
-    every = {way: np.concatenate([one.errors[way] for one in folds]) for way in ways}
-    rows.append(("all", *(f"{1e3 * np.mean(every[way]):.1f}" for way in ways), "", "", ""))
-    rival = min((way for way in ways if way != DIAGNOSED), key=lambda way: float(np.mean(every[way])))
-    before, after = every[rival], every[DIAGNOSED]
+    every = {way: np.concatenate([one.replayed[way] for one in folds]) for way in ways}
+    rows.append(("all", *(_mean(every[way]) for way in ways), "", "", ""))
+    below = "Mean absolute error of the joints in open-loop replays of whole trajectories that no fit has seen."
+    return "\n".join([markdown(columns, rows), below, *_lost(folds), *_compared(folds, every), ""])
+
+
+def _lost(folds: Sequence[Fold]) -> Iterator[str]:
+    """Tell how many trajectories are in no mean, and why."""
+    every = {way: np.concatenate([one.errors[way] for one in folds]) for way in folds[0].errors}
+    lost = {way: ~np.isfinite(np.asarray(values, dtype=float)) for way, values in every.items()}
+    some, whole = np.any(list(lost.values()), axis=0), np.all(list(lost.values()), axis=0)
+    if some.any():
+        told = ", ".join(f"{way} {int(values.sum())}" for way, values in lost.items())
+        yield (
+            f"{int(some.sum())} of {len(some)} trajectories are in no mean: a replay diverged or the torque was never "
+            f"on ({told}; {int(whole.sum())} in every replay)."
+        )
+
+
+def _compared(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterator[str]:
+    after = every[DIAGNOSED]
+    if not len(after):
+        return
+    rival = min((way for way in every if way != DIAGNOSED), key=lambda way: float(np.mean(every[way])))
     change = _change(folds, rival)
-    compared = (
+    yield (
         f"The diagnosed simulator's mean error against the best of the others ({rival}): {100.0 * change.mean:+.0f} % "
         f"({100.0 * change.lower:+.0f} to {100.0 * change.upper:+.0f} %, bootstrap over folds and "
-        f"trajectories); it is smaller in {int((after < before).sum())} of {len(after)} trajectories."
+        f"trajectories); it is smaller in {int((after < every[rival]).sum())} of {len(after)} trajectories."
     )
-    below = "Mean absolute error of the joints in open-loop replays of whole trajectories that no fit has seen."
-    return f"{markdown(columns, rows)}\n{below}\n{compared}\n"
+
+
+def _mean(errors: np.ndarray) -> str:
+    return f"{1e3 * np.mean(errors):.1f}" if len(errors) else "-"
 
 
 def _change(folds: Sequence[Fold], rival: str) -> Interval:
@@ -76,7 +106,7 @@ def _change(folds: Sequence[Fold], rival: str) -> Interval:
     rng = np.random.default_rng(0)
 
     def drawn(index: np.ndarray) -> float:
-        errors = {way: [np.asarray(folds[k].errors[way]) for k in index] for way in (rival, DIAGNOSED)}
+        errors = {way: [np.asarray(folds[k].replayed[way]) for k in index] for way in (rival, DIAGNOSED)}
         again = [rng.integers(len(one), size=len(one)) for one in errors[rival]]
         after, before = (
             np.mean(np.concatenate([one[chosen] for one, chosen in zip(errors[way], again, strict=True)]))
@@ -84,7 +114,7 @@ def _change(folds: Sequence[Fold], rival: str) -> Interval:
         )
         return float(after / before) - 1.0
 
-    every = {way: np.mean(np.concatenate([one.errors[way] for one in folds])) for way in (rival, DIAGNOSED)}
+    every = {way: np.mean(np.concatenate([one.replayed[way] for one in folds])) for way in (rival, DIAGNOSED)}
     found = bootstrap_interval(drawn, len(folds), np.random.default_rng(0))
     return found._replace(mean=float(every[DIAGNOSED] / every[rival]) - 1.0)
 

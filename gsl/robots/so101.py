@@ -13,9 +13,15 @@ by oscilloscope), and LeRobot and the collector set P 16, I 0, D 32. In the term
 
     kp = P .165 stall        kd = stall / no_load
 
-with the stall torque before friction: 11.7 N·m/rad and .94 N·m·s/rad. The logs themselves say 11 to 14 N·m/rad. Without
-the integral term gravity droop stays. D is left out: the register's scale is not published, and kd / kp alone is a lag
-of 80 ms; the logs' at slow speed is 60 to 97 ms.
+with the stall torque before friction: 11.7 N·m/rad and .94 N·m·s/rad. The logs themselves say 11 to 14 N·m/rad.
+
+The torque's limit, at full duty, is before friction too: friction is the world's, by its effects or as a diagnosis
+calibrates it, and must not be taken off twice. At the output 2.94 N·m arrive of 4.45 (C). The world so101 has .052 of
+the difference; the rest is friction of the gears under load, .29 to .30 of it in B's larger models, which is the effect
+load_friction. Without that the arm is too strong where it stalls, at errors beyond .38 rad.
+
+Without the integral term gravity droop stays. D is left out: the register's scale is not published, and kd / kp alone
+is a lag of 80 ms; the logs' at slow speed is 60 to 97 ms.
 
 Sources:
     A  TheRobotStudio/SO-ARM100, Simulation/SO101/so101_new_calib.urdf (Apache-2.0): links, joints, limits. Masses are
@@ -40,7 +46,7 @@ from gsl.robots.so101_shapes import SHAPES
 GAIN = 16.0  # register P, E
 DUTY_PER_RADIAN = 0.165  # and unit of P, B
 STALL = 4.45  # before friction [N·m], B
-TORQUE = 2.94  # that arrives at the output [N·m], C
+TORQUE = 2.94  # that arrives at the output [N·m], C: the size of the servo by which friction is measured
 NO_LOAD = 4.71  # [rad/s], C
 ARMATURE = 0.0278  # [kg·m²], B
 TORQUE_CONSTANT = 1.08  # [N·m/A], the data sheet's, C
@@ -114,7 +120,7 @@ def _mount(
     lower: float, upper: float,
 ) -> Mount:  # fmt: skip
     axis = np.array([0.0, 0.0, 1.0])
-    joint = Joint(name, parent, child, np.array(origin), axis, lower, upper, NO_LOAD, TORQUE, ARMATURE)
+    joint = Joint(name, parent, child, np.array(origin), axis, lower, upper, NO_LOAD, STALL, ARMATURE)
     return Mount(joint, euler(*attitude))
 
 

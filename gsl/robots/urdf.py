@@ -1,4 +1,4 @@
-"""URDF text of a robot, each link's inertia in its principal axes; urdf_file.py reads such text."""
+"""URDF text of a robot, each link's inertia in its principal axes; urdf_xml.py reads such text."""
 
 from __future__ import annotations
 

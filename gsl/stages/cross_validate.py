@@ -26,7 +26,7 @@ from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import effect_class
 from gsl.errors import ConfigError, InputError
 from gsl.report.cross_validation import AS_IT_WAS, CALIBRATED, DIAGNOSED, Fold, table
-from gsl.stages.logs import check_log, log_files, on_ground, read_logs
+from gsl.stages.logs import check_log, log_files, on_ground, read_logs, synchronised
 from gsl.stages.population import Workers, threads
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
@@ -40,9 +40,9 @@ SLIGHT = 0.05  # of an effect's range: where a fit of the baseline begins
 class CrossValidate:
     """A diagnosis for every value of a label, of all trajectories without it; those that have it are replayed whole.
 
-    What a diagnosis checks its hypotheses on is the value after the one that is held out, or every second motion where
-    there are two values only. Beside it stand the simulator as it was, calibrated, and with some usual effects fitted
-    without a diagnosis.
+    A diagnosis checks its hypotheses on every second motion of what is left: right where values are repeats, such as
+    dates, which make the floor. Where they are conditions that a cause shall hold for, such as gains, it checks them on
+    the next value. Beside it stand the simulator as it was, calibrated, and with some usual effects fitted alone.
     """
 
     kind: ClassVar[str] = "cross_validate"
@@ -54,11 +54,16 @@ class CrossValidate:
         "coulomb_friction",
         "viscous_friction",
     )
+    checks: Annotated[
+        Literal["motions", "values"], setting("what a diagnosis checks its hypotheses on: motions, or the next value")
+    ] = "motions"
     without: Annotated[tuple[str, ...], setting("effects that are left out of the library")] = ()
     clocks: Annotated[
-        Literal["synchronised", "unsynchronised"],
-        setting("whether commands and measurements share a clock; if not, latency is not claimed"),
-    ] = "synchronised"
+        Literal["synchronised", "unsynchronised"] | None,
+        setting(
+            "whether commands and measurements share a clock, else no latency is claimed; what the log says if null"
+        ),
+    ] = None
     most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
@@ -89,7 +94,7 @@ class CrossValidate:
         if on_ground(log):
             raise InputError(f"{self.real}: whole replays are for logs in the air")
         values = self._values(log)
-        after = [*values[1:], values[0]] if len(values) > 2 else [None] * len(values)
+        after = [*values[1:], values[0]] if self.checks == "values" and len(values) > 2 else [None] * len(values)
         folds = [self._fold(log, *pair, console) for pair in zip(values, after, strict=True)]
         documents.write_json(folder / DATA, [one.told() for one in folds])
         (folder / TABLE).write_text(table(folds, self.by), encoding="utf-8")
@@ -110,7 +115,7 @@ class CrossValidate:
         """Diagnose the trajectories without a value, which know nothing of the others; these are looked at once."""
         console.status(f"{self.by} {value} is held out")
         options = Options(
-            self.without, self.most, self.duels, self.nulls, threads(self.workers), self.clocks == "synchronised",
+            self.without, self.most, self.duels, self.nulls, threads(self.workers), synchronised(log, self.clocks),
             seed=self.seed, tolerance=self.tolerance, held_out={} if inner is None else {self.by: inner},
         )  # fmt: skip
         plant, robot = self.sim.plant, lumped(self.sim.plant.robot)

@@ -25,7 +25,7 @@ from gsl.errors import InputError
 from gsl.report.diagnosis import report_html
 from gsl.stages.diagnosis_files import PAGE, REPORT, WORLD, report_of
 from gsl.stages.experiment_file import write_next_experiment
-from gsl.stages.logs import check_log, log_files, on_ground, read_logs
+from gsl.stages.logs import check_log, log_files, on_ground, other_clocks, read_logs, synchronised
 from gsl.stages.policy_gap import Effort, policy_gap
 from gsl.stages.population import Workers, threads
 from gsl.stages.real_returns import RealReturns, measured_parents, real_returns
@@ -52,9 +52,11 @@ class Diagnose:
     episodes: Annotated[int, setting("simulated episodes of each of these policies", ge=1)] = 5
     without: Annotated[tuple[str, ...], setting("effects that are left out of the library")] = ()
     clocks: Annotated[
-        Literal["synchronised", "unsynchronised"],
-        setting("whether commands and measurements share a clock; if not, latency is not claimed"),
-    ] = "synchronised"
+        Literal["synchronised", "unsynchronised"] | None,
+        setting(
+            "whether commands and measurements share a clock, else no latency is claimed; what the log says if null"
+        ),
+    ] = None
     most: Annotated[int, setting("effects at once, at most; parted over groups it counts once", ge=1, le=6)] = 4
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
@@ -94,7 +96,7 @@ class Diagnose:
             robot,
             self.sim.plant,
             self.sim.step,
-            self._options(),
+            self._options(logs["real"]),
             _Telling(console),
             reference=logs.get("reference"),
             walking=on_ground(logs["real"]),
@@ -119,8 +121,8 @@ class Diagnose:
             return None
         return f"The log says that it is of the robot {said}, the simulator is {ours}: only the joints' names agree."
 
-    def _options(self) -> Options:
-        clocks = self.clocks == "synchronised"
+    def _options(self, batch: Batch) -> Options:
+        clocks = synchronised(batch, self.clocks)
         workers = threads(self.workers)
         return Options(
             self.without,
@@ -156,7 +158,7 @@ class Diagnose:
             seconds=seconds,
             command=self._command(),
         )
-        told["caveats"] += filter(None, [self._stranger(batch)])
+        told["caveats"] += filter(None, [self._stranger(batch), other_clocks(batch, self.clocks)])
         documents.write_json(folder / REPORT, told)
         (folder / PAGE).write_text(report_html(told), encoding="utf-8")
         (folder / WORLD).parent.mkdir()
@@ -177,7 +179,7 @@ class Diagnose:
         said += [f"tolerance={self.tolerance:g}"] if self.tolerance else []
         held = ", ".join(f"{key}: {_typed(value)}" for key, value in self.held_out.items())
         said += [f"held_out={{{held}}}"] if held else []
-        said += [f"clocks={self.clocks}"] if self.clocks != "synchronised" else []
+        said += [f"clocks={self.clocks}"] if self.clocks else []
         return shlex.join(["gsl", "diagnose", *said])
 
     def _data(self, found: Findings, batch: Batch) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError, InputError, TrajectoryError
 from gsl.stages.import_report import report, tables
 from gsl.storage import documents
-from gsl.storage.importers.assembly import Episode, episodes
+from gsl.storage.importers.assembly import Episode, episodes, unmatched
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, located, places
 from gsl.storage.importers.reading import raw_episodes
@@ -133,7 +133,9 @@ class Import:
         derived = sum(one.derived for one in found)
         which = "" if derived in (0, len(found)) else f" in {derived} of {len(found)} episodes"
         velocity = f"derived from positions{which}" if derived else "as logged"
-        return {**report(found, files, period), "time": kept, "velocity": velocity}
+        told = report(found, files, period)
+        warnings = [*told["warnings"], *unmatched(found, self.mapping)]
+        return {**told, "warnings": warnings, "time": kept, "velocity": velocity}
 
     def _batch(self, found: list[Episode], told: Mapping[str, Any]) -> Batch:
         own = {name: signal.unit for name, signal in self.mapping.signals.items() if name not in KNOWN}

@@ -14,6 +14,7 @@ from gsl.errors import InputError, TrajectoryError
 from gsl.stages.training import data_file
 from gsl.storage.trajectories import read
 
+CLOCKS, APART = "clocks", "unsynchronised"  # of a log's metadata, as gsl import writes them
 MOVES = 1e-4  # a command that changes less is constant [rad]
 LATE = 0.5  # of a control period, by which a row may come early or late
 FASTER, SLOW = 10.0, 0.05  # times the slope of the positions that velocities may be; slopes below are noise [rad/s]
@@ -46,9 +47,24 @@ def read_logs(reference: str) -> Batch:
     for path, other in zip(files[1:], batches[1:], strict=True):
         if other.joints != first.joints or abs(other.control_period - first.control_period) > 1e-9:
             raise TrajectoryError(path, f"has other joints or another control period than {files[0].name}")
+    apart = any(batch.metadata.get(CLOCKS) == APART for batch in batches)
+    clocks = {CLOCKS: APART} if apart else {}
     labels = [label for batch in batches for label in (batch.metadata.get("episodes") or [{}] * len(batch))]
     episodes = tuple(episode for batch in batches for episode in batch.episodes)
-    return replace(first, episodes=episodes, metadata={**first.metadata, "episodes": labels})
+    return replace(first, episodes=episodes, metadata={**first.metadata, **clocks, "episodes": labels})
+
+
+def synchronised(batch: Batch, asked: str | None) -> bool:
+    """Whether a log's commands and measurements share a clock: as asked, else as it says, else they do."""
+    return (asked or batch.metadata.get(CLOCKS)) != APART
+
+
+def other_clocks(batch: Batch, asked: str | None) -> str | None:
+    """Return a caveat if the log says of its clocks what was not asked for."""
+    said = batch.metadata.get(CLOCKS)
+    if not asked or said in (None, asked):
+        return None
+    return f"The log says that its clocks are {said}; clocks={asked} was asked for and counts."
 
 
 def check_log(batch: Batch, robot: Robot, name: str) -> None:

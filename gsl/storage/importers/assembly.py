@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from gsl.core.labels import alike
 from gsl.core.series import SAME, held, interpolated, pieces
 from gsl.core.trajectory import Trajectory
 from gsl.effects.effect import together
@@ -111,9 +112,19 @@ def labelled(raw: Raw, mapping: LogMapping) -> dict[str, Any]:
         effects
         for label, values in mapping.conditions.items()
         for value, effects in values.items()
-        if str(value) == str(about[label])
+        if alike(value, about[label])
     )
     return {**about, "policy": str(name), "file": raw.name, **({"conditions": known} if known else {})}
+
+
+def unmatched(found: Sequence[Episode], mapping: LogMapping) -> Iterator[str]:
+    """Tell of conditions that no episode has: most often a value that is written otherwise."""
+    for label, values in mapping.conditions.items():
+        there = [one.label[label] for one in found]
+        for value in values:
+            if not any(alike(value, one) for one in there):
+                told = ", ".join(dict.fromkeys(map(str, there)))
+                yield f"mapping.conditions.{label}.{value}: no episode has it; {label} is {told}"
 
 
 def _filled(value: Any, fields: Mapping[str, Any], where: str) -> Any:

@@ -64,9 +64,10 @@ def references(name: str, signal: Signal, joints: Mapping[str, str], table: Tabl
 def _words(name: str, signal: Signal, joints: Mapping[str, str]) -> list[str]:
     column = signal.column
     if isinstance(column, dict):
-        if lacking := [joint for joint in joints if joint not in column]:
+        keys = AXES.get(name, tuple(joints))
+        if lacking := [key for key in keys if key not in column]:
             raise ConfigError(f"mapping.signals.{name}.column", f"has no value for {', '.join(lacking)}")
-        return [str(column[joint]) for joint in joints]
+        return [str(column[key]) for key in keys]
     if isinstance(column, list):
         return [str(one) for one in column]
     if _JOINT in str(column) or "{index}" in str(column):

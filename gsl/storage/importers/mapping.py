@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import field
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -12,7 +12,7 @@ from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
 from gsl.effects.effect import built
 from gsl.errors import ConfigError
-from gsl.storage.importers.signal import KNOWN, Signal, Time
+from gsl.storage.importers.signal import AXES, BY_NAME, KNOWN, Signal, Time
 from gsl.storage.importers.units import factor
 from gsl.storage.trajectory_contract import INTEGERS, UNITS, suggestion
 
@@ -101,7 +101,16 @@ class Mapping:
         for name, signal in self.signals.items():
             self._check_file(f"signals.{name}.file", signal.file)
             _check_unit(name, signal)
-            _check_joints(f"signals.{name}", signal, names)
+            _check_keys(f"signals.{name}", name, signal, names)
+
+    def check_joints(self, joints: Sequence[str]) -> None:
+        """Refuse what is said of joints that a log does not have.
+
+        Raises:
+            ConfigError: A signal differs by a joint that is none of `joints`.
+        """
+        for name, signal in self.signals.items():
+            _check_keys(f"mapping.signals.{name}", name, signal, joints)
 
     def _check_file(self, where: str, file: str) -> None:
         if isinstance(self.files, dict):
@@ -133,9 +142,13 @@ def _check_unit(name: str, signal: Signal) -> None:
             raise ConfigError(f"{where}.unit{'.' * bool(joint)}{joint}", str(error), given=unit) from error
 
 
-def _check_joints(where: str, signal: Signal, names: list[str] | None) -> None:
-    for key in ("column", "unit", "sign", "factor", "zero", "offset"):
+def _check_keys(where: str, name: str, signal: Signal, joints: Sequence[str] | None) -> None:
+    """Refuse what is said of an axis or a joint that is none; nothing where the joints are not known yet."""
+    known, what = (AXES[name], "axis") if name in AXES else (joints, "joint")
+    if known is None:
+        return
+    for key in BY_NAME:
         value = getattr(signal, key)
-        for joint in value if isinstance(value, dict) and names else ():
-            if joint not in (names or ()):
-                raise ConfigError(f"{where}.{key}.{joint}", f"is no joint{did_you_mean(joint, names or ())}")
+        for one in value if isinstance(value, dict) else ():
+            if one not in known:
+                raise ConfigError(f"{where}.{key}.{one}", f"is no {what}{did_you_mean(one, known)}")

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gsl.errors import TrajectoryError
+from gsl.errors import ConfigError, TrajectoryError
 from gsl.storage.importers.columns import Reference, joints_of, output_names, references, side_by_side
 from gsl.storage.importers.formats import table
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, fields_of
-from gsl.storage.importers.signal import COMMANDS, FLAGS, Signal
+from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, FLAGS, Signal
 from gsl.storage.importers.stamps import ordered, seconds
 from gsl.storage.importers.table import Table, missing_column
 from gsl.storage.trajectory_contract import UNITS
@@ -62,6 +62,7 @@ def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[R
     """
     tables = _tables(place, mapping, memory)
     joints = joints_of(mapping, tables[mapping.signals["position"].file])
+    mapping.check_joints(list(joints))
     named = {name: one for name, one in mapping.signals.items() if _there(name, one, joints, tables)}
     found = {name: references(name, one, joints, tables[one.file]) for name, one in named.items()}
     values = {role: _columns(one, role, mapping, named, found) for role, one in tables.items()}
@@ -156,11 +157,19 @@ class _Reading(NamedTuple):
         if self.name in FLAGS:
             return Series(stamps, raw != 0.0, tuple(names)), int(np.sum(~keep))
         wanted = UNITS.get(self.name)
-        scales = [self.signal.scale(joint, wanted) for joint in (joints if len(names) == len(joints) else [""])]
-        gains, offsets = np.array(scales if len(names) == len(scales) else scales * len(names)).T
+        gains, offsets = np.array([self.signal.scale(key, wanted) for key in self._keys(len(names), joints)]).T
         if self.name in COMMANDS:
             stamps = stamps - self.mapping.command_offset
         return Series(stamps, self.signal.signed(raw) * gains + offsets, tuple(names)), int(np.sum(~keep))
+
+    def _keys(self, width: int, joints: Sequence[str]) -> Sequence[str]:
+        """Return the joint or axis of each column; none of a signal that is one for all joints."""
+        if self.name in AXES or width == len(joints):
+            return AXES.get(self.name, tuple(joints))
+        if apart := [key for key in BY_NAME if isinstance(getattr(self.signal, key), dict)]:
+            where = f"mapping.signals.{self.name}.{apart[0]}"
+            raise ConfigError(where, "differs by joint, but the signal is one for all of them; give one value")
+        return [""] * width
 
     def _column(self) -> str:
         return self.signal.time or self.mapping.time.column

@@ -22,6 +22,7 @@ AXES: Mapping[str, tuple[str, ...]] = {
     "base.orientation": ("x", "y", "z", "w"),
     "foot_force": ("left", "right"),
 }
+BY_NAME = ("column", "unit", "sign", "factor", "zero", "offset")  # what may differ by joint or by axis
 KNOWN = (*PER_JOINT, "voltage", *FLAGS, *AXES)
 
 
@@ -40,7 +41,7 @@ class Time:
 
 @component
 class Signal:
-    """One signal: value = sign * factor * unit * (raw - zero) + offset; a number may differ by joint: {knee: -1}."""
+    """One signal: value = sign * factor * unit * (raw - zero) + offset; by joint or axis: {knee: -1}."""
 
     column: Annotated[
         Columns, setting("column, path or key; {joint} stands for a joint's old name, [3] takes one entry")
@@ -69,7 +70,7 @@ class Signal:
         return np.where(raw >= turn / 2.0, raw - turn, raw) if self.bits else raw
 
     def scale(self, joint: str, wanted: str | None) -> tuple[float, float]:
-        """Return gain and offset of one joint's raw values, in the unit `wanted`, or in its own if there is none."""
+        """Return gain and offset of a joint's or an axis's raw values, in the unit `wanted` or, if none, its own."""
         unit = _of(self.unit, joint, "")
         size = factor(unit, wanted) if unit and wanted else 1.0
         gain = _of(self.sign, joint, 1.0) * _of(self.factor, joint, 1.0) * size

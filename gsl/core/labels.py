@@ -1,0 +1,22 @@
+"""Values of trajectories' labels, which come from files, paths and command lines: 100, 100.0 and "100" are the same."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def alike(one: Any, other: Any) -> bool:
+    """Whether two values are the same: as numbers where both are numbers, as they are written otherwise."""
+    if one is None or other is None:
+        return one is other
+    numbers = _number(one), _number(other)
+    return str(one) == str(other) or (None not in numbers and numbers[0] == numbers[1])
+
+
+def _number(value: Any) -> float | None:
+    if isinstance(value, bool):
+        return None
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return None
