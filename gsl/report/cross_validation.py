@@ -89,7 +89,7 @@ def _compared(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterato
     if not len(after):
         return
     rival = min((way for way in every if way != DIAGNOSED), key=lambda way: float(np.mean(every[way])))
-    change = _change(folds, rival)
+    change = _change([one for one in folds if len(one.replayed[rival])], rival)
     yield (
         f"The diagnosed simulator's mean error against the best of the others ({rival}): {100.0 * change.mean:+.0f} % "
         f"({100.0 * change.lower:+.0f} to {100.0 * change.upper:+.0f} %, bootstrap over folds and "

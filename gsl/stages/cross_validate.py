@@ -98,7 +98,7 @@ class CrossValidate:
         folds = [self._fold(log, *pair, console) for pair in zip(values, after, strict=True)]
         documents.write_json(folder / DATA, [one.told() for one in folds])
         (folder / TABLE).write_text(table(folds, self.by), encoding="utf-8")
-        means = {way: float(np.mean(np.concatenate([one.errors[way] for one in folds]))) for way in folds[0].errors}
+        means = {way: float(np.mean(np.concatenate([one.replayed[way] for one in folds]))) for way in folds[0].errors}
         return {"folds": len(folds), "mean_error": means, "causes": {str(one.value): one.causes for one in folds}}
 
     def _values(self, log: Batch) -> list[Any]:
