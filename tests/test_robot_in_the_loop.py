@@ -173,10 +173,29 @@ def test_a_file_dropped_into_the_folder_is_taken(place: Path) -> None:
     assert done(*COLLECT, folder=place).out.splitlines()[-1] == "runs/one/collect_real (unchanged)"
 
 
-def test_an_unanswered_request_follows_its_settings_and_keeps_the_robot_file(place: Path) -> None:
-    (place / ASKED / "robot.py").write_text("mine = 1\n")
+def test_an_unanswered_request_follows_its_settings_and_keeps_what_is_not_its_own(place: Path) -> None:
+    mine = [place / ASKED / name for name in ("robot.py", "notes.txt", "modules/mine.py")]
+    for path in mine:
+        path.write_text("mine = 1\n")
     assert "8 of 8 episodes" in done(*COLLECT, "episodes=6", folder=place).err
-    assert (place / ASKED / "robot.py").read_text() == "mine = 1\n"
+    assert [path.read_text() for path in mine] == ["mine = 1\n"] * 3
+    assert len(read_request(place / ASKED)["episodes"]) == 8
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("request.json", "request.json: is damaged: it is not JSON"),
+        ("README.txt", "README.txt: is in the way of a request, and not gsl's; move it"),
+    ],
+)
+def test_a_request_takes_the_place_of_nothing_that_gsl_did_not_write(tmp_path: Path, name: str, problem: str) -> None:
+    folder = tmp_path / ASKED
+    folder.mkdir(parents=True)
+    for file in (name, "notes.txt"):
+        (folder / file).write_text("mine")
+    assert problem in refused(*COLLECT, folder=tmp_path)
+    assert {path.name: path.read_text() for path in folder.iterdir()} == {name: "mine", "notes.txt": "mine"}
 
 
 def _lines(place: Path) -> list[str]:

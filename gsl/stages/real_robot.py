@@ -108,10 +108,10 @@ def foreseen(
         guard.start(np.array(request["episodes"][index]["posture"]))
         sent = trajectory.action if trajectory.grounded_action is None else trajectory.grounded_action
         for time, target in zip(trajectory.time[:-1], sent, strict=True):
-            if problem := guard.refusal(target):
+            if problem := guard.refusal(target, time):
                 told.append(f"{policy} asks in simulation after {time:.2f} s for what the runner refuses: {problem}")
                 break
-            guard.take(target)
+            guard.take(target, time)
     for one in told:
         console.status(f"warning: {one}; an episode that is stopped counts as a fall")
     return told
@@ -151,7 +151,7 @@ def _request(scenario: Scenario, orders: Sequence[Order], errand: Errand) -> dic
             "control_period": layout.control_period,
             "observes": layout.sizes,
             "limits": world.limits,
-            "ramp": {"seconds": world.ramp, "speed": world.ramp_speed},
+            "ramp": {"seconds": world.ramp, "speed": world.ramp_speed, "within": world.within},
             "policy": described(scenario.policy),
             "action_noise": _noise(scenario.grounding),
             "task": described(scenario.task),

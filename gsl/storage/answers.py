@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping
@@ -16,7 +15,7 @@ from gsl.core.layout import Layout
 from gsl.core.trajectory import Trajectory
 from gsl.core.validation import did_you_mean
 from gsl.errors import ArtifactError, TrajectoryError
-from gsl.runner.journal import MARK, YES, marked
+from gsl.runner.journal import MARK, YES, marked, table
 from gsl.runner.request import layout_of
 from gsl.storage import trajectories
 from gsl.storage.trajectory_columns import batch_of
@@ -124,16 +123,14 @@ def read_returns(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
     if told := marked(path):
         check_marked(path, told, request)
     found: dict[str, Answered] = {}
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
-        table = csv.DictReader(line for line in file if not line.startswith("#"))
-        names = table.fieldnames or ()
-        if not {"episode", "fell"} <= set(names) or not {"distance", "value"} & set(names):
-            needed = "needs the columns episode, distance (or value) and fell"
-            raise ArtifactError(path, f"{needed}; it has {', '.join(names)[:80] or 'none'}")
-        for number, row in enumerate(table, start=1):
-            name = _known(path, (row.get("episode") or "").strip(), request)
-            _once(found.get(name), path, name)
-            found[name] = _measured(path, number, row)
+    names, rows = table(path)
+    if not {"episode", "fell"} <= set(names) or not {"distance", "value"} & set(names):
+        needed = "needs the columns episode, distance (or value) and fell"
+        raise ArtifactError(path, f"{needed}; it has {', '.join(names)[:80] or 'none'}")
+    for number, row in enumerate(rows, start=1):
+        name = _known(path, row["episode"].strip(), request)
+        _once(found.get(name), path, name)
+        found[name] = _measured(path, number, row)
     return found
 
 
@@ -225,7 +222,7 @@ def _csv_columns(path: Path, request: Mapping[str, Any]) -> dict[str, np.ndarray
     if path.stat().st_size > most:
         size, needed = (f"{count / 1e6:,.0f} MB" for count in (path.stat().st_size, most))
         raise ArtifactError(path, f"is {size}, but what was asked for needs less than {needed}; is it the right file?")
-    with path.open(encoding="utf-8", errors="replace") as file:
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
         above = sum(1 for _ in itertools.takewhile(lambda line: line.startswith(("#", MARK)), file))
     try:
         table = pc.read_csv(path, read_options=pc.ReadOptions(skip_rows=above))

@@ -36,6 +36,9 @@ class ExternalRobot:
     speed: Annotated[float, setting("share of the joints' speed limits that a target may use", gt=0, le=3)] = 1.0
     ramp: Annotated[float, setting("least duration of a ramp in or out", unit="s", ge=1, le=60)] = 3.0
     ramp_speed: Annotated[float, setting("of the fastest joint in a ramp", unit="rad/s", gt=0, le=2)] = 0.5
+    within: Annotated[
+        float, setting("of the start that each joint must be after the ramp in", unit="rad", gt=0, le=1)
+    ] = 0.2
     requests: Annotated[str | None, setting("folder of the requests and their answers", min_length=1)] = None
 
     def __post_init__(self) -> None:
