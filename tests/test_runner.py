@@ -33,6 +33,7 @@ from gsl.tasks.walk import Walk
 from gsl.worlds.external import ExternalRobot
 
 CONF = Path(__file__).parents[1] / "conf"
+EXAMPLE = Path(__file__).parents[1] / "examples/arm.urdf"
 TASK = Walk(duration=0.6)
 STEPS = 40
 ACTS = """
@@ -88,6 +89,19 @@ def test_the_runner_acts_as_the_policy_does_to_the_bit(name: str, noise: float, 
 def test_a_policy_that_needs_more_than_numpy_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"gsl\.worlds\.mujoco needs mujoco, but beside a robot there is numpy"):
         bundled(("gsl.worlds.mujoco",))
+
+
+def test_a_robot_elsewhere_has_the_feet_and_the_files_of_its_robot() -> None:
+    four = ExternalRobot(robot="go2").layout
+    assert four.sizes["foot_force"] == 4 and four.sizes["gyro"] == 3
+    assert "foot_force" not in ExternalRobot(robot="so101", floating=False).layout.sizes
+    file, *_ = ExternalRobot(robot=str(EXAMPLE), floating=False).read_files.values()
+    assert file == EXAMPLE
+
+
+def test_a_forecast_is_made_at_any_control_period(tmp_path: Path) -> None:
+    folder = requested(tmp_path, WalkEngine(), TASK, {"one": WalkEngine().initial}, period=0.015)
+    assert read_request(folder)["control_period"] == 0.015
 
 
 LIMITS = ExternalRobot(robot="nao").limits

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from gsl.storage.trajectory_contract import SCHEMA_VERSION, UNITS, check_names, 
 
 NO = ("false", "no", "0", "")
 STOPPED = "stopped"
+OFF = 0.5  # of the control period, the most by which a row may come too late or too soon
 ROW = 64 * 32  # bytes that no row of ours reaches for a robot of 100 columns
 _PATTERNS = ("answer*.csv", "answer*.parquet", "returns*.csv")
 
@@ -82,12 +83,26 @@ def read_log(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
     if path.suffix == ".parquet":
         batch = trajectories.read(path, joints=tuple(request["joints"]))
         check_marked(path, str(batch.metadata.get("request", "")), request)
-        named = [str(one.get("name", "")) for one in batch.metadata.get("episodes", [])]
-        episodes = dict(zip(named, batch.episodes, strict=True))
+        labels = [str(one.get("name", "")) for one in batch.metadata.get("episodes", [])]
+        episodes = named(path, labels, batch.episodes, request)
     else:
         check_marked(path, marked(path), request)
         episodes = dict(csv_episodes(path, request))
-    return {_known(path, name, request): _logged(path, one, request) for name, one in episodes.items()}
+    return {name: _logged(path, name, one, request) for name, one in episodes.items()}
+
+
+def named(
+    path: Path, names: Sequence[str], episodes: Sequence[Trajectory], request: Mapping[str, Any]
+) -> dict[str, Trajectory]:
+    """Return the episodes of a file by their names: as many as there are, of the request, none of them twice."""
+    for name in names:
+        _known(path, name, request)
+        if names.count(name) > 1:
+            raise ArtifactError(path, f"{name} is named twice; every episode is one of its own")
+    if len(episodes) != len(names):
+        problem = f"holds {len(episodes)} episodes, but {len(names)} are named"
+        raise ArtifactError(path, f"{problem}; say which they are, in order: episodes=[{', '.join(names[:1])},...]")
+    return dict(zip(names, episodes, strict=True))
 
 
 def check_marked(path: Path, told: str, request: Mapping[str, Any]) -> None:
@@ -161,7 +176,18 @@ def _merged(log: Answered | None, told: Answered | None) -> Answered:
     return replace(log, fell=log.fell or told.fell, distance=told.distance, value=told.value)
 
 
-def _logged(path: Path, episode: Trajectory, request: Mapping[str, Any]) -> Answered:
+def check_rate(path: Path, name: str, episode: Trajectory, request: Mapping[str, Any]) -> None:
+    """Refuse an episode whose rows are not a control period apart: a policy that acts too late is another policy."""
+    period, apart = request["control_period"], np.diff(episode.time)
+    wrong = np.abs(apart - period) > OFF * period
+    if wrong.any():
+        row = int(np.argmax(wrong)) + 1
+        told = f"row {row} comes {1e3 * apart[row - 1]:.3g} ms after the one before, not {1e3 * period:g} ms"
+        raise TrajectoryError(path, f"{name}: {told}; run it again at the rate that was asked for")
+
+
+def _logged(path: Path, name: str, episode: Trajectory, request: Mapping[str, Any]) -> Answered:
+    check_rate(path, name, episode, request)
     sensors = dict(episode.sensors)
     stopped = bool(sensors.pop(STOPPED, np.zeros(1, dtype=bool))[-1])
     missing = [name for part in _parts(request) for name in part if name not in sensors]
@@ -171,7 +197,8 @@ def _logged(path: Path, episode: Trajectory, request: Mapping[str, Any]) -> Answ
     if grounded is not None and np.array_equal(grounded, episode.action):
         grounded = None
     whole = replace(episode, sensors=sensors, grounded_action=grounded)
-    return Answered(path, whole, fell=episode.ended_in_a_fall, stopped=stopped)
+    fell = episode.fell is not None and bool(episode.fell.any())
+    return Answered(path, whole, fell=fell, stopped=stopped)
 
 
 def _parts(request: Mapping[str, Any]) -> list[tuple[str, ...]]:
