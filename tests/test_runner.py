@@ -92,7 +92,7 @@ def test_a_policy_that_needs_more_than_numpy_is_refused() -> None:
 
 
 def test_a_robot_elsewhere_has_the_feet_and_the_files_of_its_robot() -> None:
-    four = ExternalRobot(robot="go2").layout
+    four = ExternalRobot(robot="robots_elsewhere.four_feet").layout
     assert four.sizes["foot_force"] == 4 and four.sizes["gyro"] == 3
     assert "foot_force" not in ExternalRobot(robot="so101", floating=False).layout.sizes
     file, *_ = ExternalRobot(robot=str(EXAMPLE), floating=False).read_files.values()
