@@ -4,20 +4,29 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scenarios import QUIET
 
+from gsl.core.body import Robot
 from gsl.errors import Waiting
 from gsl.grounding.ane import ActionNoise
 from gsl.policies.policy import Policy
+from gsl.robots.catalogue import robot
 from gsl.stages.population import Job
 from gsl.stages.real_robot import Errand, Order, asked
 from gsl.stages.rollout import Scenario
 from gsl.tasks.task import REAL, Task
 from gsl.worlds.external import ExternalRobot
+
+
+def four_feet() -> Robot:
+    """Return a robot with four feet."""
+    nao = robot("nao")
+    return replace(nao, feet=(*nao.feet, *nao.feet))
 
 
 def requested(

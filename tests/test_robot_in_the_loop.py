@@ -173,10 +173,29 @@ def test_a_file_dropped_into_the_folder_is_taken(place: Path) -> None:
     assert done(*COLLECT, folder=place).out.splitlines()[-1] == "runs/one/collect_real (unchanged)"
 
 
-def test_an_unanswered_request_follows_its_settings_and_keeps_the_robot_file(place: Path) -> None:
-    (place / ASKED / "robot.py").write_text("mine = 1\n")
+def test_an_unanswered_request_follows_its_settings_and_keeps_what_is_not_its_own(place: Path) -> None:
+    mine = [place / ASKED / name for name in ("robot.py", "notes.txt", "modules/mine.py")]
+    for path in mine:
+        path.write_text("mine = 1\n")
     assert "8 of 8 episodes" in done(*COLLECT, "episodes=6", folder=place).err
-    assert (place / ASKED / "robot.py").read_text() == "mine = 1\n"
+    assert [path.read_text() for path in mine] == ["mine = 1\n"] * 3
+    assert len(read_request(place / ASKED)["episodes"]) == 8
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("request.json", "request.json: is damaged: it is not JSON"),
+        ("README.txt", "README.txt: is in the way of a request, and not gsl's; move it"),
+    ],
+)
+def test_a_request_takes_the_place_of_nothing_that_gsl_did_not_write(tmp_path: Path, name: str, problem: str) -> None:
+    folder = tmp_path / ASKED
+    folder.mkdir(parents=True)
+    for file in (name, "notes.txt"):
+        (folder / file).write_text("mine")
+    assert problem in refused(*COLLECT, folder=tmp_path)
+    assert {path.name: path.read_text() for path in folder.iterdir()} == {name: "mine", "notes.txt": "mine"}
 
 
 def _lines(place: Path) -> list[str]:
@@ -187,6 +206,12 @@ def _changed(lines: list[str], column: str, value: str, row: int = 5) -> list[st
     cells = lines[row].rstrip("\n").split(",")
     cells[lines[1].strip().split(",").index(column)] = value
     return [*lines[:row], ",".join(cells) + "\n", *lines[row + 1 :]]
+
+
+def _stretched(lines: list[str], factor: float) -> list[str]:
+    """Return the lines of an answer as if time had gone faster."""
+    at, cells = lines[1].strip().split(",").index("time"), [line.rstrip("\n").split(",") for line in lines[2:]]
+    return [*lines[:2], *(",".join([*one[:at], repr(factor * float(one[at])), *one[at + 1 :]]) + "\n" for one in cells)]
 
 
 @pytest.mark.parametrize(
@@ -210,6 +235,8 @@ def _changed(lines: list[str], column: str, value: str, row: int = 5) -> list[st
         (lambda lines: [line.replace("LKneePitch", "LKnee") for line in lines[:2]] + lines[2:], "is missing, did you"),
         (lambda lines: [line.replace("gyro.x", "gyro.q") for line in lines[:2]] + lines[2:], "gyro.q: is unknown"),
         (lambda lines: [*lines[:2], *(f"9{line}" for line in lines[2:])], "there are 6 episodes in the request"),
+        (lambda lines: _stretched(lines, 2.0), "pi0_01: row 1 comes 40 ms after the one before, not 20 ms; run it ag"),
+        (lambda lines: _stretched(lines, 0.4), "pi0_01: row 1 comes 8 ms after the one before, not 20 ms; run it ag"),
     ],
 )
 def test_a_bad_answer_is_refused_in_one_line(
@@ -265,10 +292,37 @@ def test_an_episode_that_breaks_off_without_a_fall_is_refused(place: Path) -> No
         ((f"request={ASKED}", "logs=none.csv"), "none.csv: there is no such path"),
         ((f"request={ASKED}", f"logs=runs/elsewhere/{ANSWER}", "episodes=[pi0_01]"), "holds 6 episodes, but 1 are nam"),
         ((f"request={ASKED}", f"logs=runs/elsewhere/{ANSWER}", "episodes=[pi9]"), "the request has no episode 'pi9'"),
+        (
+            (
+                f"request={ASKED}",
+                f"logs=runs/elsewhere/{ANSWER}",
+                "episodes=[pi0_01,pi0_02,pi0_03,pi0_04,pi0_01,pi0_02]",
+            ),
+            "pi0_01 is named twice; every episode is one of its own",
+        ),
     ],
 )
 def test_an_answer_from_elsewhere_is_refused_in_one_line(place: Path, words: tuple[str, ...], problem: str) -> None:
     assert problem in refused("answer", *words, folder=place)
+
+
+def test_a_table_with_fewer_names_than_episodes_is_refused_in_one_line(place: Path) -> None:
+    done("answer", f"request={ASKED}", f"logs=runs/elsewhere/{ANSWER}", "out=runs/table", folder=place)
+    batch = read(place / "runs/table/answer.parquet")
+    told = {**batch.metadata, "episodes": batch.metadata["episodes"][:2]}
+    write(place / ASKED / "answer_mine.parquet", replace(batch, metadata=told))
+    assert "holds 6 episodes, but 2 are named" in refused(*COLLECT, folder=place)
+
+
+def test_what_is_logged_after_a_fall_is_cut_off(place: Path) -> None:
+    lines = _lines(place)
+    for row in range(2 + 30, 2 + 40):  # it falls, and gets up again
+        lines = _changed(lines, "fell", "true", row)
+    (place / ASKED / ANSWER).write_text("".join(lines))
+    done(*COLLECT, folder=place)
+    first, second, *_ = read(place / "runs/one/collect_real/trajectories.parquet").episodes
+    assert len(first) == 30 and first.ended_in_a_fall
+    assert len(second) == 80 and not second.ended_in_a_fall
 
 
 def test_the_log_of_another_episode_is_noticed(place: Path) -> None:
@@ -304,6 +358,7 @@ def test_a_rehearsal_runs_no_code_that_gsl_did_not_write(place: Path) -> None:
         (("world.ramp=0.1",), "world.ramp = 0.1: must be at least 1 (s)"),
         (("world.requests=null",), "world.requests: a real robot needs a folder for its requests"),
         (("world.robot=nobody",), "no robot called 'nobody'"),
+        (("world.robot=so101",), "floating = true: the so101 has no feet to stand on; say floating=false"),
     ],
 )
 def test_a_robot_that_cannot_be_asked_is_refused_in_one_line(

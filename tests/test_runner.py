@@ -15,20 +15,25 @@ from robots_elsewhere import requested, run
 from gsl.config import build
 from gsl.core.described import described
 from gsl.core.seeds import grounding_generator
-from gsl.errors import ConfigError
+from gsl.errors import ArtifactError, ConfigError
 from gsl.grounding.ane import ActionNoise
 from gsl.policies.excitation import Excitation
 from gsl.policies.policy import Policy, neighbour
 from gsl.policies.walk_engine import WalkEngine
 from gsl.runner import journal
+from gsl.runner.clock import Simulated
+from gsl.runner.episode import Player
 from gsl.runner.guard import Guard, ramp
 from gsl.runner.request import due, layout_of, read_request
+from gsl.runner.robots import PerfectRobot
+from gsl.runner.senses import RobotError
 from gsl.storage.bundle import bundled
 from gsl.tasks.excite import Excite
 from gsl.tasks.walk import Walk
 from gsl.worlds.external import ExternalRobot
 
 CONF = Path(__file__).parents[1] / "conf"
+EXAMPLE = Path(__file__).parents[1] / "examples/arm.urdf"
 TASK = Walk(duration=0.6)
 STEPS = 40
 ACTS = """
@@ -86,6 +91,19 @@ def test_a_policy_that_needs_more_than_numpy_is_refused() -> None:
         bundled(("gsl.worlds.mujoco",))
 
 
+def test_a_robot_elsewhere_has_the_feet_and_the_files_of_its_robot() -> None:
+    four = ExternalRobot(robot="robots_elsewhere.four_feet").layout
+    assert four.sizes["foot_force"] == 4 and four.sizes["gyro"] == 3
+    assert "foot_force" not in ExternalRobot(robot="so101", floating=False).layout.sizes
+    file, *_ = ExternalRobot(robot=str(EXAMPLE), floating=False).read_files.values()
+    assert file == EXAMPLE
+
+
+def test_a_forecast_is_made_at_any_control_period(tmp_path: Path) -> None:
+    folder = requested(tmp_path, WalkEngine(), TASK, {"one": WalkEngine().initial}, period=0.015)
+    assert read_request(folder)["control_period"] == 0.015
+
+
 LIMITS = ExternalRobot(robot="nao").limits
 JOINTS = ExternalRobot(robot="nao").layout.joints
 PERIOD = 0.02
@@ -99,9 +117,9 @@ def _guard() -> Guard:
 
 def test_the_guard_lets_through_what_moves_within_the_limits() -> None:
     guard, time = _guard(), np.arange(0.0, 4.0, PERIOD)
-    for target in np.outer(np.sin(time), 0.05 * np.ones(15)):
-        assert guard.refusal(target) == ""
-        guard.take(target)
+    for now, target in zip(time, np.outer(np.sin(time), 0.05 * np.ones(15)), strict=True):
+        assert guard.refusal(target, now) == ""
+        guard.take(target, now)
 
 
 @pytest.mark.parametrize(
@@ -116,26 +134,26 @@ def test_the_guard_lets_through_what_moves_within_the_limits() -> None:
 def test_the_guard_refuses_and_says_which_joint(joint: int, value: float, problem: str) -> None:
     target = np.zeros(15)
     target[joint] = value
-    assert _guard().refusal(target) == problem
+    assert _guard().refusal(target, 0.0) == problem
 
 
 def test_the_guard_refuses_what_is_too_fast_for_too_long() -> None:
     guard, told = _guard(), ""
     for tick in range(1, 20):
-        told = guard.refusal(np.full(15, 0.14 * tick * (np.arange(15) == 3)))
+        told = guard.refusal(np.full(15, 0.14 * tick * (np.arange(15) == 3)), PERIOD * tick)
         if told:
             break
-        guard.take(np.full(15, 0.14 * tick * (np.arange(15) == 3)))
+        guard.take(np.full(15, 0.14 * tick * (np.arange(15) == 3)), PERIOD * tick)
     assert told == "LKneePitch: the target moves 1.4 rad in 0.2 s, more than the 1.28 rad allowed"
 
 
 def test_the_guard_refuses_another_number_of_joints() -> None:
-    assert _guard().refusal(np.zeros(3)) == "15 targets are due, one a joint, not 3"
+    assert _guard().refusal(np.zeros(3), 0.0) == "15 targets are due, one a joint, not 3"
 
 
 def test_a_ramp_begins_gently_ends_where_it_should_and_keeps_its_speed() -> None:
     start, end = np.zeros(2), np.array([1.5, -0.2])
-    way = np.array([start, *ramp(start, end, {"seconds": 1.0, "speed": 0.5}, PERIOD)])
+    way = np.array([start, *ramp(start, end, 1.0, np.full(2, 0.5), PERIOD)])
     np.testing.assert_array_equal(way[-1], end)
     speed = np.abs(np.diff(way, axis=0)) / PERIOD
     assert speed.max() <= 0.5 * 1.001 and speed[0].max() < 0.02 and speed[-1].max() < 0.02
@@ -160,6 +178,7 @@ def test_what_a_journal_keeps_comes_back_and_an_episode_run_again_takes_its_plac
 
 ROBOT = """
 import numpy as np
+SIMULATED = True
 at = np.array({start})
 def read():
     return {{"position": at, "gyro": [0, 0, 0], "foot_force": [20, 20], {more}}}
@@ -287,12 +306,156 @@ def test_an_unsafe_target_stops_the_episode_safely_and_counts_as_a_fall(tmp_path
     assert journal.ends(folder / "answer.csv") == {0: True}
     sent, guard = np.load(tmp_path / "sent.npy"), Guard(JOINTS, LIMITS, PERIOD)
     guard.start(sent[0])
-    for target in sent:
-        assert guard.refusal(target) == ""
-        guard.take(target)
+    for tick, target in enumerate(sent):
+        assert guard.refusal(target, PERIOD * tick) == ""
+        guard.take(target, PERIOD * tick)
 
 
 def test_the_policy_of_a_request_is_all_of_it(walk: Path) -> None:
     request = read_request(walk)
     assert request["policy"] == described(WalkEngine())
     assert request["episodes"][0]["parameters"] == WalkEngine().initial.tolist()
+
+
+class Slow(PerfectRobot):
+    """A perfect robot whose readings take a while, and that knows when it was sent what."""
+
+    def __init__(self, request: dict, time: Simulated, takes: np.ndarray, shift: float = 0.0) -> None:
+        super().__init__(request)
+        self._time, self._takes, self._shift, self.sent, self.began = time, takes, shift, [], []
+
+    def begin(self, episode: dict) -> None:
+        self.sent.clear()
+
+    def read(self) -> dict:
+        self._time.until(self._time.now() + self._takes[len(self.sent) % len(self._takes)])
+        told = super().read()
+        return {**told, "position": told["position"] + self._shift}
+
+    def send(self, targets: np.ndarray) -> None:
+        super().send(targets)
+        self.sent.append(self._time.now())
+
+
+def _slow(walk: Path, takes: np.ndarray, shift: float = 0.0) -> tuple[Player, Slow]:
+    time, request = Simulated(), read_request(walk)
+    robot = Slow(request, time, takes, shift)
+    return Player(request, robot, time), robot
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_two_targets_are_closer_than_nearly_a_period_however_late_a_reading_is(walk: Path, seed: int) -> None:
+    takes = np.random.default_rng(seed).uniform(0.0, 2.5 * PERIOD, 50)
+    player, robot = _slow(walk, takes)
+    episode = player.request["episodes"][0]
+    player.approach(episode)
+    played = player.play(episode)
+    assert len(played.rows) == 31 and np.diff(robot.sent).min() >= 0.9 * PERIOD - 1e-12
+    assert played.late > PERIOD
+
+
+def test_a_tick_that_is_far_too_late_ends_the_episode(walk: Path) -> None:
+    player, _ = _slow(walk, np.where(np.arange(50) == 20, 5.0 * PERIOD, 0.0))
+    episode = player.request["episodes"][0]
+    player.approach(episode)
+    with pytest.raises(RobotError, match=r"one: at 0\.50 s a tick came 80 ms late; stopped and not kept"):
+        player.play(episode)
+
+
+def test_the_guard_judges_speed_by_the_time_that_passed() -> None:
+    step = 0.1 * (np.arange(15) == 3)
+    told = {}
+    for period in (PERIOD, 0.5 * PERIOD):
+        guard = _guard()
+        for tick in range(1, 20):
+            if problem := guard.refusal(step * tick, period * tick):
+                told[period] = problem
+                break
+            guard.take(step * tick, period * tick)
+    assert list(told) == [0.5 * PERIOD] and "in 0.2 s" in told[0.5 * PERIOD]
+
+
+def test_a_robot_that_does_not_arrive_is_not_let_go(walk: Path) -> None:
+    player, _ = _slow(walk, np.zeros(1), shift=0.25)
+    with pytest.raises(RobotError, match="is 0.25 rad off after the ramp to the start of one; it is left where it is"):
+        player.approach(player.request["episodes"][0])
+
+
+def test_a_ramp_keeps_to_half_of_a_slow_joints_limit(tmp_path: Path) -> None:
+    slow = {"speed": 0.05, "ramp": 1.0, "ramp_speed": 2.0}
+    folder = requested(tmp_path, WalkEngine(), TASK, {"one": WalkEngine().initial}, **slow)
+    player, robot = _slow(folder, np.zeros(1))
+    robot._position = robot._before = np.zeros(15)
+    player.approach(player.request["episodes"][0])
+    assert (robot.fastest <= 0.5 * np.array(player.request["limits"]["speed"]) * 1.001).all()
+    assert robot.fastest.max() > 0.0
+
+
+def _fails(folder: Path, what: str) -> str:
+    word = _robot(folder)
+    path = Path(word.removeprefix("--robot="))
+    path.write_text(path.read_text() + what)
+    return word
+
+
+LEAVES = """
+sends, plain = -1000, send
+def begin(episode):
+    global sends
+    sends = 0
+def send(targets):
+    global sends
+    sends += 1
+    if sends == 30 + 3:
+        raise {error}
+    plain(targets)
+"""
+
+
+@pytest.mark.parametrize("error", ["KeyboardInterrupt", "OSError('gone')"])
+def test_an_episode_that_is_over_is_kept_though_the_way_out_fails(walk: Path, tmp_path: Path, error: str) -> None:
+    log = tmp_path / "answer.csv"
+    done = run(walk, _fails(tmp_path, LEAVES.format(error=error)), f"--log={log}", "--yes", "--unpaced")
+    assert done.returncode in (2, 130) and "one: 30 steps" in done.stdout
+    assert journal.ends(log) == {0: False}
+
+
+@pytest.mark.parametrize(
+    ("more", "problem"),
+    [
+        ("def begin(episode):\n    1 / 0\n", "begin() failed: ZeroDivisionError: division by zero"),
+        ("def end():\n    1 / 0\n", "end() failed: ZeroDivisionError: division by zero"),
+        ("SIMULATED = False\n", "--unpaced is for a rehearsal; "),
+        ("plain = read\ndef read():\n    return {**plain(), 'fell': 'no'}\n", "read() gives for 'fell' 'no', which"),
+    ],
+)
+def test_what_a_robot_file_does_wrong_is_told_in_one_line(walk: Path, tmp_path: Path, more: str, problem: str) -> None:
+    done = run(walk, _fails(tmp_path, more), f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    assert done.returncode == 2 and done.stderr == ""
+    assert done.stdout.splitlines()[-1].startswith(f"runner.py: {problem}")
+
+
+def test_nobody_at_the_prompt_means_back_to_where_it_was(walk: Path, tmp_path: Path) -> None:
+    word = _fails(tmp_path, "def end():\n    open(__file__ + '.end', 'w').close()\n")
+    done = run(walk, word, f"--log={tmp_path / 'answer.csv'}", "--unpaced", typed="\n")
+    assert done.returncode == 2 and "there is nobody to ask" in done.stdout
+    assert (tmp_path / "mine.py.end").exists()
+
+
+@pytest.mark.parametrize("name", ["answer.csv", "returns.csv"])
+def test_what_answers_another_request_is_not_added_to(walk: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text(f"{journal.MARK}abc\nepisode,distance,fell\none,1,no\n")
+    done = run(walk, _robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    assert done.returncode == 2 and f"{name}: answers another request" in done.stdout
+    with pytest.raises(ArtifactError, match="answers another request"):
+        journal.add_return(tmp_path / name, "h", "one", "2", fell=False)
+
+
+def test_returns_written_by_hand_keep_their_columns(tmp_path: Path) -> None:
+    path = tmp_path / "returns.csv"
+    path.write_bytes(b'\xef\xbb\xbfepisode,value,fell,note\r\none,0.3,TRUE,"wet, cold"\r\ntwo,0.2,no,\r\n')
+    journal.add_return(path, "h", "two", "1.5", fell=False)
+    rows = journal.returned(path)
+    assert rows["one"] == {"episode": "one", "value": "0.3", "fell": "TRUE", "note": "wet, cold", "distance": ""}
+    assert rows["two"]["distance"] == "1.5" and rows["two"]["value"] == ""
+    assert journal.is_yes(rows["one"]["fell"]) and journal.marked(path) == ""

@@ -16,11 +16,12 @@ from gsl.blind.strength import WORST, turned_up
 from gsl.blind.walks import Individual, Walks
 from gsl.core.body import lumped
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.experiment import experiment, fitting_step
+from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.on_ground import Walking, model_error
 from gsl.diagnosis.records import BASE, Pieces
 from gsl.errors import GslError
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.fits import fitting_step
 
 BANDS = {STRONG: (4.0, 20.0)}  # [floors]; lower than in the air, for windows are a third as long
 SHOWN = 0.5  # least share of its own gap that an effect takes away

@@ -12,7 +12,7 @@ from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.arena import LATENCY, arena_of, looked_at
 from gsl.diagnosis.attribute import BEAM, Arena, Hypothesis
-from gsl.diagnosis.experiment import Experiment, experiment, fitting_step
+from gsl.diagnosis.experiment import Experiment, experiment
 from gsl.diagnosis.on_ground import Walking, model_error
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.reference import Baseline, calibrated_on, clock_shift
@@ -23,6 +23,7 @@ from gsl.diagnosis.self_test import Trial, duels, null_gains
 from gsl.diagnosis.verdict import Verdict, judged
 from gsl.effects.effect import applied, built
 from gsl.errors import InputError
+from gsl.worlds.fits import fitting_step
 
 NOISE_COST = 0.96  # robust cost of a residual that is noise and nothing else
 GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best gain of chance it has to be

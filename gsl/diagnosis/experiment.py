@@ -18,6 +18,7 @@ from gsl.diagnosis.records import BASE, Pieces, Record, pieces, records
 from gsl.diagnosis.replay import Bench, InTheAir, Simulator
 from gsl.diagnosis.residual import Comparison, comparison
 from gsl.errors import InputError
+from gsl.worlds.fits import fitting_step
 
 WARM_UP, SCORED = 0.4, 0.6  # of a window [s]: shorter warm-ups bias friction, whose state a log does not show
 ON_GROUND = (0.1, 0.2)  # the same for a walk, where replays part soon
@@ -136,11 +137,6 @@ def _on_ground(
     held, by_record = _held_out(found, cut, held_out)
     how = Comparison(noise.sd, np.zeros(len(noise.sd), dtype=bool), np.zeros(len(noise.sd)))
     return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
-
-
-def fitting_step(step: float, period: float) -> float:
-    """Return the physics period nearest to `step` that divides the control period [s]."""
-    return period / max(1, round(period / step))
 
 
 def _held_out(found: Sequence[Record], cut: Pieces, asked: Mapping[str, Any] | None) -> tuple[np.ndarray, bool]:

@@ -16,7 +16,7 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.diagnose import Findings
-from gsl.diagnosis.experiment import SCORED, WARM_UP, Experiment, fitting_step
+from gsl.diagnosis.experiment import SCORED, WARM_UP, Experiment
 from gsl.diagnosis.fit import projected
 from gsl.diagnosis.menu import Dish
 from gsl.diagnosis.records import Pieces, Record, pieces
@@ -24,6 +24,7 @@ from gsl.diagnosis.replay import Effects, Simulator
 from gsl.diagnosis.residual import Comparison
 from gsl.diagnosis.self_test import simulated
 from gsl.effects.effect import applied, built
+from gsl.worlds.fits import fitting_step
 
 THREADS = 2  # more would hold more logs at once for little
 

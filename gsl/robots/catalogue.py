@@ -34,6 +34,13 @@ def files(name: str) -> tuple[Path, ...]:
     return files_of(Path(name)) if is_file(name) else ()
 
 
+def read_files(name: str) -> dict[str, Path]:
+    """Return what a robot is read from, by the setting that names it: its files are part of what a world is."""
+    first, *others = files(name) or (None,)
+    named = {} if first is None else {"robot": first}
+    return named | {f"robot.{path.suffix[1:]}": path for path in others}
+
+
 def robot(name: str) -> Robot:
     """Build a robot.
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from gsl.core.seeds import grounding_generator
+from gsl.errors import GslError
 from gsl.grounding.ane import ActionNoise
 from gsl.runner.request import layout_of
 
@@ -23,20 +25,33 @@ class Actor:
 
     def __init__(self, request: Mapping[str, Any], episode: Mapping[str, Any]) -> None:
         self._table = np.array(episode["commands"], dtype=float) if "commands" in episode else None
-        self._next, layout = 0, layout_of(request)
+        self._episode, self._next, layout = episode, 0, layout_of(request)
         if self._table is None:
-            self._run = policy_of(request).start(np.array(episode["parameters"], dtype=float), layout)
+            with _told(episode):
+                self._run = policy_of(request).start(np.array(episode["parameters"], dtype=float), layout)
         noise = ActionNoise(sd=request["action_noise"])
         self._noise = noise.start(layout, grounding_generator(episode["seed"]))
 
     def act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what the policy wants and what is to be sent: with noise [rad], shape (n_joints,) each."""
         if self._table is None:
-            action = self._run.act(observation)
+            with _told(self._episode):
+                action = self._run.act(observation)
         else:
             action = self._table[min(self._next, len(self._table) - 1)]
             self._next += 1
         return action, self._noise.transform(observation, action)
+
+
+@contextmanager
+def _told(episode: Mapping[str, Any]) -> Iterator[None]:
+    """Turn whatever a policy raises into one line that names its episode."""
+    try:
+        yield
+    except GslError:
+        raise
+    except Exception as error:
+        raise GslError(f"{episode['name']}: its policy failed: {type(error).__name__}: {error}") from error
 
 
 def policy_of(request: Mapping[str, Any]) -> Any:

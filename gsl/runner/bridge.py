@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 PIPES = "GSL_RUNNER_PIPES"
+SIMULATED = True
 
 
 def _opened() -> tuple[Any, Any]:

@@ -2,48 +2,26 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gsl.runner.acting import Actor
+from gsl.runner.clock import Clock, Time
 from gsl.runner.guard import Guard, ramp
 from gsl.runner.request import layout_of
 from gsl.runner.senses import RobotError, Seen, Senses, names_of
 
 HOLD = 1.0  # for which the last safe target is held before the ramp out of a stop [s]
-
-
-class Clock:
-    """Ticks of a control period [s]: it waits for each, or, not `paced`, says that it came when it was due."""
-
-    def __init__(self, period: float, *, paced: bool) -> None:
-        self._period, self._paced = period, paced
-        self.worst = 0.0
-        self.begin()
-
-    def begin(self) -> None:
-        """Let tick 0 be now."""
-        self._start, self.worst = time.perf_counter(), 0.0
-
-    def wait(self, tick: int) -> float:
-        """Wait for a tick and return the time since the beginning [s]; `worst` is the greatest delay so far [s]."""
-        due = self._period * tick
-        if not self._paced:
-            return due
-        late = time.perf_counter() - self._start - due
-        if late < 0.0:
-            time.sleep(-late)
-        self.worst = max(self.worst, late)
-        return time.perf_counter() - self._start
+LATEST = 3.0  # that a tick may come before the episode is stopped, in periods
+CALM = 0.5  # of a joint's speed limit, the most in a ramp
 
 
 class Played(NamedTuple):
-    """An episode that is over: columns, rows, and why it ended early, if it did; `broken` is Ctrl-C.
+    """An episode that is over: columns, rows, and why it ended early, if it did.
 
-    A person breaks it off, most often, because the robot falls.
+    `broken` is Ctrl-C: most often because the robot falls. `late` is the worst delay of a tick [s].
     """
 
     columns: list[str]
@@ -51,6 +29,7 @@ class Played(NamedTuple):
     fell: bool
     stopped: str
     broken: bool = False
+    late: float = 0.0
 
     def as_a_fall(self) -> Played:
         """Return the same episode, ended by a fall."""
@@ -61,9 +40,9 @@ class Played(NamedTuple):
 class Player:
     """Plays the episodes of a request on a robot."""
 
-    def __init__(self, request: Mapping[str, Any], robot: Any, *, paced: bool) -> None:
+    def __init__(self, request: Mapping[str, Any], robot: Any, source: Time) -> None:
         self.request, self.robot, self.period = request, robot, request["control_period"]
-        self.clock = Clock(self.period, paced=paced)
+        self.clock = Clock(self.period, source)
         self.guard = Guard(request["joints"], request["limits"], self.period)
         self._layout = layout_of(request)
         self._senses = Senses(self._layout)
@@ -72,75 +51,100 @@ class Player:
         """Bring the robot from where it is to where the episode starts.
 
         Raises:
-            RobotError: It is found where nothing should move it, or the start is unsafe.
+            RobotError: It is found where nothing should move it, the start is unsafe, or it does not get there.
         """
-        position = self._read().observation[self._layout["position"]]
+        position = self._position()
         if problem := self.guard.beyond(position):
             raise RobotError(f"{problem}; bring it by hand into its range")
         posture = np.array(episode["posture"], dtype=float)
         self.guard.start(posture)
-        if problem := self.guard.refusal(posture):
+        if problem := self.guard.refusal(posture, 0.0):
             raise RobotError(f"the start of {episode['name']} is refused: {problem}")
-        self._ramp(np.clip(position, self.guard.lower, self.guard.upper), posture)
+        self.guard.start(np.clip(position, self.guard.lower, self.guard.upper))
+        self.clock.begin()
+        self._ramp(posture)
+        self.clock.wait()
+        if problem := self.guard.away(self._position(), self.request["ramp"]["within"]):
+            raise RobotError(f"{problem} after the ramp to the start of {episode['name']}; it is left where it is")
         self.guard.start(posture)
 
     def play(self, episode: Mapping[str, Any]) -> Played:
-        """Act; a fall or a target that is refused ends it early, the last safe target is then held."""
+        """Act; a fall or a target that is refused ends it early, the last safe target is then held.
+
+        Raises:
+            RobotError: The robot or the policy fails, or a tick comes far too late.
+        """
         actor, rows, fell, stopped = Actor(self.request, episode), [], False, ""
         self._senses = Senses(self._layout)
-        getattr(self.robot, "begin", lambda episode: None)(episode)
+        self._called("begin", episode)
         self.clock.begin()
-        tick, now, seen, broken = 0, 0.0, self._read(), False
+        tick, now, broken = 0, 0.0, False
+        seen = self._read(now)
         if seen.fell:
             raise RobotError(f"the robot lies down before {episode['name']} has begun")
         try:
             while not (fell := seen.fell) and tick < episode["steps"]:
+                self._check_late(episode, now)
                 action, sent = actor.act(seen.observation)
-                if stopped := self.guard.refusal(sent):
+                if stopped := self._send(sent):
                     stopped = f"{stopped} (at {now:.2f} s)"
                     break
-                self._send(sent)
-                self.guard.take(sent)
                 rows.append(self._row(episode, tick, now, seen, action, sent))
                 tick += 1
-                now, seen = self.clock.wait(tick), self._read()
+                now = self.clock.wait()
+                seen = self._read(now)
         except KeyboardInterrupt:
             broken = True
             rows = [row for row in rows if row[2] < now]  # the state after the last action may not have been read yet
             tick = len(rows)
         nothing = np.full(len(self.guard.joints), np.nan)
         rows.append(self._row(episode, tick, now, seen, nothing, nothing, fell=fell, stopped=bool(stopped)))
-        return Played(self._columns(seen), rows, fell, stopped, broken)
+        return Played(self._columns(seen), rows, fell, stopped, broken, self.clock.worst)
 
     def leave(self, episode: Mapping[str, Any], *, hold: bool) -> None:
-        """Bring the robot back to the start posture, first holding the last safe target where it had to stop."""
-        if hold:
-            self._follow([self.guard.last] * max(1, round(HOLD / self.period)))
-        self._ramp(self.guard.last, np.array(episode["posture"], dtype=float))
-        getattr(self.robot, "end", lambda: None)()
+        """Bring the robot back to the start posture: hold the last safe target, long where it had to stop, and ramp."""
+        seconds = HOLD if hold else self.request["limits"]["window"]
+        self._follow([self.guard.last] * max(1, round(seconds / self.period)))
+        self.guard.start(self.guard.last)
+        self._ramp(np.array(episode["posture"], dtype=float))
+        self._called("end")
 
-    def _read(self) -> Seen:
+    def _position(self) -> np.ndarray:
+        return self._read(self.clock.now()).observation[self._layout["position"]]
+
+    def _read(self, now: float) -> Seen:
+        return self._senses.seen(self._called("read"), now)
+
+    def _called(self, name: str, *words: Any) -> Any:
+        """Call a function of the robot, none where it has none."""
         try:
-            told = self.robot.read()
+            return getattr(self.robot, name, lambda *words: None)(*words)
         except Exception as error:
-            raise RobotError(f"read() failed: {type(error).__name__}: {error}") from error
-        return self._senses.seen(told)
+            raise RobotError(f"{name}() failed: {type(error).__name__}: {error}") from error
 
-    def _send(self, targets: np.ndarray) -> None:
-        try:
-            self.robot.send(targets.copy())
-        except Exception as error:
-            raise RobotError(f"send() failed: {type(error).__name__}: {error}") from error
+    def _send(self, target: np.ndarray) -> str:
+        """Send a target that is safe, and not too soon; return why it is refused, nothing if it was sent."""
+        now = self.clock.apart()
+        if problem := self.guard.refusal(target, now):
+            return problem
+        self.guard.take(target, now)  # first: if send() breaks off, the robot may have it
+        self._called("send", target.copy())
+        return ""
 
-    def _ramp(self, start: np.ndarray, end: np.ndarray) -> None:
-        self._follow(list(ramp(start, end, self.request["ramp"], self.period)))
+    def _check_late(self, episode: Mapping[str, Any], now: float) -> None:
+        if self.clock.late > LATEST * self.period:
+            late = f"at {now:.2f} s a tick came {1e3 * self.clock.late:.0f} ms late"
+            raise RobotError(f"{episode['name']}: {late}; stopped and not kept; run it again")
+
+    def _ramp(self, end: np.ndarray) -> None:
+        speed = np.minimum(self.request["ramp"]["speed"], CALM * np.array(self.request["limits"]["speed"]))
+        self._follow(list(ramp(self.guard.last, end, self.request["ramp"]["seconds"], speed, self.period)))
 
     def _follow(self, targets: list[np.ndarray]) -> None:
-        self.clock.begin()
-        for tick, target in enumerate(targets):
-            self.clock.wait(tick)
-            self._send(target)
-        self.guard.start(targets[-1])
+        for target in targets:
+            self.clock.wait()
+            if problem := self._send(target):
+                raise RobotError(f"a ramp is refused: {problem}")
 
     def _columns(self, seen: Seen) -> list[str]:
         groups = ("action", "grounded_action") if self.request["action_noise"] else ("action",)

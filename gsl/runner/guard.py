@@ -5,6 +5,7 @@ lower <= target <= upper,    change in a tick <= step,    way within a window of
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -29,23 +30,24 @@ class Guard:
         self.lower, self.upper, self.step, self.path = (
             np.array(limits[name], dtype=float) for name in ("lower", "upper", "step", "path")
         )
-        self._window = max(1, round(limits["window"] / period))
+        self._window = float(limits["window"])
         self.start(np.clip(np.zeros(len(self.joints)), self.lower, self.upper))
 
     def start(self, target: np.ndarray) -> None:
         """Forget the past: the robot rests at a target [rad], shape (n_joints,)."""
-        self.last = target
-        self._ways: deque[np.ndarray] = deque(maxlen=self._window - 1)
+        self.last = target.copy()
+        self._ways: deque[tuple[float, np.ndarray]] = deque()
 
-    def refusal(self, target: np.ndarray) -> str:
-        """Return why a target [rad], shape (n_joints,), must not be sent, nothing if it may."""
+    def refusal(self, target: np.ndarray, now: float) -> str:
+        """Return why a target [rad], shape (n_joints,), must not be sent at a time [s], nothing if it may."""
         if target.shape != self.last.shape:
             return f"{len(self.joints)} targets are due, one a joint, not {target.size}"
         if not np.isfinite(target).all():
             return self._told(~np.isfinite(target), "the target is not a finite number")
         change = np.abs(target - self.last)
-        way = change + (np.sum(self._ways, axis=0) if self._ways else 0.0)
-        seconds = f"{self._window * self._period:g} s"
+        since = now - self._window + 0.5 * self._period  # ticks are not to the microsecond
+        way = sum((way for at, way in self._ways if at > since), change)
+        seconds = f"{self._window:g} s"
         rules = (
             (target, self.lower, -1.0, "the target of {:.4g} rad is below the limit of {:.4g} rad"),
             (target, self.upper, 1.0, "the target of {:.4g} rad is above the limit of {:.4g} rad"),
@@ -57,15 +59,22 @@ class Guard:
         )
         return next(filter(None, found), "")
 
-    def take(self, target: np.ndarray) -> None:
-        """Remember a target that was sent [rad], shape (n_joints,)."""
-        self._ways.append(np.abs(target - self.last))
+    def take(self, target: np.ndarray, now: float) -> None:
+        """Remember a target that was sent [rad], shape (n_joints,), at a time [s]."""
+        self._ways.append((now, np.abs(target - self.last)))
+        while self._ways[0][0] < now - self._window:
+            self._ways.popleft()
         self.last = target.copy()
 
     def beyond(self, position: np.ndarray) -> str:
         """Return which joint was found so far outside of its range that nothing should move it, nothing if none."""
         outside = np.maximum(self.lower - position, position - self.upper)
         return self._told(outside > BEYOND, "is at {:.4g} rad, {:.4g} rad outside of its range", position, outside)
+
+    def away(self, position: np.ndarray, within: float) -> str:
+        """Return which joint is further from the last target than `within` [rad], nothing if none is."""
+        off = np.abs(position - self.last)
+        return self._told(off > within, "is {:.4g} rad off", off)
 
     def _told(self, wrong: np.ndarray, text: str, *values: np.ndarray) -> str:
         if not wrong.any():
@@ -74,7 +83,7 @@ class Guard:
         return f"{self.joints[joint]}: {text.format(*(value[joint] for value in values))}"
 
 
-def ramp(start: np.ndarray, end: np.ndarray, settings: Mapping[str, float], period: float) -> Iterator[np.ndarray]:
+def ramp(start: np.ndarray, end: np.ndarray, seconds: float, speed: np.ndarray, period: float) -> Iterator[np.ndarray]:
     """Yield the targets of a smooth way from one posture to another, the end included.
 
         target = start + (end - start) (1 - cos(pi t / T)) / 2
@@ -82,10 +91,11 @@ def ramp(start: np.ndarray, end: np.ndarray, settings: Mapping[str, float], peri
     Args:
         start: [rad], shape (n_joints,).
         end: [rad], shape (n_joints,).
-        settings: `seconds`, the least duration, and `speed` [rad/s], the most of any joint.
+        seconds: The least duration [s].
+        speed: The most of each joint [rad/s], shape (n_joints,).
         period: Control period [s].
     """
-    longest = 0.5 * np.pi * float(np.abs(end - start).max()) / settings["speed"]
-    ticks = max(1, round(max(settings["seconds"], longest) / period))
+    longest = 0.5 * np.pi * float((np.abs(end - start) / speed).max())
+    ticks = max(1, math.ceil(max(seconds, longest) / period - _ROUNDING))
     for tick in range(1, ticks + 1):
         yield start + (end - start) * (0.5 - 0.5 * np.cos(np.pi * tick / ticks))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from gsl.errors import ArtifactError
@@ -21,9 +21,24 @@ YES = ("true", "yes", "1")
 
 def marked(path: Path) -> str:
     """Return the hash of the request that a file says it answers, nothing if it says none."""
-    with path.open(encoding="utf-8", errors="replace") as file:
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
         first = file.readline(200)
     return first.removeprefix(MARK).strip() if first.startswith(MARK) else ""
+
+
+def check_marked(path: Path, request: str, *, by_hand: bool = False) -> None:
+    """Refuse a file, if there is one, that answers another request; one written `by_hand` need not say which.
+
+    Raises:
+        ArtifactError: It does.
+    """
+    if path.exists() and (marked(path) or ("" if not by_hand else request)) != request:
+        raise ArtifactError(path, "answers another request; move it away or choose another --log")
+
+
+def is_yes(text: str | None) -> bool:
+    """Tell whether a cell of a table says yes."""
+    return (text or "").strip().lower() in YES
 
 
 def keep(path: Path, request: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
@@ -37,8 +52,7 @@ def keep(path: Path, request: str, columns: Sequence[str], rows: Sequence[Sequen
     before = ""
     if path.exists():
         lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-        if marked(path) != request:
-            raise ArtifactError(path, "answers another request; move it away or choose another --log")
+        check_marked(path, request)
         if lines[1].strip() != ",".join(columns):
             raise ArtifactError(path, "has other columns than the robot tells now; choose another --log")
         before = "".join([*lines[:2], *(line for line in lines[2:] if not line.startswith(f"{rows[0][0]},"))])
@@ -52,27 +66,48 @@ def ends(path: Path) -> dict[int, bool]:
     """Return for every episode of an answer, by number, whether it ended in a fall or was stopped for safety."""
     found: dict[int, bool] = {}
     if path.exists():
-        for row in _rows(path):
-            found[int(row["episode"])] = row["fell"] in YES or row["stopped"] in YES
+        for row in table(path)[1]:
+            found[int(row["episode"])] = is_yes(row["fell"]) or is_yes(row["stopped"])
     return found
 
 
-def returned(path: Path) -> dict[str, Mapping[str, str]]:
-    """Return the rows of a file of returns by the name of the episode."""
-    return {row["episode"]: row for row in _rows(path)} if path.exists() else {}
+def table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
+    """Return the columns of a CSV file and its rows, whoever has written it; lines that begin with # are no rows."""
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        read = csv.DictReader((line for line in file if not line.startswith("#")), restkey="", restval="")
+        columns = [name.strip() for name in read.fieldnames or ()]
+        rows = [dict(zip(columns, row.values(), strict=False)) for row in read]
+    return columns, rows
+
+
+def returned(path: Path) -> dict[str, dict[str, str]]:
+    """Return the rows of a file of returns by the name of the episode.
+
+    Raises:
+        ArtifactError: It does not name the episodes.
+    """
+    columns, rows = table(path) if path.exists() else (["episode"], [])
+    if "episode" not in columns:
+        raise ArtifactError(path, f"needs the columns {', '.join(RETURN_COLUMNS)}; it has {', '.join(columns)[:80]}")
+    return {row["episode"].strip(): row for row in rows}
 
 
 def add_return(path: Path, request: str, episode: str, distance: str, *, fell: bool) -> None:
-    """Write down what a person measured, in place of what was there."""
-    row = {"episode": episode, "distance": distance, "fell": "yes" if fell else "no"}
-    rows = {**returned(path), episode: row}
-    lines = [",".join(row.get(name) or "" for name in RETURN_COLUMNS) for row in rows.values()]
-    _replace(path, "\n".join([f"{MARK}{request}", ",".join(RETURN_COLUMNS), *lines, ""]))
+    """Write down what a person measured, in place of what was there of this episode; all else stays.
 
-
-def _rows(path: Path) -> Iterator[Mapping[str, str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        yield from csv.DictReader(line for line in file if not line.startswith("#"))
+    Raises:
+        ArtifactError: The file answers another request.
+    """
+    check_marked(path, request, by_hand=True)
+    mark = not path.exists() or bool(marked(path))
+    rows = returned(path)
+    rows[episode] = {"episode": episode, "distance": distance, "fell": "yes" if fell else "no"}
+    columns = list(dict.fromkeys([*(table(path)[0] if path.exists() else ()), *RETURN_COLUMNS]))
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, restval="", extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows.values())
+    _replace(path, f"{MARK}{request}\n" * mark + text.getvalue())
 
 
 def _cell(value: object) -> object:

@@ -11,12 +11,14 @@ from typing import Any
 
 from gsl.errors import GslError
 from gsl.runner import journal
+from gsl.runner.clock import Simulated, Wall
 from gsl.runner.episode import Played, Player
 from gsl.runner.request import due, read_request
 from gsl.runner.robots import PerfectRobot, robot_of
 from gsl.runner.senses import RobotError
 
 LATE = 0.002  # of a tick, that is worth telling [s]
+OFF = 0.5  # of a tick, from which on a log is refused, in periods
 MOST = 100.0  # that a robot may walk in an episode [m]
 
 
@@ -53,7 +55,7 @@ def say(text: str) -> None:
 def dry_run(request: Mapping[str, Any]) -> int:
     """Play every episode against a perfect robot and tell rates and extremes; return 1 if a target is refused."""
     robot = PerfectRobot(request)
-    stage, ticks, stops = Player(request, robot, paced=False), 0, 0
+    stage, ticks, stops = Player(request, robot, Simulated()), 0, 0
     begin = time.perf_counter()
     for episode in request["episodes"]:
         stage.approach(episode)
@@ -77,13 +79,16 @@ class Sitting:
     def __init__(self, request: Mapping[str, Any], asked: argparse.Namespace) -> None:
         self._request, self._asked = request, asked
         self._returns = asked.log.with_name(journal.RETURNS)
-        if asked.log.exists() and journal.marked(asked.log) != request["hash"]:
-            raise RobotError(f"{asked.log} answers another request; move it away or choose another --log")
+        journal.check_marked(asked.log, request["hash"])
+        journal.check_marked(self._returns, request["hash"], by_hand=True)
         names = [episode["name"] for episode in request["episodes"]]
         for name in asked.episode or ():
             if name not in names:
                 raise RobotError(f"there is no episode {name}; there is {', '.join(names)}")
-        self._player = Player(request, robot_of(asked.robot), paced=not asked.unpaced)
+        robot = robot_of(asked.robot)
+        if asked.unpaced and not getattr(robot, "SIMULATED", False):
+            raise RobotError(f"--unpaced is for a rehearsal; {asked.robot} does not say SIMULATED = True")
+        self._player = Player(request, robot, Simulated() if asked.unpaced else Wall())
 
     def run(self) -> int:
         """Run the episodes that are missing, or those that were named."""
@@ -97,28 +102,51 @@ class Sitting:
         return 0
 
     def _one(self, episode: Mapping[str, Any]) -> None:
+        """Run an episode; what it came to is written before the robot moves on, as that may fail, too."""
         player = self._player
         player.approach(episode)
-        if not self._ask("it stands at the start: Enter begins, q ends"):
+        played = self._played(episode)
+        if played is None:
             player.leave(episode, hold=False)
             raise KeyboardInterrupt
         try:
-            played = player.play(episode)
-        except BaseException:
-            player.leave(episode, hold=True)
-            raise
-        late = f", {1e3 * player.clock.worst:.0f} ms late at worst" if player.clock.worst > LATE else ""
-        player.leave(episode, hold=played.fell or played.broken or bool(played.stopped))
-        if played.broken:
-            played = self._broken(played)
-        if len(played.rows) > 1:
-            journal.keep(self._asked.log, self._request["hash"], played.columns, played.rows)
-        else:  # its first target was refused: there is nothing to log
-            journal.add_return(self._returns, self._request["hash"], episode["name"], "", fell=True)
-        ended = f"; refused: {played.stopped}; held, then ramped out" if played.stopped else ""
-        say(f"{episode['name']}: {len(played.rows) - 1} steps{late}{', fell' * played.fell}{ended}")
+            if not played.broken:
+                self._keep(episode, played)
+        finally:
+            try:
+                player.leave(episode, hold=played.fell or played.broken or bool(played.stopped))
+            finally:
+                if played.broken:
+                    self._keep(episode, self._broken(played))
         if self._request["distance"] and "base.position.x" not in played.columns:
             self._measure(episode, fell=played.fell or bool(played.stopped))
+
+    def _played(self, episode: Mapping[str, Any]) -> Played | None:
+        """Play an episode, None if a person does not want it; whatever goes wrong, hold and ramp out."""
+        try:
+            if not self._ask("it stands at the start: Enter begins, q ends"):
+                return None
+            return self._player.play(episode)
+        except BaseException:
+            try:
+                self._player.leave(episode, hold=True)
+            except GslError as error:
+                say(f"{episode['name']}: could not be brought back: {error}")
+            raise
+
+    def _keep(self, episode: Mapping[str, Any], played: Played) -> None:
+        """Write down what an episode came to: its log, or that it fell where there is none that could be used."""
+        late = f"{1e3 * played.late:.0f} ms late at worst"
+        useless = played.late > OFF * self._request["control_period"]
+        if useless and not (played.fell or played.stopped):
+            raise RobotError(f"{episode['name']}: {late}; not kept; run it again where the rate is kept")
+        if useless or len(played.rows) == 1:  # nothing was sent, or not at the rate
+            journal.add_return(self._returns, self._request["hash"], episode["name"], "", fell=True)
+        else:
+            journal.keep(self._asked.log, self._request["hash"], played.columns, played.rows)
+        ended = f"; refused: {played.stopped}; held, then ramped out" if played.stopped else ""
+        told = f", {late}" if played.late > LATE else ""
+        say(f"{episode['name']}: {len(played.rows) - 1} steps{told}{', fell' * played.fell}{ended}")
 
     def _broken(self, played: Played) -> Played:
         """Ask why a person broke an episode off: a fall is a result and must not be lost, anything else is none."""
@@ -150,8 +178,7 @@ class Sitting:
     def _due(self) -> list[Mapping[str, Any]]:
         episodes = self._request["episodes"]
         ends = {episodes[number]["name"]: down for number, down in journal.ends(self._asked.log).items()}
-        told = journal.returned(self._returns).items()
-        fallen = {name for name, row in told if (row["fell"] or "").lower() in journal.YES}
+        fallen = {name for name, row in journal.returned(self._returns).items() if journal.is_yes(row.get("fell"))}
         return list(due(self._request, {*ends, *fallen}, {name for name, down in ends.items() if down} | fallen))
 
     def _ask(self, question: str) -> bool:

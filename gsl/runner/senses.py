@@ -32,10 +32,10 @@ class Senses:
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
-        self._before: np.ndarray | None = None
+        self._before: tuple[float, np.ndarray] | None = None
 
-    def seen(self, told: Mapping[str, Any]) -> Seen:
-        """Return what a dictionary of `read` says.
+    def seen(self, told: Mapping[str, Any], now: float) -> Seen:
+        """Return what a dictionary of `read` says at a time [s].
 
         Raises:
             RobotError: Something is missing, of another size, not finite or unknown.
@@ -48,27 +48,34 @@ class Senses:
             if name not in known:
                 raise RobotError(f"read() gives '{name}', which is none of {', '.join(sorted(known))}")
         values = {name: _numbers(name, value, known[name]) for name, value in told.items() if name != FELL}
-        values = self._with_velocity(values)
+        values = self._with_velocity(values, now)
         for name in sizes:
             if name not in values:
                 raise RobotError(f"read() gives no '{name}', which the policies need")
         observation = np.concatenate([values[name] for name in sizes])
         more = {name: value for name, value in values.items() if name not in sizes}
-        return Seen(observation, _columns(more, self._layout.joints), bool(told.get(FELL, False)))
+        return Seen(observation, _columns(more, self._layout.joints), _yes(told.get(FELL, False)))
 
-    def _with_velocity(self, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def _with_velocity(self, values: dict[str, np.ndarray], now: float) -> dict[str, np.ndarray]:
         """Add the difference of positions where a robot has no velocities."""
         if "velocity" in values or "position" not in values:
             return values
-        before = values["position"] if self._before is None else self._before
-        self._before = values["position"]
-        return {**values, "velocity": (values["position"] - before) / self._layout.control_period}
+        at, before = self._before or (now, values["position"])
+        self._before = now, values["position"]
+        seconds = max(now - at, 0.5 * self._layout.control_period)
+        return {**values, "velocity": (values["position"] - before) / seconds}
 
 
 def names_of(layout: Layout) -> list[str]:
     """Return the columns of an observation, in order."""
     joints = {part: [f"{part}.{joint}" for joint in layout.joints] for part in ("position", "velocity")}
     return [name for part in layout.sizes for name in joints.get(part) or layout.columns[part]]
+
+
+def _yes(value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_ | int) or value not in (0, 1):
+        raise RobotError(f"read() gives for '{FELL}' {value!r}, which is neither True nor False")
+    return bool(value)
 
 
 def _numbers(name: str, value: Any, size: int) -> np.ndarray:

@@ -18,7 +18,7 @@ from gsl.runner.acting import Actor
 from gsl.runner.journal import RETURNS
 from gsl.runner.request import NAME, layout_of, read_request
 from gsl.storage import trajectories
-from gsl.storage.answers import STOPPED, check_lengths, csv_episodes, read_log, read_returns
+from gsl.storage.answers import STOPPED, check_lengths, check_rate, csv_episodes, named, read_log, read_returns
 from gsl.storage.references import resolve
 
 FILE = "answer.parquet"
@@ -76,12 +76,8 @@ class Answer:
         found = _csv(source, request) if source.suffix == ".csv" else _parquet(source, request)
         asked = {episode["name"]: episode for episode in request["episodes"]}
         names = self.episodes or tuple(asked)
-        for name in names:
-            if name not in asked:
-                raise ArtifactError(source, f"the request has no episode '{name}'; there is {', '.join(asked)}")
-        if len(found) != len(names):
-            problem = f"holds {len(found)} episodes, but {len(names)} are named"
-            raise ArtifactError(source, f"{problem}; say which they are, in order: episodes=[{names[0]},...]")
+        for name, episode in named(source, names, found, request).items():
+            check_rate(source, name, episode, request)
         about = {"robot": request["robot"], "role": "real", "source": source.name, "request": request["hash"]}
         told = [{"name": name, "policy": asked[name]["policy"]} for name in names]
         joints, period = tuple(request["joints"]), request["control_period"]

@@ -72,6 +72,9 @@ def _sees_itself(trajectory: Trajectory) -> bool:
 
 
 def _fallen(trajectory: Trajectory, *, fell: bool) -> Trajectory:
+    """Return a log that ends at its first fall: what a robot does when it lies is not what it was asked."""
+    if trajectory.fell is not None and trajectory.fell.any():
+        trajectory = _cut(trajectory, max(1, int(np.argmax(trajectory.fell))))
     down = np.zeros(len(trajectory) + 1, dtype=bool)
     down[-1] = fell
     return replace(trajectory, fell=down)

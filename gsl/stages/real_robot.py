@@ -24,8 +24,10 @@ from gsl.storage.answers import Answered, answer_files, read_answers
 from gsl.storage.requests import sealed, write_request
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot
+from gsl.worlds.fits import fitting_step
 from gsl.worlds.world import World
 
+STEP = 0.002  # physics period of the forecast, nearly [s]
 SHOWN = 6  # names of missing episodes
 REHEARSAL = "rehearse"
 
@@ -97,7 +99,8 @@ def foreseen(
     """Return, and tell, which policies ask in a nominal simulator for what the runner will refuse on the robot."""
     world = scenario.world
     assert isinstance(world, ExternalRobot)
-    nominal = BulletWorld(robot=world.robot, effects={}, floating=world.floating, period=world.period)
+    step = fitting_step(STEP, world.period)
+    nominal = BulletWorld(robot=world.robot, effects={}, floating=world.floating, step=step, period=world.period)
     first = {order.policy: index for index, order in reversed(list(enumerate(orders)))}
     replay = Scenario(nominal, scenario.task, scenario.policy, scenario.role, scenario.grounding)
     with console.progress(len(first), "looking in simulation for targets that the robot's limits forbid") as progress:
@@ -108,10 +111,10 @@ def foreseen(
         guard.start(np.array(request["episodes"][index]["posture"]))
         sent = trajectory.action if trajectory.grounded_action is None else trajectory.grounded_action
         for time, target in zip(trajectory.time[:-1], sent, strict=True):
-            if problem := guard.refusal(target):
+            if problem := guard.refusal(target, time):
                 told.append(f"{policy} asks in simulation after {time:.2f} s for what the runner refuses: {problem}")
                 break
-            guard.take(target)
+            guard.take(target, time)
     for one in told:
         console.status(f"warning: {one}; an episode that is stopped counts as a fall")
     return told
@@ -151,7 +154,7 @@ def _request(scenario: Scenario, orders: Sequence[Order], errand: Errand) -> dic
             "control_period": layout.control_period,
             "observes": layout.sizes,
             "limits": world.limits,
-            "ramp": {"seconds": world.ramp, "speed": world.ramp_speed},
+            "ramp": {"seconds": world.ramp, "speed": world.ramp_speed, "within": world.within},
             "policy": described(scenario.policy),
             "action_noise": _noise(scenario.grounding),
             "task": described(scenario.task),

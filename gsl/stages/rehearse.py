@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -91,19 +92,23 @@ class Surrogate:
         words = [sys.executable, "-I", str((folder / "runner.py").resolve()), f"--robot={bridge.__file__}"]
         words += [f"--log={log.resolve()}", "--yes", "--unpaced", *(f"--episode={name}" for name in episodes)]
         environment = {**os.environ, bridge.PIPES: f"{to_runner},{from_runner}", "PYTHONDONTWRITEBYTECODE": "1"}
-        with subprocess.Popen(
-            words, env=environment, pass_fds=(to_runner, from_runner), stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-        ) as process:
+        with (
+            tempfile.TemporaryFile() as said,  # a pipe that nobody empties would stop the runner
+            subprocess.Popen(
+                words, env=environment, pass_fds=(to_runner, from_runner), stdout=said, stderr=subprocess.STDOUT
+            ) as process,
+        ):
             os.close(to_runner)
             os.close(from_runner)
             with os.fdopen(to_us, encoding="utf-8") as requests, os.fdopen(from_us, "w", encoding="utf-8") as answers:
                 for line in requests:
                     answers.write(json.dumps(self._answer(json.loads(line), progress)) + "\n")
                     answers.flush()
-            assert process.stdout is not None
-            said = process.stdout.read().decode().strip()
+            process.wait()
+            said.seek(0)
+            last = said.read().decode(errors="replace").strip().rpartition("\n")[2]
         if process.returncode:
-            raise GslError(f"the runner ended with exit code {process.returncode}: {said.rpartition(chr(10))[2]}")
+            raise GslError(f"the runner ended with exit code {process.returncode}: {last}")
 
     def _answer(self, call: Mapping[str, Any], progress: Any) -> Any:
         match call["do"]:

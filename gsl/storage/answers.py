@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from gsl.core.layout import Layout
 from gsl.core.trajectory import Trajectory
 from gsl.core.validation import did_you_mean
 from gsl.errors import ArtifactError, TrajectoryError
-from gsl.runner.journal import MARK, YES, marked
+from gsl.runner.journal import MARK, YES, marked, table
 from gsl.runner.request import layout_of
 from gsl.storage import trajectories
 from gsl.storage.trajectory_columns import batch_of
@@ -24,6 +23,7 @@ from gsl.storage.trajectory_contract import SCHEMA_VERSION, UNITS, check_names, 
 
 NO = ("false", "no", "0", "")
 STOPPED = "stopped"
+OFF = 0.5  # of the control period, the most by which a row may come too late or too soon
 ROW = 64 * 32  # bytes that no row of ours reaches for a robot of 100 columns
 _PATTERNS = ("answer*.csv", "answer*.parquet", "returns*.csv")
 
@@ -83,12 +83,26 @@ def read_log(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
     if path.suffix == ".parquet":
         batch = trajectories.read(path, joints=tuple(request["joints"]))
         check_marked(path, str(batch.metadata.get("request", "")), request)
-        named = [str(one.get("name", "")) for one in batch.metadata.get("episodes", [])]
-        episodes = dict(zip(named, batch.episodes, strict=True))
+        labels = [str(one.get("name", "")) for one in batch.metadata.get("episodes", [])]
+        episodes = named(path, labels, batch.episodes, request)
     else:
         check_marked(path, marked(path), request)
         episodes = dict(csv_episodes(path, request))
-    return {_known(path, name, request): _logged(path, one, request) for name, one in episodes.items()}
+    return {name: _logged(path, name, one, request) for name, one in episodes.items()}
+
+
+def named(
+    path: Path, names: Sequence[str], episodes: Sequence[Trajectory], request: Mapping[str, Any]
+) -> dict[str, Trajectory]:
+    """Return the episodes of a file by their names: as many as there are, of the request, none of them twice."""
+    for name in names:
+        _known(path, name, request)
+        if names.count(name) > 1:
+            raise ArtifactError(path, f"{name} is named twice; every episode is one of its own")
+    if len(episodes) != len(names):
+        problem = f"holds {len(episodes)} episodes, but {len(names)} are named"
+        raise ArtifactError(path, f"{problem}; say which they are, in order: episodes=[{', '.join(names[:1])},...]")
+    return dict(zip(names, episodes, strict=True))
 
 
 def check_marked(path: Path, told: str, request: Mapping[str, Any]) -> None:
@@ -124,16 +138,14 @@ def read_returns(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
     if told := marked(path):
         check_marked(path, told, request)
     found: dict[str, Answered] = {}
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
-        table = csv.DictReader(line for line in file if not line.startswith("#"))
-        names = table.fieldnames or ()
-        if not {"episode", "fell"} <= set(names) or not {"distance", "value"} & set(names):
-            needed = "needs the columns episode, distance (or value) and fell"
-            raise ArtifactError(path, f"{needed}; it has {', '.join(names)[:80] or 'none'}")
-        for number, row in enumerate(table, start=1):
-            name = _known(path, (row.get("episode") or "").strip(), request)
-            _once(found.get(name), path, name)
-            found[name] = _measured(path, number, row)
+    names, rows = table(path)
+    if not {"episode", "fell"} <= set(names) or not {"distance", "value"} & set(names):
+        needed = "needs the columns episode, distance (or value) and fell"
+        raise ArtifactError(path, f"{needed}; it has {', '.join(names)[:80] or 'none'}")
+    for number, row in enumerate(rows, start=1):
+        name = _known(path, row["episode"].strip(), request)
+        _once(found.get(name), path, name)
+        found[name] = _measured(path, number, row)
     return found
 
 
@@ -164,7 +176,18 @@ def _merged(log: Answered | None, told: Answered | None) -> Answered:
     return replace(log, fell=log.fell or told.fell, distance=told.distance, value=told.value)
 
 
-def _logged(path: Path, episode: Trajectory, request: Mapping[str, Any]) -> Answered:
+def check_rate(path: Path, name: str, episode: Trajectory, request: Mapping[str, Any]) -> None:
+    """Refuse an episode whose rows are not a control period apart: a policy that acts too late is another policy."""
+    period, apart = request["control_period"], np.diff(episode.time)
+    wrong = np.abs(apart - period) > OFF * period
+    if wrong.any():
+        row = int(np.argmax(wrong)) + 1
+        told = f"row {row} comes {1e3 * apart[row - 1]:.3g} ms after the one before, not {1e3 * period:g} ms"
+        raise TrajectoryError(path, f"{name}: {told}; run it again at the rate that was asked for")
+
+
+def _logged(path: Path, name: str, episode: Trajectory, request: Mapping[str, Any]) -> Answered:
+    check_rate(path, name, episode, request)
     sensors = dict(episode.sensors)
     stopped = bool(sensors.pop(STOPPED, np.zeros(1, dtype=bool))[-1])
     missing = [name for part in _parts(request) for name in part if name not in sensors]
@@ -174,7 +197,8 @@ def _logged(path: Path, episode: Trajectory, request: Mapping[str, Any]) -> Answ
     if grounded is not None and np.array_equal(grounded, episode.action):
         grounded = None
     whole = replace(episode, sensors=sensors, grounded_action=grounded)
-    return Answered(path, whole, fell=episode.ended_in_a_fall, stopped=stopped)
+    fell = episode.fell is not None and bool(episode.fell.any())
+    return Answered(path, whole, fell=fell, stopped=stopped)
 
 
 def _parts(request: Mapping[str, Any]) -> list[tuple[str, ...]]:
@@ -225,7 +249,7 @@ def _csv_columns(path: Path, request: Mapping[str, Any]) -> dict[str, np.ndarray
     if path.stat().st_size > most:
         size, needed = (f"{count / 1e6:,.0f} MB" for count in (path.stat().st_size, most))
         raise ArtifactError(path, f"is {size}, but what was asked for needs less than {needed}; is it the right file?")
-    with path.open(encoding="utf-8", errors="replace") as file:
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
         above = sum(1 for _ in itertools.takewhile(lambda line: line.startswith(("#", MARK)), file))
     try:
         table = pc.read_csv(path, read_options=pc.ReadOptions(skip_rows=above))

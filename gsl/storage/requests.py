@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gsl.errors import ArtifactError
-from gsl.runner.request import NAME, SCHEMA_VERSION, hash_of
+from gsl.runner.request import NAME, SCHEMA_VERSION, hash_of, read_request
 from gsl.storage import documents
 from gsl.storage.answers import answer_files
 from gsl.storage.bundle import RUNNER, bundled
@@ -71,10 +71,10 @@ def sealed(request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_request(folder: Path, request: Mapping[str, Any], warnings: Sequence[str]) -> None:
-    """Write the folder of a sealed request in place of one that nobody has answered; a robot.py in it stays.
+    """Write the folder of a sealed request, in place of one that nobody has answered; what is not ours in it stays.
 
     Raises:
-        ArtifactError: There is an answer to another request in it.
+        ArtifactError: There is an answer to another request in it, a damaged request, or somebody's file in the way.
         ConfigError: The policy needs a library beside numpy.
         GslError: The folder cannot be written.
     """
@@ -86,14 +86,35 @@ def write_request(folder: Path, request: Mapping[str, Any], warnings: Sequence[s
         shutil.rmtree(temporary, ignore_errors=True)
         try:
             _write(temporary, request, files, warnings)
-            kept = folder / ROBOT
-            if kept.is_file():
-                shutil.copy2(kept, temporary / ROBOT)
+            _check_ours(folder, temporary)
             flush_tree(temporary)
-            shutil.rmtree(folder, ignore_errors=True)
-            os.rename(temporary, folder)
+            _put(temporary, folder)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _check_ours(folder: Path, new: Path) -> None:
+    """Refuse a folder with a request that is damaged, or without one and with files of our names that are not ours."""
+    if (folder / NAME).exists():
+        read_request(folder)
+        return
+    for path in (path for path in sorted(new.rglob("*")) if path.is_file() and path.name != ROBOT):
+        old = folder / path.relative_to(new)
+        if old.exists() and not (old.is_file() and old.read_bytes() == path.read_bytes()):
+            raise ArtifactError(old, "is in the way of a request, and not gsl's; move it, or choose another folder")
+
+
+def _put(new: Path, folder: Path) -> None:
+    """Move a folder to its place: as a whole, or file by file into one that is there, the request itself last."""
+    if not folder.exists():
+        os.rename(new, folder)
+        return
+    files = [path for path in new.rglob("*") if path.is_file() and path != new / NAME]
+    for path in [*files, new / NAME]:
+        to = folder / path.relative_to(new)
+        if path != new / ROBOT or not to.exists():
+            to.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(path, to)
 
 
 def _write(folder: Path, request: Mapping[str, Any], files: Mapping[str, bytes], warnings: Sequence[str]) -> None:

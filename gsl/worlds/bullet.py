@@ -20,7 +20,7 @@ from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
 from gsl.effects.effect import applied, built
 from gsl.errors import GslError
-from gsl.robots.catalogue import files, robot
+from gsl.robots.catalogue import read_files, robot
 from gsl.worlds.engine import Engine, Physics, Reading
 from gsl.worlds.fits import check_base, check_periods, check_plant
 from gsl.worlds.ground import random_heights
@@ -50,10 +50,8 @@ class BulletWorld:
 
     @property
     def read_files(self) -> Mapping[str, Path]:
-        """What it is read from, by the setting that names it: a robot's files are part of what a world is."""
-        first, *others = files(self.robot) or (None,)
-        named = {} if first is None else {"robot": first}
-        return named | {f"robot.{path.suffix[1:]}": path for path in others}
+        """What it is read from, by the setting that names it."""
+        return read_files(self.robot)
 
     @cached_property
     def plant(self) -> Plant:

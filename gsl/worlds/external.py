@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -15,10 +16,11 @@ from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.policies.limits import SPEED_SHARE, WINDOW, limits, narrowest
-from gsl.robots.catalogue import robot
+from gsl.robots.catalogue import read_files, robot
+from gsl.worlds.fits import check_base
 from gsl.worlds.world import World
 
-_SIZES = {"gyro": 3, "foot_force": 2, "base.position": 3, "base.orientation": 4, "base.velocity": 3}
+_SIZES = {"gyro": 3, "base.position": 3, "base.orientation": 4, "base.velocity": 3}
 Sensor = Literal["gyro", "foot_force", "base.position", "base.orientation", "base.velocity"]
 
 
@@ -36,13 +38,21 @@ class ExternalRobot:
     speed: Annotated[float, setting("share of the joints' speed limits that a target may use", gt=0, le=3)] = 1.0
     ramp: Annotated[float, setting("least duration of a ramp in or out", unit="s", ge=1, le=60)] = 3.0
     ramp_speed: Annotated[float, setting("of the fastest joint in a ramp", unit="rad/s", gt=0, le=2)] = 0.5
+    within: Annotated[
+        float, setting("of the start that each joint must be after the ramp in", unit="rad", gt=0, le=1)
+    ] = 0.2
     requests: Annotated[str | None, setting("folder of the requests and their answers", min_length=1)] = None
 
     def __post_init__(self) -> None:
-        """Refuse a robot that does not exist, and a sensor named twice."""
-        robot(self.robot)
+        """Refuse a robot that does not exist or cannot stand where it should, and a sensor named twice."""
+        check_base(self.body, floating=self.floating)
         if len(set(self.sensors)) != len(self.sensors):
             raise ConfigError("sensors", "names one twice", given=", ".join(self.sensors))
+
+    @property
+    def read_files(self) -> Mapping[str, Path]:
+        """What it is read from, by the setting that names it."""
+        return read_files(self.robot)
 
     @cached_property
     def body(self) -> Robot:
@@ -52,12 +62,9 @@ class ExternalRobot:
     @property
     def layout(self) -> Layout:
         """What an observation holds."""
-        joints = self.body.controlled
-        return Layout(
-            joints,
-            {"position": len(joints), "velocity": len(joints), **{name: _SIZES[name] for name in self.sensors}},
-            self.period,
-        )
+        joints, known = self.body.controlled, {**_SIZES, "foot_force": len(self.body.feet)}
+        told: dict[str, int] = {name: known[name] for name in self.sensors if known[name]}
+        return Layout(joints, {"position": len(joints), "velocity": len(joints), **told}, self.period)
 
     @property
     def limits(self) -> dict[str, Any]:

@@ -22,6 +22,11 @@ def check_periods(step: float, period: float) -> None:
         raise ConfigError("period", f"{period} s is not a multiple of the physics step {step} s")
 
 
+def fitting_step(step: float, period: float) -> float:
+    """Return the physics period nearest to `step` that divides the control period [s]."""
+    return period / max(1, round(period / step))
+
+
 def check_plant(plant: Plant, step: float, period: float) -> None:
     """Refuse a plant whose servos cannot be simulated.
 
