@@ -15,12 +15,13 @@ from robots_elsewhere import requested, run
 from gsl.config import build
 from gsl.core.described import described
 from gsl.core.seeds import grounding_generator
-from gsl.errors import ArtifactError, ConfigError
+from gsl.errors import ArtifactError, ConfigError, GslError
 from gsl.grounding.ane import ActionNoise
 from gsl.policies.excitation import Excitation
 from gsl.policies.policy import Policy, neighbour
 from gsl.policies.walk_engine import WalkEngine
 from gsl.runner import journal
+from gsl.runner.acting import Actor
 from gsl.runner.clock import Simulated
 from gsl.runner.episode import Player
 from gsl.runner.guard import Guard, ramp
@@ -251,7 +252,9 @@ def test_an_episode_broken_off_is_a_fall_if_a_person_says_so_and_else_nothing(
 
 
 def test_a_clock_that_is_real_keeps_the_rate(walk: Path, tmp_path: Path) -> None:
-    run(walk, _robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--yes", "--episode=one")
+    for _ in range(5):  # a machine that is busy may miss a tick, and then nothing is kept
+        if run(walk, _robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--yes", "--episode=one").returncode == 0:
+            break
     times = np.loadtxt(tmp_path / "answer.csv", delimiter=",", skiprows=2, usecols=2, dtype=float)
     assert len(times) == 31 and np.diff(times).min() > 0.0
     assert np.median(np.diff(times)) == pytest.approx(PERIOD, rel=0.1)
@@ -360,6 +363,20 @@ def test_a_tick_that_is_far_too_late_ends_the_episode(walk: Path) -> None:
     player.approach(episode)
     with pytest.raises(RobotError, match=r"one: at 0\.50 s a tick came 80 ms late; stopped and not kept"):
         player.play(episode)
+
+
+def test_an_episode_off_the_rate_is_not_kept(walk: Path, tmp_path: Path) -> None:
+    late = "import time\nreads, plain = 0, read\ndef read():\n    global reads\n    reads += 1\n"
+    word = _fails(tmp_path, late + "    time.sleep(0.038 * (reads == 20))\n    return plain()\n")
+    done = run(walk, word, f"--log={tmp_path / 'answer.csv'}", "--yes")
+    assert done.returncode == 2 and "not kept; run it again" in done.stdout
+    assert not (tmp_path / "answer.csv").exists()
+
+
+def test_a_policy_that_fails_is_told_in_one_line(walk: Path) -> None:
+    request = read_request(walk)
+    with pytest.raises(GslError, match="one: its policy failed: "):
+        Actor(request, {**request["episodes"][0], "parameters": [[0.0]]}).act(np.zeros(1))
 
 
 def test_the_guard_judges_speed_by_the_time_that_passed() -> None:
