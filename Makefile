@@ -31,11 +31,12 @@ xl330: $(INSTALLED)
 	$(GSL) diagnose real=xl330 sim=xl330_pendulum name=xl330 tolerance=0.0175
 	$(GSL) cross-validate real=xl330 sim=xl330_pendulum name=xl330 tolerance=0.0175 by=kp checks=values
 
+CHECKED := chirp_sweep, coupled_joints, hold_under_gravity, single_joint_rotation, single_joint_wrist_roll, \
+	staircase_motion, step_response, velocity_ramp
+
 so101: $(INSTALLED)
 	$(GSL) import mapping=so101_arm name=so101
-	$(GSL) diagnose real=so101 sim=so101 name=so101 'held_out={date: 2026-02-03}'
-	$(GSL) diagnose real=so101 sim=so101 name=so101_motions \
-		'held_out={motion: [chirp_sweep, coupled_joints, hold_under_gravity, single_joint_rotation, single_joint_wrist_roll, staircase_motion, step_response, velocity_ramp]}'
+	$(GSL) diagnose real=so101 sim=so101 name=so101 'held_out={motion: [$(CHECKED)]}'
 	$(GSL) cross-validate real=so101 sim=so101 name=so101 by=date
 
 go2: $(INSTALLED)

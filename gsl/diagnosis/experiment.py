@@ -118,7 +118,7 @@ def experiment(
             raise InputError("conditions of a trajectory are for logs in the air; leave them out of its label")
         return _on_ground(found, robot, period, held_out)
     warm_up, scored = round(WARM_UP / period), round(SCORED / period)
-    noise = noise_floor(_unchecked(found, held_out), robot.encoder_step)
+    noise = noise_floor(found, robot.encoder_step, held=labelled(found, held_out or {}))
     cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
     commands = cut.windows.commands[:, : warm_up + scored, : len(robot.controlled)]
     held, by_record = _held_out(found, cut, held_out)
@@ -133,7 +133,7 @@ def _on_ground(
     cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
     cut = cut.chosen(_spread(np.arange(len(cut)), WALKS))
     joints = np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
-    noise = noise_floor(_unchecked(found, held_out), robot.encoder_step, np.r_[joints, list(LEAST.values())])
+    noise = noise_floor(found, robot.encoder_step, np.r_[joints, list(LEAST.values())], labelled(found, held_out or {}))
     held, by_record = _held_out(found, cut, held_out)
     how = Comparison(noise.sd, np.zeros(len(noise.sd), dtype=bool), np.zeros(len(noise.sd)))
     return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
@@ -152,18 +152,14 @@ def _held_out(found: Sequence[Record], cut: Pieces, asked: Mapping[str, Any] | N
     return np.arange(len(cut)) % 2 == 1, False
 
 
-def _unchecked(found: Sequence[Record], asked: Mapping[str, Any] | None) -> Sequence[Record]:
-    """Return the records that the floor is of: what is held out by its label may differ from them and shall tell."""
-    held = labelled(found, asked) if asked else []
-    return [one for k, one in enumerate(found) if k not in held]
-
-
 def labelled(found: Sequence[Record], asked: Mapping[str, Any]) -> list[int]:
-    """Return the indices of the records that have some labels, each a value or one of several.
+    """Return the indices of the records that have some labels, each a value or one of several; none without labels.
 
     Raises:
         InputError: None of them has, or every one.
     """
+    if not asked:
+        return []
     wanted = {key: value if isinstance(value, list | tuple) else [value] for key, value in asked.items()}
     chosen = [
         k

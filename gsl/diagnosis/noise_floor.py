@@ -45,16 +45,20 @@ class NoiseFloor:
         return float(2.0 * np.sqrt(2.0 / max(self.samples, 1)))
 
 
-def noise_floor(found: Sequence[Record], resolution: float, least: np.ndarray | None = None) -> NoiseFloor:
+def noise_floor(
+    found: Sequence[Record], resolution: float, least: np.ndarray | None = None, held: Sequence[int] = ()
+) -> NoiseFloor:
     """Measure the floor.
 
     Args:
         found: All records.
         resolution: Of the encoders [rad]; the floor is at least what rounding makes, resolution / sqrt(12).
         least: Least floor of each channel instead, shape (n_channels,).
+        held: Indices of records that are held out by a label; they are no repeats of the others, whose difference from
+            them is to show.
     """
     least = np.array(max(resolution / np.sqrt(12.0), 1e-5)) if least is None else least
-    groups = [group for group in _repeats(found) if len(group) > 1]
+    groups = [group for group in _repeats(found, held) if len(group) > 1]
     if groups:
         spread = [np.array([one.measured[SETTLED:] for one in group]) for group in groups]
         square, slow = _variance(spread), _variance([in_blocks(part).mean(axis=2) for part in spread])
@@ -80,11 +84,12 @@ def in_blocks(x: np.ndarray) -> np.ndarray:
     return x[:, : rows * MEAN].reshape(len(x), rows, MEAN, -1)
 
 
-def _repeats(found: Sequence[Record]) -> list[list[Record]]:
+def _repeats(found: Sequence[Record], held: Sequence[int]) -> list[list[Record]]:
     groups: dict[bytes, list[Record]] = defaultdict(list)
-    for one in found:
+    for index, one in enumerate(found):
         if len(one) > 2 * SETTLED:
-            groups[np.round(one.targets, 6).tobytes() + repr(one.conditions).encode()].append(one)
+            apart = repr((one.conditions, index in held)).encode()
+            groups[np.round(one.targets, 6).tobytes() + apart].append(one)
     return list(groups.values())
 
 
