@@ -217,6 +217,12 @@ def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
     assert "in 18 of 18 trajectories" in (folder / "table.md").read_text()
     said = refused("cross-validate", "real=logs.parquet", *LINE[:-1], "by=date", folder=tmp_path)
     assert said == "by = date: needs a label with two values at least; the log's labels: gain, policy"
+    for usual, line in (
+        ("[ground_friction]", "ground_friction: is no effect of all joints"),
+        ("[]", "names at least one"),
+    ):
+        said = refused("cross-validate", "real=logs.parquet", *LINE, f"usual={usual}", folder=tmp_path)
+        assert said.startswith("usual") and line in said
 
 
 def test_what_is_held_out_changes_nothing_of_its_diagnosis(tmp_path: Path) -> None:

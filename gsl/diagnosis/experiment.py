@@ -116,33 +116,32 @@ def experiment(
     if walking:
         if any(one.conditions for one in found):
             raise InputError("conditions of a trajectory are for logs in the air; leave them out of its label")
-        return _on_ground(found, robot, period, held_out)
+        return _on_ground(found, robot, period, labelled(found, held_out or {}))
     warm_up, scored = round(WARM_UP / period), round(SCORED / period)
-    noise = noise_floor(found, robot.encoder_step, held=labelled(found, held_out or {}))
+    asked = labelled(found, held_out or {})
+    noise = noise_floor(found, robot.encoder_step, held=asked)
     cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
     commands = cut.windows.commands[:, : warm_up + scored, : len(robot.controlled)]
-    held, by_record = _held_out(found, cut, held_out)
+    held, by_record = _held_out(found, cut, asked)
     how = comparison(cut, noise, np.ptp(commands, axis=1) < STILL)
     return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
 
 
-def _on_ground(
-    found: tuple[Record, ...], robot: Robot, period: float, held_out: Mapping[str, Any] | None
-) -> Experiment:
+def _on_ground(found: tuple[Record, ...], robot: Robot, period: float, asked: Sequence[int]) -> Experiment:
     warm_up, scored = (round(part / period) for part in ON_GROUND)
     cut = pieces(found, robot, period, warm_up=warm_up, scored=scored)
     cut = cut.chosen(_spread(np.arange(len(cut)), WALKS))
     joints = np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
-    noise = noise_floor(found, robot.encoder_step, np.r_[joints, list(LEAST.values())], labelled(found, held_out or {}))
-    held, by_record = _held_out(found, cut, held_out)
+    noise = noise_floor(found, robot.encoder_step, np.r_[joints, list(LEAST.values())], asked)
+    held, by_record = _held_out(found, cut, asked)
     how = Comparison(noise.sd, np.zeros(len(noise.sd), dtype=bool), np.zeros(len(noise.sd)))
     return Experiment(robot, found, cut, noise, how, np.flatnonzero(~held), np.flatnonzero(held), period, by_record)
 
 
-def _held_out(found: Sequence[Record], cut: Pieces, asked: Mapping[str, Any] | None) -> tuple[np.ndarray, bool]:
+def _held_out(found: Sequence[Record], cut: Pieces, asked: Sequence[int]) -> tuple[np.ndarray, bool]:
     """Hold out what is asked for, else every second motion in the order of the names; repeats stay together."""
     if asked:
-        return np.isin(cut.record, labelled(found, asked)), True
+        return np.isin(cut.record, asked), True
     motions: dict[bytes, list[int]] = {}
     for index in sorted(range(len(found)), key=lambda k: (found[k].name, k)):
         motions.setdefault(np.round(found[index].targets, 6).tobytes(), []).append(index)

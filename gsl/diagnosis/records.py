@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -192,7 +193,7 @@ class Pieces:
         windows = type(self.windows)(*(part[index] for part in self.windows))
         return Pieces(windows, self.real[index], self.record[index], self.tick[index], self.warm_up, self.conditions)
 
-    @property
+    @cached_property
     def alike(self) -> list[tuple[Mapping[str, Any], np.ndarray]]:
         """Windows by what is known of them: these effects, and indices, shape (n,)."""
         if not self.conditions:

@@ -10,15 +10,14 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from gsl.core.body import lumped
-from gsl.core.interruption import checkpoint
+from gsl.core.labels import alike
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Hypothesis
+from gsl.diagnosis.candidates import library
 from gsl.diagnosis.diagnose import Findings, diagnosed, prepared
-from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import Experiment
-from gsl.diagnosis.fit import Fit
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.records import Record
 from gsl.diagnosis.shrinkage import ceiling, removed
@@ -26,7 +25,8 @@ from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import effect_class
 from gsl.errors import ConfigError, InputError
 from gsl.report.cross_validation import AS_IT_WAS, CALIBRATED, DIAGNOSED, Fold, table
-from gsl.stages.logs import check_log, log_files, on_ground, read_logs, synchronised
+from gsl.stages.diagnosis_settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
+from gsl.stages.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
 from gsl.stages.population import Workers, threads
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
@@ -57,35 +57,29 @@ class CrossValidate:
     checks: Annotated[
         Literal["motions", "values"], setting("what a diagnosis checks its hypotheses on: motions, or the next value")
     ] = "motions"
-    without: Annotated[tuple[str, ...], setting("effects that are left out of the library")] = ()
-    clocks: Annotated[
-        Literal["synchronised", "unsynchronised"] | None,
-        setting(
-            "whether commands and measurements share a clock, else no latency is claimed; what the log says if null"
-        ),
-    ] = None
-    most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
-    duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
-    nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
-    tolerance: Annotated[
-        float, setting("difference of a joint that does not matter, beside the noise", unit="rad", ge=0)
-    ] = 0.0
+    without: Without = ()
+    clocks: Clocks = None
+    most: Most = 4
+    duels: Duels = 2
+    nulls: Nulls = 3
+    tolerance: Tolerance = 0.0
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def __post_init__(self) -> None:
-        """Refuse effects that do not exist, or that are to be left out."""
+        """Refuse what cannot be fitted to all joints, or is to be left out."""
         if not self.usual:
             raise ConfigError("usual", "names at least one effect to compare with")
+        everywhere = {one.effect for one in library(lumped(self.sim.plant.robot)) if one.on_joints}
         for name in self.usual:
             effect_class(name)
-            if name in self.without:
-                raise ConfigError("usual", "is left out of the library by without=", given=name)
+            if name in self.without or name not in everywhere:
+                why = "is left out by without=" if name in self.without else "is no effect of all joints"
+                raise ConfigError("usual", why, given=name)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""
-        files = log_files(self.real)
-        return {"real" if len(files) == 1 else f"real.{k}": path for k, path in enumerate(files)}
+        return log_parents(real=self.real)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the table and every fold."""
@@ -93,6 +87,8 @@ class CrossValidate:
         check_log(log, lumped(self.sim.plant.robot), self.real)
         if on_ground(log):
             raise InputError(f"{self.real}: whole replays are for logs in the air")
+        if caveat := other_clocks(log, self.clocks):
+            console.status(f"warning: {caveat}")
         values = self._values(log)
         after = [*values[1:], values[0]] if self.checks == "values" and len(values) > 2 else [None] * len(values)
         folds = [self._fold(log, *pair, console) for pair in zip(values, after, strict=True)]
@@ -103,7 +99,10 @@ class CrossValidate:
 
     def _values(self, log: Batch) -> list[Any]:
         labels = log.metadata.get("episodes") or []
-        found = list(dict.fromkeys(one[self.by] for one in labels if isinstance(one.get(self.by), SINGLE)))
+        found: list[Any] = []
+        for one in labels:
+            if isinstance(value := one.get(self.by), SINGLE) and not any(alike(value, other) for other in found):
+                found.append(value)
         if len(found) < 2:
             known = ", ".join(sorted({key for one in labels for key in one if isinstance(one[key], SINGLE)}))
             known = known or "there are none"
@@ -119,21 +118,18 @@ class CrossValidate:
             seed=self.seed, tolerance=self.tolerance, held_out={} if inner is None else {self.by: inner},
         )  # fmt: skip
         plant, robot = self.sim.plant, lumped(self.sim.plant.robot)
-        found = diagnosed(self._rest(log, value), robot, plant, self.sim.step, options, lambda phase: checkpoint())
-        exp = prepared(log, robot, replace(options, held_out={self.by: value}))
-        before, after = (
-            found.simulator.told(one.effects, one.fit.nuisances, exp.pieces)
-            for one in (replace(found.selection.none, fit=_untouched(found)), found.selection.chosen)
-        )
-        z = [exp.comparison.residual(told, exp.pieces) for told in (before, after)]
-        told = document(found)
-        console.status(f"{self.by} {value}: {told['summary']}")
+        found = diagnosed(self._rest(log, value), robot, plant, self.sim.step, options, Telling(console))
+        exp, chosen = prepared(log, robot, replace(options, held_out={self.by: value})), found.selection.chosen
+        before = found.simulator.told({}, nuisance.none(len(exp.joints)), exp.pieces)
+        after = found.simulator.told(chosen.effects, chosen.fit.nuisances, exp.pieces)
+        causes = [chosen.names[one.index] for one in found.verdict.causes]
+        console.status(f"{self.by} {value}: {' '.join([found.verdict.word, *causes])}")
         return Fold(
             value=value,
-            verdict=told["verdict"],
-            causes=[one["effect"] for one in told["causes"] or told["suspects"]],
-            parameters=found.selection.chosen.effects,
-            removed=removed(exp, *z)[0],
+            verdict=found.verdict.word,
+            causes=causes,
+            parameters=chosen.effects,
+            removed=removed(exp, *(exp.comparison.residual(told, exp.pieces) for told in (before, after)))[0],
             ceiling=ceiling(exp, before, seed=self.seed),
             names=[one.name for one in _checked(exp)],
             errors=self._errors(found, _checked(exp)),
@@ -141,7 +137,7 @@ class CrossValidate:
 
     def _rest(self, log: Batch, value: Any) -> Batch:
         labels = log.metadata["episodes"]
-        kept = [k for k, one in enumerate(labels) if one.get(self.by) != value]
+        kept = [k for k, one in enumerate(labels) if not alike(one.get(self.by), value)]
         about = {**log.metadata, "episodes": [labels[k] for k in kept]}
         return replace(log, episodes=tuple(log.episodes[k] for k in kept), metadata=about)
 
@@ -164,17 +160,11 @@ def _checked(exp: Experiment) -> list[Record]:
     return [exp.records[k] for k in np.unique(exp.pieces.record[exp.held_out])]
 
 
-def _untouched(found: Findings) -> Fit:
-    """Return the calibration of the simulator as it was: none."""
-    return replace(found.selection.none.fit, nuisances=nuisance.none(len(found.experiment.joints)))
-
-
 def _usual(found: Findings, effects: Sequence[str]) -> Hypothesis:
     """Return these effects on all joints, fitted together as a diagnosis fits a hypothesis."""
     arena = found.arena
-    chosen = tuple(
-        next(one for one in arena.library if one.effect == name and one.scope in ("all", "")) for name in effects
-    )
+    everywhere = {one.effect: one for one in library(found.experiment.robot) if one.on_joints}
+    chosen = tuple(everywhere[name] for name in effects)
     start = [one.neutral + SLIGHT * (one.documented[1] - one.neutral) for one in chosen]
     return arena.fitted(chosen, np.concatenate(start), nuisance.none(arena.train.joints), every=1, rounds=8)
 

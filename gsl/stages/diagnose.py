@@ -7,13 +7,12 @@ import time
 from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 import yaml
 
 from gsl.core.body import lumped
 from gsl.core.described import described
-from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import Findings, diagnosed
@@ -24,15 +23,14 @@ from gsl.diagnosis.world_file import diagnosed_effects, joined
 from gsl.errors import InputError
 from gsl.report.diagnosis import report_html
 from gsl.stages.diagnosis_files import PAGE, REPORT, WORLD, report_of
+from gsl.stages.diagnosis_settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
 from gsl.stages.experiment_file import write_next_experiment
-from gsl.stages.logs import check_log, log_files, on_ground, other_clocks, read_logs, synchronised
+from gsl.stages.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
 from gsl.stages.policy_gap import Effort, policy_gap
 from gsl.stages.population import Workers, threads
 from gsl.stages.real_returns import RealReturns, measured_parents, real_returns
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
-
-QUIET = 15.0  # of a phase that takes long [s]
 
 
 @component
@@ -50,20 +48,13 @@ class Diagnose:
         str | None, setting("policies with real returns, of evaluate or iterate, to be simulated before and after")
     ] = None
     episodes: Annotated[int, setting("simulated episodes of each of these policies", ge=1)] = 5
-    without: Annotated[tuple[str, ...], setting("effects that are left out of the library")] = ()
-    clocks: Annotated[
-        Literal["synchronised", "unsynchronised"] | None,
-        setting(
-            "whether commands and measurements share a clock, else no latency is claimed; what the log says if null"
-        ),
-    ] = None
-    most: Annotated[int, setting("effects at once, at most; parted over groups it counts once", ge=1, le=6)] = 4
-    duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
-    nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
+    without: Without = ()
+    clocks: Clocks = None
+    most: Most = 4
+    duels: Duels = 2
+    nulls: Nulls = 3
     workers: Workers = -1
-    tolerance: Annotated[
-        float, setting("difference of a joint that does not matter, beside the noise", unit="rad", ge=0)
-    ] = 0.0
+    tolerance: Tolerance = 0.0
     held_out: Annotated[
         Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
     ] = field(default_factory=dict)
@@ -72,12 +63,8 @@ class Diagnose:
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""
-        named = {"real": self.real, **({"reference": self.reference} if self.reference else {})}
-        found: dict[str, Path] = {}
-        for role, reference in named.items():
-            files = log_files(reference)
-            found |= {role if len(files) == 1 else f"{role}.{k}": path for k, path in enumerate(files)}
-        return found | (measured_parents(self.policies) if self.policies else {})
+        logs = log_parents(real=self.real, reference=self.reference)
+        return {**logs, **(measured_parents(self.policies) if self.policies else {})}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write report.json, report.html, the diagnosed world and the next experiment."""
@@ -97,7 +84,7 @@ class Diagnose:
             self.sim.plant,
             self.sim.step,
             self._options(logs["real"]),
-            _Telling(console),
+            Telling(console),
             reference=logs.get("reference"),
             walking=on_ground(logs["real"]),
         )
@@ -122,19 +109,10 @@ class Diagnose:
         return f"The log says that it is of the robot {said}, the simulator is {ours}: only the joints' names agree."
 
     def _options(self, batch: Batch) -> Options:
-        clocks = synchronised(batch, self.clocks)
-        workers = threads(self.workers)
         return Options(
-            self.without,
-            self.most,
-            self.duels,
-            self.nulls,
-            workers,
-            clocks,
-            seed=self.seed,
-            tolerance=self.tolerance,
-            held_out=self.held_out,
-        )
+            self.without, self.most, self.duels, self.nulls, threads(self.workers), synchronised(batch, self.clocks),
+            seed=self.seed, tolerance=self.tolerance, held_out=self.held_out,
+        )  # fmt: skip
 
     def _policy_gap(self, measured: RealReturns, found: Findings, console: Any) -> Mapping[str, Any]:
         effort = Effort(self.episodes, threads(self.workers), self.seed)
@@ -214,23 +192,3 @@ class Diagnose:
 def _typed(value: Any) -> str:
     """Return a value, or several, as it is typed."""
     return f"[{', '.join(map(str, value))}]" if isinstance(value, list | tuple) else str(value)
-
-
-class _Telling:
-    """Says a phase when it begins, and now and then how long it has been at it; nothing goes on after a Ctrl-C."""
-
-    def __init__(self, console: Any) -> None:
-        self._console, self._phase, self._fits = console, "", 0
-        self._begun = self._said = time.monotonic()
-
-    def __call__(self, phase: str) -> None:
-        now = time.monotonic()
-        if phase:
-            self._console.status(phase)
-            self._phase, self._fits, self._begun, self._said = phase, 0, now, now
-            return
-        checkpoint()
-        self._fits += 1
-        if now - self._said > QUIET:
-            self._console.status(f"{self._phase}: {self._fits} fits in {now - self._begun:.0f} s")
-            self._said = now

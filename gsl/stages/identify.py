@@ -23,7 +23,8 @@ from gsl.diagnosis.replay import Bench, Effects
 from gsl.diagnosis.world_file import joined
 from gsl.errors import GslError
 from gsl.stages.diagnosis_files import REPORT
-from gsl.stages.logs import check_log, log_files, on_ground, read_logs
+from gsl.stages.diagnosis_settings import Without
+from gsl.stages.logs import check_log, log_parents, on_ground, read_logs
 from gsl.stages.population import Workers, threads
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
@@ -42,15 +43,14 @@ class Identify:
 
     real: Annotated[str, setting("trajectories in the air: a run, a parquet file or a folder of them", min_length=1)]
     sim: Annotated[BulletWorld, setting("the simulator that is fitted to them")]
-    without: Annotated[tuple[str, ...], setting("effects that are left out of the library")] = ()
+    without: Without = ()
     evaluations: Annotated[int, setting("replays of the log that the fit may take", ge=16)] = 4800
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""
-        files = log_files(self.real)
-        return {"real" if len(files) == 1 else f"real.{k}": path for k, path in enumerate(files)}
+        return log_parents(real=self.real)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write report.json and the identified world."""

@@ -35,6 +35,17 @@ def log_files(reference: str) -> list[Path]:
     return [data_file(reference)]
 
 
+def log_parents(**references: str | None) -> dict[str, Path]:
+    """Return the files that references stand for, by role and, where one stands for several, number."""
+    return {
+        role if len(files) == 1 else f"{role}.{k}": path
+        for role, reference in references.items()
+        if reference
+        for files in [log_files(reference)]
+        for k, path in enumerate(files)
+    }
+
+
 def read_logs(reference: str) -> Batch:
     """Return the trajectories of all files as one batch.
 

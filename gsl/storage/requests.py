@@ -39,12 +39,12 @@ def read():
     More if you have it: "base.position" (3), "base.orientation" (x, y, z, w), "base.velocity" (3), "acceleration" (3),
     "torque", "temperature" (one a joint), "voltage"; "fell": True once the robot lies down, which ends the episode.
     """
-    raise NotImplementedError
+    raise RuntimeError("it is still to be filled in, for your robot")
 
 
 def send(targets):
     """Hand desired joint positions [rad] to the servos, joints in the order of request.json; return at once."""
-    raise NotImplementedError
+    raise RuntimeError("it is still to be filled in, for your robot")
 
 
 # def begin(episode): called when the robot stands at the start, just before the first step
