@@ -20,12 +20,19 @@ from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.nuisance import none
 from gsl.diagnosis.records import records
+from gsl.diagnosis.replay import InTheAir
 from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import names
-from gsl.errors import InputError
+from gsl.errors import GslError, InputError
+from gsl.grounding.gat import LoadedTransformation
+from gsl.models.config import ModelConfig
+from gsl.models.forward import ForwardModel
+from gsl.models.inverse import Solver
 from gsl.report.cross_validation import AS_IT_WAS, DIAGNOSED, Fold, table
+from gsl.stages.learned_replay import LearnedReplay, Simulated
 from gsl.stages.logs import other_clocks, read_logs, synchronised
 from gsl.storage.trajectories import write
+from gsl.worlds.bullet import BulletWorld
 
 SOFT = {"servo_gain": {"kp": 0.5}}
 
@@ -179,16 +186,17 @@ def test_a_log_says_whether_its_clocks_are_apart_and_the_command_line_wins(tmp_p
 
 def test_a_table_says_what_it_leaves_out_of_its_means() -> None:
     errors = {AS_IT_WAS: [0.004, 0.006, np.nan], "usual": [0.002, 0.002, np.nan], DIAGNOSED: [0.001, np.nan, np.nan]}
-    fold = Fold(1, "causes", ["backlash"], {}, 0.5, None, ["a", "b", "c"], errors)
-    told = table([fold, replace(fold, value=2, errors=dict.fromkeys(errors, [np.nan] * 3))], "day")
+    fold = Fold([1], "causes", ["backlash"], {}, 0.5, None, ["a", "b", "c"], errors)
+    told = table([fold, replace(fold, values=[2, 3], errors=dict.fromkeys(errors, [np.nan] * 3))], "day")
     assert "nan" not in told
-    assert "| 4.0 " in told and "in 1 of 1 trajectories" in told
+    assert "| 4.0 " in told and "| 2, 3 " in told and "in 1 of 1 trajectories" in told
     assert "5 of 6 trajectories are in no mean" in told
     assert "(as it was 4, usual 4, diagnosed 5; 4 in every replay)" in told
 
 
 CAUSE = {"command_latency": {"delay": 0.016}}
 LINE = ("sim.robot=blind_arm.arm", "sim.floating=false", "most=1", "nulls=0", "duels=0", "workers=1", "by=gain")
+LINEAR = "gat.forward.family=linear"
 SMALL = f"without=[{','.join(sorted(set(names()) - {'command_latency', 'coulomb_friction', 'viscous_friction'}))}]"
 
 
@@ -205,15 +213,15 @@ def folds(folder: Path) -> list[dict[str, Any]]:
 
 def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
     written(both(**CAUSE), tmp_path / "logs.parquet")
-    done("cross-validate", "real=logs.parquet", *LINE, SMALL, "name=c", folder=tmp_path)
+    done("cross-validate", "real=logs.parquet", *LINE, SMALL, "name=c", LINEAR, folder=tmp_path)
     folder = tmp_path / "runs/c/cross_validate"
-    assert [one["value"] for one in folds(folder)] == [0.5, 1.0]
+    assert [one["values"] for one in folds(folder)] == [[0.5], [1.0]]
     assert all(one["causes"] == ["command_latency"] for one in folds(folder))
     for one in folds(folder):
         errors = {way: np.mean(values) for way, values in one["errors"].items()}
         assert errors["diagnosed"] < 0.3 * errors["coulomb + viscous"]
         assert errors["diagnosed"] < 0.3 * errors["as it was"]
-        assert len(one["names"]) == 9
+        assert len(one["names"]) == len(one["errors"]["GAT"]) == len(one["errors"]["diagnosed + GAT"]) == 9
     assert "in 18 of 18 trajectories" in (folder / "table.md").read_text()
     said = refused("cross-validate", "real=logs.parquet", *LINE[:-1], "by=date", folder=tmp_path)
     assert said == "by = date: needs a label with two values at least; the log's labels: gain, policy"
@@ -223,6 +231,55 @@ def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
     ):
         said = refused("cross-validate", "real=logs.parquet", *LINE, f"usual={usual}", folder=tmp_path)
         assert said.startswith("usual") and line in said
+    said = refused("cross-validate", "real=logs.parquet", *LINE, "folds=3", folder=tmp_path)
+    assert said == "folds = 3: the label gain has 2 values"
+
+
+def test_values_are_held_out_in_groups(tmp_path: Path) -> None:
+    written(log(CAUSE, jitter=0.0), tmp_path / "logs.parquet")
+    by_motion = ("by=policy", "folds=2", "gat=null", "name=g")
+    done("cross-validate", "real=logs.parquet", *LINE[:-1], SMALL, *by_motion, folder=tmp_path)
+    first, second = folds(tmp_path / "runs/g/cross_validate")
+    assert first["values"] == ["chirp_a", "poses_a", "steps_a", "triangle_a"]
+    assert sorted(first["names"]) == ["chirp_a", "poses_a", "steps_a", "steps_a", "triangle_a"]
+    assert second["values"] == ["chirp_b", "poses_b", "steps_b", "triangle_b"]
+
+
+def learning() -> LearnedReplay:
+    return LearnedReplay(forward=ModelConfig(family="linear"), inverse=ModelConfig(family="linear"))
+
+
+def world() -> BulletWorld:
+    return BulletWorld(robot="test_diagnosis.arm", effects={}, floating=False)
+
+
+def test_a_grounding_that_does_nothing_replays_as_the_chain_does() -> None:
+    made = both(**CAUSE)
+    found, simulator = records(made, arm()), InTheAir(nominal(arm()), 0.002, PERIOD)
+    forward = learning().learned(found, arm().controlled, PERIOD, 1)
+    assert isinstance(forward, ForwardModel)
+    nothing = LoadedTransformation(forward, Solver(forward, np.eye(2), 0.5), alpha=0.0)
+    simulated = Simulated(world(), simulator, arm(), {"coulomb_friction": {"torque": 0.05}}, none(2) + 0.01)
+    for one in (found[0], found[-1]):
+        other = mean_errors(simulator, simulated.effects, simulated.nuisances, [one], arm())
+        assert simulated.replayed(one, nothing, 1) == pytest.approx(other.mean(), rel=1e-3)
+
+
+def test_a_learned_grounding_brings_replays_nearer_to_a_late_robot() -> None:
+    made = log({"command_latency": {"delay": 0.04}}, jitter=0.0)
+    found = records(made, arm())
+    train, held = found[:6], found[6:]
+    simulator = InTheAir(nominal(arm()), 0.002, PERIOD)
+    simulated = Simulated(world(), simulator, arm(), {}, none(2))
+    forward = learning().learned(train, arm().controlled, PERIOD, 1)
+    errors = learning().errors(simulated, forward, train, held, 1)
+    assert np.mean(errors) < 0.8 * mean_errors(simulator, {}, none(2), held, arm()).mean()
+
+
+def test_too_few_trajectories_teach_no_grounding() -> None:
+    found = records(log({}), arm())[:2]
+    with pytest.raises(GslError, match="GAT needs 3 trajectories to learn from, here are 2; gat=null leaves it out"):
+        learning().learned(found, arm().controlled, PERIOD, 1)
 
 
 def test_what_is_held_out_changes_nothing_of_its_diagnosis(tmp_path: Path) -> None:
@@ -230,8 +287,9 @@ def test_what_is_held_out_changes_nothing_of_its_diagnosis(tmp_path: Path) -> No
     for name, other in (("a", CAUSE), ("b", {"coulomb_friction": {"torque": 0.3}})):
         soft = labelled(log({**other, **SOFT}, jitter=0.0), gain=0.5, conditions=SOFT)
         written(joined(stiff, soft), tmp_path / f"{name}.parquet")
-        done("cross-validate", f"real={name}.parquet", *LINE, SMALL, f"name={name}", folder=tmp_path)
+        line = (f"real={name}.parquet", *LINE, SMALL, "gat=null", f"name={name}")
+        done("cross-validate", *line, folder=tmp_path)
     first, second = (folds(tmp_path / f"runs/{name}/cross_validate")[0] for name in "ab")
-    assert first["value"] == second["value"] == 0.5
+    assert first["values"] == second["values"] == [0.5]
     assert first["parameters"] == second["parameters"]
     assert first["errors"] != second["errors"]

@@ -30,7 +30,7 @@ def mean_errors(
         robot: Theirs.
     """
     errors = []
-    for one in map(_driven, found):
+    for one in map(driven, found):
         if not len(one):
             errors.append(np.full(one.position.shape[1], np.nan))
             continue
@@ -40,7 +40,7 @@ def mean_errors(
     return np.array(errors)
 
 
-def _driven(one: Record) -> Record:
+def driven(one: Record) -> Record:
     """Return a trajectory from where its torque is first on to where it is switched off; maybe of no control period."""
     works = one.driven[: len(one)]
     first = int(np.argmax(works)) if works.any() else len(one)

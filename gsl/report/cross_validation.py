@@ -12,14 +12,15 @@ from gsl.core.statistics import Interval, bootstrap_interval
 from gsl.report.markdown import table as markdown
 
 AS_IT_WAS, CALIBRATED, DIAGNOSED = "as it was", "calibrated", "diagnosed"
+GAT, DIAGNOSED_GAT = "GAT", "diagnosed + GAT"
 
 
 @dataclass(frozen=True)
 class Fold:
-    """What came of holding out one value of a label.
+    """What came of holding out one or more values of a label.
 
     Attributes:
-        value: Of the label.
+        values: Of the label.
         verdict: Of the diagnosis of the rest.
         causes: Named, or suspected where nothing may be named.
         parameters: Of these, as a world's `effects:`.
@@ -30,7 +31,7 @@ class Fold:
             or where the torque is never on.
     """
 
-    value: Any
+    values: Sequence[Any]
     verdict: str
     causes: Sequence[str]
     parameters: Mapping[str, Any]
@@ -38,6 +39,11 @@ class Fold:
     ceiling: float | None
     names: Sequence[str]
     errors: Mapping[str, Sequence[float]]
+
+    @property
+    def held_out(self) -> str:
+        """What was held out, in words."""
+        return ", ".join(map(str, self.values))
 
     @property
     def replayed(self) -> Mapping[str, np.ndarray]:
@@ -57,7 +63,7 @@ def table(folds: Sequence[Fold], by: str) -> str:
     columns = (f"{by} held out", *(f"{way} [mrad]" for way in ways), "excess removed", "learned residual", "causes")
     rows = [
         (
-            str(one.value),
+            one.held_out,
             *(_mean(one.replayed[way]) for way in ways),
             _percent(one.removed),
             _percent(one.ceiling),
@@ -88,7 +94,9 @@ def _compared(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterato
     after = every[DIAGNOSED]
     if not len(after):
         return
-    rival = min((way for way in every if way != DIAGNOSED), key=lambda way: float(np.mean(every[way])))
+    rival = min(
+        (way for way in every if way not in (DIAGNOSED, DIAGNOSED_GAT)), key=lambda way: float(np.mean(every[way]))
+    )
     change = _change([one for one in folds if len(one.replayed[rival])], rival)
     yield (
         f"The diagnosed simulator's mean error against the best of the others ({rival}): {100.0 * change.mean:+.0f} % "

@@ -24,8 +24,9 @@ from gsl.diagnosis.shrinkage import ceiling, removed
 from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import effect_class
 from gsl.errors import ConfigError, InputError
-from gsl.report.cross_validation import AS_IT_WAS, CALIBRATED, DIAGNOSED, Fold, table
+from gsl.report.cross_validation import AS_IT_WAS, CALIBRATED, DIAGNOSED, DIAGNOSED_GAT, GAT, Fold, table
 from gsl.stages.diagnosis_settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
+from gsl.stages.learned_replay import LearnedReplay, Simulated
 from gsl.stages.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
 from gsl.stages.population import Workers, threads
 from gsl.storage import documents
@@ -42,7 +43,8 @@ class CrossValidate:
 
     A diagnosis checks its hypotheses on every second motion of what is left: right where values are repeats, such as
     dates, which make the floor. Where they are conditions that a cause shall hold for, such as gains, it checks them on
-    the next value. Beside it stand the simulator as it was, calibrated, and with some usual effects fitted alone.
+    the next value. Beside it stand the simulator as it was, calibrated, with some usual effects fitted alone, and with
+    a grounding by actions, which learns from the same trajectories, in front of it as it was and as it was diagnosed.
     """
 
     kind: ClassVar[str] = "cross_validate"
@@ -58,6 +60,12 @@ class CrossValidate:
         Literal["motions", "values"], setting("what a diagnosis checks its hypotheses on: motions, or the next value")
     ] = "motions"
     without: Without = ()
+    gat: Annotated[
+        LearnedReplay | None, setting("a grounding by actions that learns from the same logs; none leaves it out")
+    ] = None
+    folds: Annotated[
+        int | None, setting("groups that the values are held out in; none holds out one value after the other", ge=2)
+    ] = None
     clocks: Clocks = None
     most: Most = 4
     duels: Duels = 2
@@ -89,13 +97,22 @@ class CrossValidate:
             raise InputError(f"{self.real}: whole replays are for logs in the air")
         if caveat := other_clocks(log, self.clocks):
             console.status(f"warning: {caveat}")
-        values = self._values(log)
-        after = [*values[1:], values[0]] if self.checks == "values" and len(values) > 2 else [None] * len(values)
-        folds = [self._fold(log, *pair, console) for pair in zip(values, after, strict=True)]
+        groups = self._groups(log)
+        after = [*groups[1:], groups[0]] if self.checks == "values" and len(groups) > 2 else [[]] * len(groups)
+        folds = [self._fold(log, *pair, console) for pair in zip(groups, after, strict=True)]
         documents.write_json(folder / DATA, [one.told() for one in folds])
         (folder / TABLE).write_text(table(folds, self.by), encoding="utf-8")
         means = {way: float(np.mean(np.concatenate([one.replayed[way] for one in folds]))) for way in folds[0].errors}
-        return {"folds": len(folds), "mean_error": means, "causes": {str(one.value): one.causes for one in folds}}
+        return {"folds": len(folds), "mean_error": means, "causes": {one.held_out: one.causes for one in folds}}
+
+    def _groups(self, log: Batch) -> list[list[Any]]:
+        """Return what is held out together: each value alone, or every so many'th of them in order."""
+        values = self._values(log)
+        if self.folds is None:
+            return [[value] for value in values]
+        if self.folds > len(values):
+            raise ConfigError("folds", f"the label {self.by} has {len(values)} values", given=str(self.folds))
+        return [values[k :: self.folds] for k in range(self.folds)]
 
     def _values(self, log: Batch) -> list[Any]:
         labels = log.metadata.get("episodes") or []
@@ -110,34 +127,35 @@ class CrossValidate:
             raise ConfigError("by", problem, given=self.by)
         return sorted(found, key=lambda value: (str(type(value)), value))
 
-    def _fold(self, log: Batch, value: Any, inner: Any, console: Any) -> Fold:
-        """Diagnose the trajectories without a value, which know nothing of the others; these are looked at once."""
-        console.status(f"{self.by} {value} is held out")
+    def _fold(self, log: Batch, values: list[Any], inner: list[Any], console: Any) -> Fold:
+        """Diagnose the trajectories without some values, which know nothing of the others; these are looked at once."""
+        told = f"{self.by} {', '.join(map(str, values))}"
+        console.status(f"{told} is held out")
         options = Options(
             self.without, self.most, self.duels, self.nulls, threads(self.workers), synchronised(log, self.clocks),
-            seed=self.seed, tolerance=self.tolerance, held_out={} if inner is None else {self.by: inner},
+            seed=self.seed, tolerance=self.tolerance, held_out={self.by: inner} if inner else {},
         )  # fmt: skip
         plant, robot = self.sim.plant, lumped(self.sim.plant.robot)
-        found = diagnosed(self._rest(log, value), robot, plant, self.sim.step, options, Telling(console))
-        exp, chosen = prepared(log, robot, replace(options, held_out={self.by: value})), found.selection.chosen
+        found = diagnosed(self._rest(log, values), robot, plant, self.sim.step, options, Telling(console))
+        exp, chosen = prepared(log, robot, replace(options, held_out={self.by: values})), found.selection.chosen
         before = found.simulator.told({}, nuisance.none(len(exp.joints)), exp.pieces)
         after = found.simulator.told(chosen.effects, chosen.fit.nuisances, exp.pieces)
         causes = [chosen.names[one.index] for one in found.verdict.causes]
-        console.status(f"{self.by} {value}: {' '.join([found.verdict.word, *causes])}")
+        console.status(f"{told}: {' '.join([found.verdict.word, *causes])}")
         return Fold(
-            value=value,
+            values=values,
             verdict=found.verdict.word,
             causes=causes,
             parameters=chosen.effects,
-            removed=removed(exp, *(exp.comparison.residual(told, exp.pieces) for told in (before, after)))[0],
+            removed=removed(exp, *(exp.comparison.residual(one, exp.pieces) for one in (before, after)))[0],
             ceiling=ceiling(exp, before, seed=self.seed),
             names=[one.name for one in _checked(exp)],
             errors=self._errors(found, _checked(exp)),
         )
 
-    def _rest(self, log: Batch, value: Any) -> Batch:
+    def _rest(self, log: Batch, values: list[Any]) -> Batch:
         labels = log.metadata["episodes"]
-        kept = [k for k, one in enumerate(labels) if not alike(one.get(self.by), value)]
+        kept = [k for k, one in enumerate(labels) if not any(alike(one.get(self.by), value) for value in values)]
         about = {**log.metadata, "episodes": [labels[k] for k in kept]}
         return replace(log, episodes=tuple(log.episodes[k] for k in kept), metadata=about)
 
@@ -149,10 +167,18 @@ class CrossValidate:
         for way, fit in {**fits, DIAGNOSED: found.selection.chosen}.items():
             ways[way] = fit.effects, fit.fit.nuisances
         robot = found.experiment.robot
-        return {
+        errors = {
             way: mean_errors(found.simulator, effects, nuisances, held, robot).mean(axis=1).tolist()
             for way, (effects, nuisances) in ways.items()
         }
+        if self.gat is None:
+            return errors
+        known, period = found.experiment.records, found.experiment.period
+        forward = self.gat.learned(known, found.experiment.joints, period, self.seed)
+        for name, way in ((GAT, AS_IT_WAS), (DIAGNOSED_GAT, DIAGNOSED)):
+            world = Simulated(self.sim, found.simulator, robot, *ways[way])
+            errors[name] = self.gat.errors(world, forward, known, held, self.seed)
+        return errors
 
 
 def _checked(exp: Experiment) -> list[Record]:

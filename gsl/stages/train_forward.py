@@ -17,7 +17,7 @@ from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import Transitions, transitions, usable
 from gsl.errors import TrajectoryError
 from gsl.models.calibration import calibrated
-from gsl.models.choice import best, fit_network
+from gsl.models.choice import Choice, best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Forward, ensemble
 from gsl.models.forward import ForwardModel
@@ -75,10 +75,7 @@ class TrainForward:
             write(folder / HELDOUT, data.heldout)
             return forward_of_states(folder, data, self.model, self.seed)
         self._check(path, data)
-        judges = self._long(of_policy(data.validation, pi0=False)) or self._long(data.validation.episodes)
-        model, choice = best(
-            self.model, lambda config: self._fitted(config, data), lambda model: self._score(model, judges)
-        )
+        model, choice = fitted(self.model, data, self.seed)
         write_model(folder, model)
         own = [one for part in data for one in of_policy(part, pi0=True)]
         falls = float(np.mean([one.ended_in_a_fall for one in own])) if own else 0.0
@@ -87,44 +84,53 @@ class TrainForward:
         known, unseen = (_rows(choice.config, part.episodes).windows for part in (data.training, data.validation))
         write_region(folder, region(known, unseen))
         groups = {"pi0": of_policy(data.heldout, pi0=True), "off_pi0": of_policy(data.heldout, pi0=False)}
-        measured = {name: measures(model, long) for name, part in groups.items() if (long := self._long(part))}
+        measured = {name: measures(model, long) for name, part in groups.items() if (long := _long(self.model, part))}
         return {**summary(choice), "trajectories": len(data.training) + len(data.validation), "heldout": measured}
-
-    @property
-    def _needed(self) -> int:
-        """Ticks an episode has to have before it can be predicted."""
-        return self.model.of_body.span + TICKS + self.model.horizon
-
-    def _long(self, episodes: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
-        return tuple(one for one in episodes if usable(one) >= self._needed)
 
     def _check(self, path: Path, data: Parts) -> None:
         try:
             for part in data:
-                long = checked(path, part.episodes, self._needed)
+                long = checked(path, part.episodes, _needed(self.model))
                 _rows(self.model, long)
         except KeyError as error:
             raise TrajectoryError(
                 path, "was not recorded; leave the sensor out of model.sensors", column=error.args[0]
             ) from error
 
-    def _fitted(self, config: ModelConfig, data: Parts) -> Forward:
-        episodes = data.training.episodes
-        if config.members == 1:
-            return _member(config, episodes, data, self.seed)
-        rng = np.random.default_rng(derived_seed(self.seed, "members"))
-        drawn = [rng.integers(len(episodes), size=len(episodes)) for _ in range(config.members)]
-        members = [
-            _member(config, [episodes[index] for index in indices], data, self.seed + number)
-            for number, indices in enumerate(drawn)
-        ]
-        return ensemble(tuple(members), _rows(config, data.validation.episodes).windows)
 
-    def _score(self, model: Forward, episodes: Sequence[Trajectory]) -> float:
-        measured = measures(model, episodes)
-        if model.head.draws:
-            return float(measured["nll"])
-        return float(measured["free_run_deg"] if model.horizon == 1 else measured["one_step_deg"])
+def fitted(config: ModelConfig, data: Parts, seed: int) -> tuple[Forward, Choice]:
+    """Return the forward model that a configuration allows and that does best on validation trajectories."""
+    judges = _long(config, of_policy(data.validation, pi0=False)) or _long(config, data.validation.episodes)
+    return best(config, lambda one: _fitted(one, data, seed), lambda model: _score(model, judges))
+
+
+def _fitted(config: ModelConfig, data: Parts, seed: int) -> Forward:
+    episodes = data.training.episodes
+    if config.members == 1:
+        return _member(config, episodes, data, seed)
+    rng = np.random.default_rng(derived_seed(seed, "members"))
+    drawn = [rng.integers(len(episodes), size=len(episodes)) for _ in range(config.members)]
+    members = [
+        _member(config, [episodes[index] for index in indices], data, seed + number)
+        for number, indices in enumerate(drawn)
+    ]
+    return ensemble(tuple(members), _rows(config, data.validation.episodes).windows)
+
+
+def _score(model: Forward, episodes: Sequence[Trajectory]) -> float:
+    measured = measures(model, episodes)
+    if model.head.draws:
+        return float(measured["nll"])
+    return float(measured["free_run_deg"] if model.horizon == 1 else measured["one_step_deg"])
+
+
+def _needed(config: ModelConfig) -> int:
+    """Ticks an episode has to have before it can be predicted."""
+    return config.of_body.span + TICKS + config.horizon
+
+
+def _long(config: ModelConfig, episodes: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
+    return tuple(one for one in episodes if usable(one) >= _needed(config))
 
 
 def _member(config: ModelConfig, episodes: Sequence[Trajectory], data: Parts, seed: int) -> ForwardModel:

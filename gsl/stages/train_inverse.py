@@ -12,7 +12,7 @@ from gsl.core.angles import encode
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.core.transitions import Transitions, transitions
-from gsl.models.choice import best, fit_network
+from gsl.models.choice import Choice, best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.forward import ForwardModel
 from gsl.models.free_run import TICKS, recovered_error, segments
@@ -23,6 +23,14 @@ from gsl.stages.train_states import inverse_of_states
 from gsl.stages.training import Parts, checked, data_file, degrees, degrees_by_joint, parts, summary
 from gsl.storage.models import write_model
 from gsl.tasks.task import REAL
+
+Method = Annotated[
+    Literal["regression", "solve"],
+    setting("fit the action (the paper), or solve a model of the simulator for it, the identity where sim = real"),
+]
+Damping = Annotated[
+    float, setting("of solve: what a change of action costs, in units of the squared sensitivity", gt=0, upper=1.0)
+]
 
 
 @component
@@ -37,13 +45,8 @@ class TrainInverse:
 
     data: Annotated[str, setting("simulated trajectories: a file, or a run or artifact of collect", min_length=1)]
     model: Annotated[ModelConfig, setting("what to fit")]
-    method: Annotated[
-        Literal["regression", "solve"],
-        setting("fit the action (the paper), or solve a model of the simulator for it, the identity where sim = real"),
-    ] = "regression"
-    damping: Annotated[
-        float, setting("of solve: what a change of action costs, in units of the squared sensitivity", gt=0, upper=1.0)
-    ] = 0.2
+    method: Method = "regression"
+    damping: Damping = 0.2
     heldout: Annotated[float, setting("share of the trajectories that is held out", gt=0, lt=1)] = 0.2
     seed: Annotated[int, setting("of the split and of the fit", ge=0)] = 1
 
@@ -61,32 +64,40 @@ class TrainInverse:
             return inverse_of_states(folder, data, self.model, self.seed)
         for part in data:
             checked(path, part.episodes, self.model.of_joints.span + TICKS + self.model.horizon)
-        fit = self._regression if self.method == "regression" else self._solver
-        pieces = segments(data.heldout.episodes, self.model.of_joints, carried_out=True)
-        model, choice = best(
-            self.model, lambda config: fit(config, data), lambda model: degrees(recovered_error(model, pieces))
-        )
+        model, choice = fitted(self.model, data, self.seed, self.method, self.damping)
         write_model(folder, model)
-        errors = recovered_error(model, pieces)
+        errors = recovered_error(model, segments(data.heldout.episodes, self.model.of_joints, carried_out=True))
         by_joint = degrees_by_joint(errors, model.joints)
         measured = {"recovered_action_deg": degrees(errors), "recovered_action_by_joint_deg": by_joint}
         return {**summary(choice), "method": self.method, "trajectories": len(data.training), "heldout": measured}
 
-    def _regression(self, config: ModelConfig, data: Parts) -> InverseModel:
-        n = len(data.training.joints)
-        known, unseen = (_turned(_rows(config, part), n, config) for part in (data.training, data.validation))
-        network = fit_network(known, unseen, config, seed=self.seed)
-        return Regression(network, config.of_joints, data.training.joints, config.encoding, config.horizon)
 
-    def _solver(self, config: ModelConfig, data: Parts) -> InverseModel:
-        joints = data.training.joints
-        rows = [_rows(config, part) for part in (data.training, data.validation)]
-        known, unseen = ((part.windows, encode(part.change, config.encoding)) for part in rows)
-        network = fit_network(known, unseen, config, seed=self.seed)
-        simulator = ForwardModel(network, config.of_joints, joints, config.encoding, config.horizon)
-        plain = fit_linear(rows[0].windows, rows[0].change, ridge=config.ridge)
-        sensitivity = plain.layers[0][0][:, : len(joints)].astype(float)
-        return Solver(simulator, sensitivity, self.damping)
+def fitted(config: ModelConfig, data: Parts, seed: int, method: Method, damping: float) -> tuple[InverseModel, Choice]:
+    """Return the inverse model that a configuration allows and that best recovers held-out actions."""
+    pieces = segments(data.heldout.episodes, config.of_joints, carried_out=True)
+
+    def fit(one: ModelConfig) -> InverseModel:
+        return _regression(one, data, seed) if method == "regression" else _solver(one, data, seed, damping)
+
+    return best(config, fit, lambda model: degrees(recovered_error(model, pieces)))
+
+
+def _regression(config: ModelConfig, data: Parts, seed: int) -> InverseModel:
+    n = len(data.training.joints)
+    known, unseen = (_turned(_rows(config, part), n, config) for part in (data.training, data.validation))
+    network = fit_network(known, unseen, config, seed=seed)
+    return Regression(network, config.of_joints, data.training.joints, config.encoding, config.horizon)
+
+
+def _solver(config: ModelConfig, data: Parts, seed: int, damping: float) -> InverseModel:
+    joints = data.training.joints
+    rows = [_rows(config, part) for part in (data.training, data.validation)]
+    known, unseen = ((part.windows, encode(part.change, config.encoding)) for part in rows)
+    network = fit_network(known, unseen, config, seed=seed)
+    simulator = ForwardModel(network, config.of_joints, joints, config.encoding, config.horizon)
+    plain = fit_linear(rows[0].windows, rows[0].change, ridge=config.ridge)
+    sensitivity = plain.layers[0][0][:, : len(joints)].astype(float)
+    return Solver(simulator, sensitivity, damping)
 
 
 def _turned(data: Transitions, n: int, config: ModelConfig) -> Samples:

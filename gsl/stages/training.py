@@ -61,6 +61,11 @@ def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
     _check_joints(path, batch)
     if len(batch) < 3:
         raise TrajectoryError(path, f"holds {len(batch)} episodes; three are the least: to fit, to stop, to hold out")
+    return parted(batch, share, seed)
+
+
+def parted(batch: Batch, share: float, seed: int) -> Parts:
+    """Split a batch of three trajectories at least."""
     rng = np.random.default_rng(seed)
     rest, heldout = _split(batch, share, rng)
     return Parts(*_split(rest, share, rng), heldout)

@@ -72,13 +72,19 @@ class BulletWorld:
 
 
 class BulletEnv(gymnasium.Env):
-    """One robot in one Bullet client."""
+    """One robot in one Bullet client.
+
+    Args:
+        world: Its configuration.
+        plant: Another one of the same robot, such as a calibrated one; by default the world's.
+    """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  gymnasium's own name and type
 
-    def __init__(self, world: BulletWorld) -> None:
+    def __init__(self, world: BulletWorld, plant: Plant | None = None) -> None:
         self.world, self.layout = world, world.layout
-        self._plant, self._robot = world.plant, lumped(world.plant.robot)
+        self._plant = plant or world.plant
+        self._robot = lumped(self._plant.robot)
         self._drive, self._n = self._robot.drive, len(self._robot.controlled)
         limits = [self._robot.joint(name) for name in self._robot.controlled]
         low, high = np.array([(joint.lower, joint.upper) for joint in limits]).T
