@@ -38,6 +38,7 @@ so101: $(INSTALLED)
 	$(GSL) import mapping=so101_arm name=so101
 	$(GSL) diagnose real=so101 sim=so101 name=so101 'held_out={motion: [$(CHECKED)]}'
 	$(GSL) cross-validate real=so101 sim=so101 name=so101 by=date
+	$(GSL) cross-validate real=so101 sim=so101 name=so101_motions by=motion folds=4
 
 go2: $(INSTALLED)
 	$(GSL) import mapping=go2_in_air name=go2

@@ -12,6 +12,7 @@ import pytest
 from commands import done, refused
 from test_diagnosis import PERIOD, QUICK, arm, log
 
+from gsl.core.history import History
 from gsl.core.labels import alike
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch
@@ -28,6 +29,7 @@ from gsl.grounding.gat import LoadedTransformation
 from gsl.models.config import ModelConfig
 from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Solver
+from gsl.models.linear import fit_linear
 from gsl.report.cross_validation import AS_IT_WAS, DIAGNOSED, Fold, table
 from gsl.stages.learned_replay import LearnedReplay, Simulated
 from gsl.stages.logs import other_clocks, read_logs, synchronised
@@ -35,6 +37,7 @@ from gsl.storage.trajectories import write
 from gsl.worlds.bullet import BulletWorld
 
 SOFT = {"servo_gain": {"kp": 0.5}}
+LATE, STICKY = {"command_latency": {"delay": 0.04}}, {"viscous_friction": {"coefficient": 1.0}}
 
 
 def labelled(batch: Batch, **more: Any) -> Batch:
@@ -245,8 +248,8 @@ def test_values_are_held_out_in_groups(tmp_path: Path) -> None:
     assert second["values"] == ["chirp_b", "poses_b", "steps_b", "triangle_b"]
 
 
-def learning() -> LearnedReplay:
-    return LearnedReplay(forward=ModelConfig(family="linear"), inverse=ModelConfig(family="linear"))
+def learning(**how: Any) -> LearnedReplay:
+    return LearnedReplay(forward=ModelConfig(family="linear"), inverse=ModelConfig(family="linear"), **how)
 
 
 def world() -> BulletWorld:
@@ -256,8 +259,8 @@ def world() -> BulletWorld:
 def test_a_grounding_that_does_nothing_replays_as_the_chain_does() -> None:
     made = both(**CAUSE)
     found, simulator = records(made, arm()), InTheAir(nominal(arm()), 0.002, PERIOD)
-    forward = learning().learned(found, arm().controlled, PERIOD, 1)
-    assert isinstance(forward, ForwardModel)
+    network = fit_linear(np.ones((2, 16)), np.ones((2, 2)), ridge=1.0)
+    forward = ForwardModel(network, History(3), arm().controlled)
     nothing = LoadedTransformation(forward, Solver(forward, np.eye(2), 0.5), alpha=0.0)
     simulated = Simulated(world(), simulator, arm(), {"coulomb_friction": {"torque": 0.05}}, none(2) + 0.01)
     for one in (found[0], found[-1]):
@@ -265,21 +268,25 @@ def test_a_grounding_that_does_nothing_replays_as_the_chain_does() -> None:
         assert simulated.replayed(one, nothing, 1) == pytest.approx(other.mean(), rel=1e-3)
 
 
-def test_a_learned_grounding_brings_replays_nearer_to_a_late_robot() -> None:
-    made = log({"command_latency": {"delay": 0.04}}, jitter=0.0)
-    found = records(made, arm())
-    train, held = found[:6], found[6:]
-    simulator = InTheAir(nominal(arm()), 0.002, PERIOD)
+@pytest.mark.parametrize(("cause", "residual", "left"), [(LATE, False, 0.85), (STICKY, True, 0.85)])
+def test_a_learned_grounding_brings_replays_nearer(cause: dict[str, Any], residual: bool, left: float) -> None:
+    found, simulator = records(log(cause, jitter=0.0), arm()), InTheAir(nominal(arm()), 0.002, PERIOD)
     simulated = Simulated(world(), simulator, arm(), {}, none(2))
-    forward = learning().learned(train, arm().controlled, PERIOD, 1)
-    errors = learning().errors(simulated, forward, train, held, 1)
-    assert np.mean(errors) < 0.8 * mean_errors(simulator, {}, none(2), held, arm()).mean()
+    errors = learning(residual=residual).errors(simulated, found[:6], found[6:], 1)
+    assert np.mean(errors) < left * mean_errors(simulator, {}, none(2), found[6:], arm()).mean()
+
+
+def test_a_correction_of_a_simulator_that_knows_gains_is_better_at_another_gain_than_a_model_of_logs() -> None:
+    found = records(both(viscous_friction={"coefficient": 0.4}), arm())
+    simulated = Simulated(world(), InTheAir(nominal(arm()), 0.002, PERIOD), arm(), {}, none(2))
+    errors = {how: learning(residual=how).errors(simulated, found[:9], found[9:], 1) for how in (True, False)}
+    assert np.mean(errors[True]) < 0.7 * np.mean(errors[False])
 
 
 def test_too_few_trajectories_teach_no_grounding() -> None:
-    found = records(log({}), arm())[:2]
+    found, simulator = records(log({}), arm())[:2], InTheAir(nominal(arm()), 0.002, PERIOD)
     with pytest.raises(GslError, match="GAT needs 3 trajectories to learn from, here are 2; gat=null leaves it out"):
-        learning().learned(found, arm().controlled, PERIOD, 1)
+        learning().errors(Simulated(world(), simulator, arm(), {}, none(2)), found, found, 1)
 
 
 def test_what_is_held_out_changes_nothing_of_its_diagnosis(tmp_path: Path) -> None:

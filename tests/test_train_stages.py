@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -8,7 +9,8 @@ import numpy as np
 import pytest
 from toy_plant import LAYOUT, QUICK, SLOW, ToyEnv, a_batch
 
-from gsl.errors import TrajectoryError
+from gsl.core.transitions import transitions
+from gsl.errors import ConfigError, TrajectoryError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.models.config import HISTORIES, ModelConfig
 from gsl.models.ensemble import Ensemble
@@ -101,6 +103,50 @@ def test_the_chain_makes_a_quick_simulator_move_like_the_slow_robot(
     assert np.abs(grounded - robot).max() < left * np.abs(simulator - robot).max()
 
 
+@pytest.fixture
+def inverse(sim: str, tmp_path: Path) -> str:
+    folder = tmp_path / "inverse"
+    folder.mkdir()
+    TrainInverse(data=sim, model=LINEAR, method="solve").run(folder, QUIET)
+    return str(folder / "inverse_model.safetensors")
+
+
+@pytest.mark.parametrize("likelihood", ["point", "gaussian"])
+def test_a_residual_of_which_nothing_is_known_leaves_the_simulator(
+    real: str, inverse: str, tmp_path: Path, likelihood: Any
+) -> None:
+    rows = transitions(a_batch(SLOW, "real").episodes, LINEAR.of_joints, 1, carried_out=True)
+    windows = rows.windows
+    simulator = read_inverse_model(inverse).simulator
+    for name, ridge, near in (("shrunk", 1e6, True), ("fitted", 1e-6, False)):
+        (tmp_path / name).mkdir()
+        model = replace(LINEAR, ridge=ridge, likelihood=likelihood)
+        TrainForward(real, model, residual_to=inverse).run(tmp_path / name, QUIET)
+        found = read_forward_model(str(tmp_path / name / "forward_model.safetensors"))
+        assert found.base is not None and found.base.joints == simulator.joints
+        apart = np.abs(found.effects(windows) - simulator.effects(windows)).max()
+        assert (apart < 1e-2) == near
+        np.testing.assert_allclose(found.effect(windows[0]), found.effects(windows)[0], atol=1e-6)
+    assert found.effects(windows) == pytest.approx(rows.change, abs=1e-3)
+
+
+def test_what_cannot_be_corrected_is_refused(real: str, sim: str, inverse: str, tmp_path: Path) -> None:
+    TrainInverse(data=sim, model=LINEAR).run(tmp_path, QUIET)
+    regression = str(tmp_path / "inverse_model.safetensors")
+    for model, reference, line in (
+        (LINEAR, regression, "residual_to: holds no model of the simulator; train it with method=solve"),
+        (replace(LINEAR, history=5), inverse, "model: the model that is corrected looks 3 ticks back and 1 ahead"),
+        (replace(LINEAR, encoding="sincos"), inverse, "model.encoding = sincos: angles that are corrected are plain"),
+    ):
+        with pytest.raises(ConfigError) as caught:
+            TrainForward(real, model, residual_to=reference).run(tmp_path, QUIET)
+        assert str(caught.value).startswith(line)
+    TrainForward(data=real, model=LINEAR).run(tmp_path, QUIET)
+    grounding = ActionTransformation(str(tmp_path / "forward_model.safetensors"), inverse, residual=True)
+    with pytest.raises(ConfigError, match="corrects no simulator"):
+        grounding.load(read_forward_model, read_inverse_model)
+
+
 def test_unlabelled_episodes_are_those_of_pi0(tmp_path: Path) -> None:
     batch = a_batch(SLOW, "real")
     del batch.metadata["episodes"]  # type: ignore[attr-defined]
@@ -141,6 +187,8 @@ def test_a_gaussian_ensemble_is_trained_by_likelihood_and_knows_what_it_has_seen
 def test_a_grounding_is_trained_the_forward_model_that_it_needs() -> None:
     point, wanted = ModelConfig(), ActionTransformation("f", "i", predicts="mixture", gate=1.0)
     assert (as_needed(point, wanted).likelihood, as_needed(point, wanted).members) == ("mixture", 5)
+    residual = as_needed(point, ActionTransformation("f", "i", residual=True))
+    assert (residual.family, residual.ridge) == ("linear", 1.0)
     own = ModelConfig(likelihood="gaussian", members=3)
     assert as_needed(own, ActionTransformation("f", "i", gate=1.0)) == own
 

@@ -14,6 +14,7 @@ from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Hypothesis, share
 from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.diagnose import NOISE_COST, Findings
+from gsl.diagnosis.droop import droops
 from gsl.diagnosis.localise import cells, horizon, regimes, sides
 from gsl.diagnosis.records import FEW
 from gsl.diagnosis.shrinkage import shrinkage
@@ -48,6 +49,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "causes": causes,
         "suspects": [_cause(found, one) for one in found.verdict.causes] if found.verdict.word == "unknown" else [],
         "inseparable": [list(group) for group in found.verdict.inseparable if causes],
+        "droops": [asdict(one) for one in droops(found)],
         "where": [place for place in places if place["named"] or place["regime"] == "all"],
         "horizon": {"time": times, "rms": growth},
         "sides": sides(exp, z),
@@ -196,6 +198,16 @@ def _caveats(found: Findings) -> list[str]:
     stuck = [name for k, name in enumerate(exp.joints) if _stuck(found, k)]
     if stuck:
         said.append(f"These joints are commanded to move and do not: {', '.join(stuck)}. Look at them first.")
+    if unsure := droops(found):
+        zeros = ", ".join(f"{one.joint} {1e3 * one.zero:+.0f} mrad" for one in unsure)
+        said.append(
+            "Inseparable in this log, in which gravity hardly changes: a shifted zero and another droop under gravity, "
+            f"by a load or a gain that is off. The fit calls it a zero: {zeros}."
+        )
+    if held := [one.joint for one in unsure if not one.told]:
+        said.append(
+            f"No pose of their own changes gravity enough to tell, only the base turned round: {', '.join(held)}."
+        )
     far = _far_off(found)
     if far:
         said.append(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsl.diagnosis.diagnose import Findings
+from gsl.diagnosis.droop import Droop, droops, ladder
 from gsl.diagnosis.menu import Dish
 from gsl.diagnosis.questions import NOTHING, Question, alike, hidden, rivals
 from gsl.diagnosis.rehearsal import Rehearsal
@@ -16,6 +17,7 @@ ENOUGH = 30.0  # log-odds with which a question is answered: what comes on top d
 WORTH = 3.0  # log-odds below which a motion is not worth playing
 CERTAIN = 100.0  # log-odds beyond which their size says nothing any more
 LISTED = 4  # effects that a sentence names
+PAIR = ("zero_offset", "gravity_droop")
 ON_GROUND = "any motion with the feet on the ground"
 
 
@@ -37,7 +39,13 @@ class NextExperiment:
 
 
 def next_experiment(found: Findings, dishes: Sequence[Dish]) -> NextExperiment | None:
-    """Return the best of a menu; None if the log leaves nothing open, or nothing that any of it would show."""
+    """Return the best of a menu; None if the log leaves nothing open, or nothing that any of it would show.
+
+    Causes that cannot be told apart come first, then zeros that may be loads, then effects that the log cannot show.
+    """
+    unsure = tuple(one for one in droops(found) if one.told)
+    if unsure and not rivals(found) and not alike(found):
+        return _ladder(unsure, found)
     questions = rivals(found) or ([] if alike(found) else hidden(found))
     best = _best(questions, Rehearsal.of(found, dishes), dishes) if questions else None
     return best or (_on_ground(alike(found)) if alike(found) else None)
@@ -71,6 +79,21 @@ def _why(dish: Dish, questions: Sequence[Question], odds: np.ndarray, period: fl
         f"every joint calibrated anew, in {seconds:.0f} s with a second variant and a repeat."
     )
     return told.replace("_", " ")
+
+
+def _ladder(unsure: tuple[Droop, ...], found: Findings) -> NextExperiment:
+    exp = found.experiment
+    dish = ladder(unsure, exp.robot, exp.period)
+    most = max(unsure, key=lambda one: one.apart)
+    seconds = exp.period * sum(len(targets) for _, targets in dish.episodes)
+    joints, (first, last) = ", ".join(one.joint for one in unsure), most.torques
+    why = (
+        f"This log cannot tell a shifted zero from another droop under gravity in {joints}. On a ladder of poses a "
+        f"zero stays and gravity's torque changes: in {most.joint} from {first:+.2f} to {last:+.2f} N·m between "
+        f"{most.ends[0]:.2f} and {most.ends[1]:.2f} rad, which sets the two {1e3 * most.apart:.0f} mrad apart; "
+        f"{seconds:.0f} s with a second variant and a repeat."
+    )
+    return NextExperiment("pose_ladder", (PAIR,), dish.episodes, why)
 
 
 def _on_ground(groups: Sequence[tuple[str, ...]]) -> NextExperiment:

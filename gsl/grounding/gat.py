@@ -46,6 +46,10 @@ class ActionTransformation:
     predicts: Annotated[
         Likelihood, setting("a point, what f expects (GAT); a distribution, drawn from in every tick (SGAT)")
     ] = "point"
+    residual: Annotated[
+        bool,
+        setting("f learns how the robot differs from the simulator, and says as the simulator where data say little"),
+    ] = False
     x: Annotated[
         tuple[str, ...] | Literal["all", "auto"],
         setting("joints that are grounded; auto: the fewest that do as well on validation trajectories"),
@@ -76,6 +80,8 @@ class ActionTransformation:
             if self.noise or self.gate is not None or self.alpha not in (1.0, "auto"):
                 raise ConfigError("grounding", "alpha, noise and gate are for actions that are numbers, not choices")
             return TableTransformation(f, f_inv, draws=self.predicts != "point")
+        if self.residual and (isinstance(f, StateForward) or f.base is None):
+            raise ConfigError("forward_model", "corrects no simulator; train it with residual_to=<the inverse model>")
         if self.predicts not in ("point", f.head.likelihood):
             problem = f"predicts a {f.head.likelihood}; train it with model.likelihood={self.predicts}"
             raise ConfigError("forward_model", problem)

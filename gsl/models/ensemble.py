@@ -42,6 +42,11 @@ class Ensemble:
         return self.members[0].joints
 
     @property
+    def base(self) -> ForwardModel | None:
+        """What its members correct."""
+        return self.members[0].base
+
+    @property
     def horizon(self) -> int:
         """Ticks ahead."""
         return self.members[0].horizon

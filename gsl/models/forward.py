@@ -14,6 +14,8 @@ from gsl.core.history import History
 from gsl.models.head import Head
 from gsl.models.network import Network
 
+BASE = "base."  # begins the names of the base's arrays in a checkpoint
+
 
 @dataclass(frozen=True)
 class ForwardModel:
@@ -27,6 +29,7 @@ class ForwardModel:
         horizon: Ticks ahead.
         head: How its outputs are read.
         memory: Correlation of its errors from one tick to the next, which draws keep, shape (n_outputs,).
+        base: A model whose answer the network corrects, of the same joints, past and horizon; none if it needs none.
     """
 
     kind: ClassVar[str] = "forward_model"
@@ -38,31 +41,41 @@ class ForwardModel:
     horizon: int = 1
     head: Head = Head()
     memory: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    base: ForwardModel | None = None
 
     def __post_init__(self) -> None:
         """Hold network and windows together."""
         check_sizes(self.network, self.history, self.joints, self.encoding, self.head)
+        if self.base is not None:
+            assert (self.base.joints, self.base.horizon) == (self.joints, self.horizon), "a base of another robot"
+            assert self.base.history == History(self.history.ticks), "a base with other windows"
 
     def effect(self, window: np.ndarray, draws: Draws | None = None) -> np.ndarray:
         """Return the expected change [rad], shape (n_joints,); with `draws`, one of what may happen."""
         raw = self.network.predict(window)
-        return decode(self.head.expected(raw) if draws is None else self.head.drawn(raw, draws), self.encoding)
+        change = decode(self.head.expected(raw) if draws is None else self.head.drawn(raw, draws), self.encoding)
+        return change if self.base is None else change + self.base.effect(window[: self.base.network.inputs])
 
     def effects(self, windows: np.ndarray) -> np.ndarray:
         """Return the expected changes [rad], shape (N, n_joints), for many windows."""
-        return decode(self.head.expected(self.network.predict_many(windows)), self.encoding)
+        return decode(self.head.expected(self.network.predict_many(windows)), self.encoding) + self.known(windows)
+
+    def known(self, windows: np.ndarray) -> np.ndarray | float:
+        """Return what the base says of many windows [rad], shape (N, n_joints), or 0."""
+        return 0.0 if self.base is None else self.base.effects(windows[:, : self.base.network.inputs])
 
     def surprise(self, windows: np.ndarray, changes: np.ndarray) -> np.ndarray:
         """Return the negative log likelihood of changes, shape (N, n_joints), per output in nats, shape (N,).
 
         Only a model with a distribution has one.
         """
-        outputs = encode(changes, self.encoding)
+        outputs = encode(changes - self.known(windows), self.encoding)
         return self.head.surprise(self.network.predict_many(windows), outputs) / outputs.shape[1]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint stores."""
-        return {**self.network.arrays(), "memory": self.memory}
+        base = {} if self.base is None else self.base.arrays()
+        return {**self.network.arrays(), "memory": self.memory, **{BASE + name: value for name, value in base.items()}}
 
     def description(self) -> dict[str, Any]:
         """Return what a checkpoint says of the arrays."""
@@ -73,15 +86,19 @@ class ForwardModel:
             "encoding": self.encoding,
             "horizon": self.horizon,
             **vars(self.head),
+            **({} if self.base is None else {"base": self.base.description()}),
         }
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, np.ndarray], about: Mapping[str, Any]) -> ForwardModel:
         """Return the model that a checkpoint holds."""
         network, history = Network.from_arrays(arrays), history_from(about["history"])
-        head = Head(about["likelihood"], about["components"])
+        head, base = Head(about["likelihood"], about["components"]), None
+        if "base" in about:
+            below = {name.removeprefix(BASE): one for name, one in arrays.items() if name.startswith(BASE)}
+            base = cls.from_arrays(below, about["base"])
         return cls(
-            network, history, tuple(about["joints"]), about["encoding"], about["horizon"], head, arrays["memory"]
+            network, history, tuple(about["joints"]), about["encoding"], about["horizon"], head, arrays["memory"], base
         )
 
 

@@ -31,6 +31,7 @@ from gsl.worlds.external import asking
 from gsl.worlds.world import World
 
 MEMBERS = 5  # of the ensemble behind a gate, where nothing else is said
+SHRINKING = 1.0  # least ridge of a residual: in directions that the data hardly show it is no correction
 
 
 @component
@@ -110,9 +111,11 @@ class Chain:
                 seed=seed,
             )
             built(stage, home / f"collect_{role}", console)
-        forward = TrainForward(str(home / "collect_real"), as_needed(self.forward_model, grounding), seed=seed)
         inverse = TrainInverse(str(home / "collect_sim"), self.inverse_model, method=self.inverse_method, seed=seed)
-        f, f_inverse = (built(stage, home / stage.kind, console) for stage in (forward, inverse))
+        f_inverse = built(inverse, home / inverse.kind, console)
+        needed, base = as_needed(self.forward_model, grounding), str(f_inverse.folder) if grounding.residual else None
+        forward = TrainForward(str(home / "collect_real"), needed, base, seed=seed)
+        f = built(forward, home / forward.kind, console)
         return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))
 
     def values(self, out: Path, grounding: Grounding | None, found: Mapping[str, Any], console: Any) -> Artifact:
@@ -163,4 +166,6 @@ class Chain:
 def as_needed(model: ModelConfig, grounding: ActionTransformation) -> ModelConfig:
     """Return the settings of a forward model that can do what a grounding asks of it."""
     wanted = model if grounding.predicts == "point" else replace(model, likelihood=grounding.predicts)
+    if grounding.residual:
+        wanted = replace(wanted, family="linear", ridge=max(wanted.ridge, SHRINKING))
     return wanted if grounding.gate is None or wanted.members > 1 else replace(wanted, members=MEMBERS)

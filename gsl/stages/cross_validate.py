@@ -173,11 +173,9 @@ class CrossValidate:
         }
         if self.gat is None:
             return errors
-        known, period = found.experiment.records, found.experiment.period
-        forward = self.gat.learned(known, found.experiment.joints, period, self.seed)
         for name, way in ((GAT, AS_IT_WAS), (DIAGNOSED_GAT, DIAGNOSED)):
             world = Simulated(self.sim, found.simulator, robot, *ways[way])
-            errors[name] = self.gat.errors(world, forward, known, held, self.seed)
+            errors[name] = self.gat.errors(world, found.experiment.records, held, self.seed)
         return errors
 
 

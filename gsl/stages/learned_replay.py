@@ -12,17 +12,22 @@ from gsl.core.body import Robot
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
+from gsl.core.transitions import transitions
 from gsl.diagnosis.nuisance import calibrated
 from gsl.diagnosis.records import Record, pieces, same, slope
 from gsl.diagnosis.replay import Effects, Simulator
 from gsl.diagnosis.whole import driven
 from gsl.effects.effect import applied, built
-from gsl.errors import GslError
+from gsl.errors import ConfigError, GslError
 from gsl.grounding.gat import LoadedTransformation
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Forward
+from gsl.models.forward import ForwardModel
+from gsl.models.inverse import Solver
+from gsl.models.linear import fit_linear
 from gsl.stages import train_forward, train_inverse
-from gsl.stages.train_inverse import Damping, Method
+from gsl.stages.chain import SHRINKING
+from gsl.stages.train_inverse import Damping
 from gsl.stages.training import parted
 from gsl.worlds.bullet import BulletEnv, BulletWorld
 from gsl.worlds.held import Windows
@@ -37,57 +42,73 @@ LEAST = 3  # trajectories that it takes to fit a model
 class LearnedReplay:
     """How the grounding is learned; the defaults of its config are the recipe's.
 
-    The forward model learns the logs. The inverse model learns what the simulator does with their commands, with noise
-    on top and under the conditions of what is to be replayed: a simulator can be asked.
+    The inverse model solves one of the simulator, which learns what this does with the logs' commands and noise on top.
+    The forward model corrects that by how the robot differs (`residual`), or learns the logs alone, as in the paper.
+    Where conditions of trajectories are known, such as gains, there is a model of the simulator under each.
     """
 
     forward: Annotated[ModelConfig, setting("the forward model of the robot")]
-    inverse: Annotated[ModelConfig, setting("the inverse model of the simulator")]
-    method: Method = "solve"
+    inverse: Annotated[ModelConfig, setting("the model of the simulator that is solved for actions")]
+    residual: Annotated[bool, setting("the forward model corrects the simulator's; else it learns the logs alone")] = (
+        True
+    )
     damping: Damping = 0.2
     noise: Annotated[float, setting("on the commands that the simulator plays", unit="rad", ge=0)] = 0.015
 
     def __post_init__(self) -> None:
         """Refuse body sensors: a robot in the air has none to tell of."""
         if self.forward.sensors:
-            raise GslError("gat.forward.sensors: logs in the air have joints alone; leave the sensors out")
+            raise ConfigError("gat.forward.sensors", "logs in the air have joints alone; leave the sensors out")
 
-    def learned(self, known: Sequence[Record], joints: Sequence[str], period: float, seed: int) -> Forward:
-        """Return a forward model of trajectories.
-
-        Raises:
-            GslError: There are too few of them.
-        """
-        drives = [one for one in map(driven, known) if len(one)]
-        if len(drives) < LEAST:
-            raise GslError(
-                f"GAT needs {LEAST} trajectories to learn from, here are {len(drives)}; gat=null leaves it out"
-            )
-        parts = parted(_batch([_recorded(one, period) for one in drives], joints, period), SHARE, seed)
-        return train_forward.fitted(self.forward, parts, seed)[0]
-
-    def errors(
-        self, world: Simulated, forward: Forward, known: Sequence[Record], held: Sequence[Record], seed: int
-    ) -> list[float]:
+    def errors(self, world: Simulated, known: Sequence[Record], held: Sequence[Record], seed: int) -> list[float]:
         """Return the mean absolute error of every held-out trajectory [rad], NaN where a replay diverges.
 
         Args:
             world: What replays.
-            forward: From `learned`.
-            known: Trajectories whose commands the simulator plays for the inverse model.
+            known: Trajectories to learn from.
             held: What is replayed.
             seed: Of the noise and the fits.
+
+        Raises:
+            GslError: There are too few trajectories to learn from.
         """
-        result = np.full(len(held), np.nan)
-        for index in same([one.conditions for one in held]):
-            conditions = held[index[0]].conditions
-            played = _batch(world.played(known, conditions, self.noise, seed), forward.joints, world.simulator.period)
-            data = parted(played, SHARE, seed)
-            inverse, _ = train_inverse.fitted(self.inverse, data, seed, self.method, self.damping)
-            grounding = LoadedTransformation(forward, inverse)
-            for k in index:
-                result[k] = world.replayed(held[k], grounding, seed)
-        return result.tolist()
+        known = [one for one in map(driven, known) if len(one)]
+        if len(known) < LEAST:
+            raise GslError(
+                f"GAT needs {LEAST} trajectories to learn from, here are {len(known)}; gat=null leaves it out"
+            )
+        every = [*known, *held]
+        kinds = same([one.conditions for one in every])
+        kind = {k: number for number, index in enumerate(kinds) for k in index}
+        solvers = [self._solver(world, known, every[index[0]].conditions, seed) for index in kinds]
+        forwards = self._forwards(world, known, [kind[k] for k in range(len(known))], solvers, seed)
+        return [
+            world.replayed(one, LoadedTransformation(forwards[kind[k]], solvers[kind[k]]), seed)
+            for k, one in enumerate(held, start=len(known))
+        ]
+
+    def _solver(self, world: Simulated, known: Sequence[Record], conditions: Mapping[str, Any], seed: int) -> Solver:
+        """Return what solves the simulator under some conditions for actions."""
+        played = world.batch(world.played(known, conditions, self.noise, seed))
+        found, _ = train_inverse.fitted(self.inverse, parted(played, SHARE, seed), seed, "solve", self.damping)
+        assert isinstance(found, Solver)
+        return found
+
+    def _forwards(
+        self, world: Simulated, known: Sequence[Record], kind: Sequence[int], solvers: Sequence[Solver], seed: int
+    ) -> list[Forward]:
+        """Return a forward model for every solver, given which one each trajectory belongs to."""
+        logged = world.batch(map(world.recorded, known))
+        if not self.residual:
+            return [train_forward.fitted(self.forward, parted(logged, SHARE, seed), seed)[0]] * len(solvers)
+        bases = [one.simulator for one in solvers]
+        rows = [transitions([one], bases[0].history, bases[0].horizon, carried_out=True) for one in logged.episodes]
+        windows = np.concatenate([one.windows for one in rows])
+        left = np.concatenate(
+            [one.change - bases[number].effects(one.windows) for one, number in zip(rows, kind, strict=True)]
+        )
+        network = fit_linear(windows, left, ridge=max(self.forward.ridge, SHRINKING))
+        return [ForwardModel(network, base.history, base.joints, horizon=base.horizon, base=base) for base in bases]
 
 
 @dataclass(frozen=True)
@@ -125,7 +146,7 @@ class Simulated:
         )
         for start, path, asked in zip(cut.windows.motion[:, :1, :joints], told, commands, strict=True):
             if np.isfinite(path).all():
-                yield _trajectory(asked[:length, :joints][::-1], np.vstack([start, path]), period)
+                yield self._trajectory(asked[:length, :joints][::-1], np.vstack([start, path]))
 
     def replayed(self, one: Record, grounding: LoadedTransformation, seed: int) -> float:
         """Return the mean absolute error of a replay whose commands pass through a grounding [rad]."""
@@ -151,14 +172,14 @@ class Simulated:
         plant = calibrated(applied(self.simulator.plant, built(self.effects)), self.nuisances)
         return BulletEnv(world, applied(plant, built(conditions)))
 
+    def recorded(self, one: Record) -> Trajectory:
+        """Return a log's trajectory as a model learns it."""
+        return self._trajectory(one.targets[:, : one.position.shape[1]], one.position)
 
-def _recorded(one: Record, period: float) -> Trajectory:
-    return _trajectory(one.targets[:, : one.position.shape[1]], one.position, period)
+    def batch(self, episodes: Iterable[Trajectory]) -> Batch:
+        """Return trajectories of this robot."""
+        return Batch(tuple(episodes), self.robot.controlled, self.simulator.period)
 
-
-def _trajectory(action: np.ndarray, position: np.ndarray, period: float) -> Trajectory:
-    return Trajectory(period * np.arange(len(position)), action, position, slope(position, period))
-
-
-def _batch(episodes: Iterable[Trajectory], joints: Sequence[str], period: float) -> Batch:
-    return Batch(tuple(episodes), tuple(joints), period)
+    def _trajectory(self, action: np.ndarray, position: np.ndarray) -> Trajectory:
+        period = self.simulator.period
+        return Trajectory(period * np.arange(len(position)), action, position, slope(position, period))

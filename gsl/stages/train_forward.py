@@ -13,15 +13,16 @@ from gsl.core.angles import encode
 from gsl.core.region import region
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
-from gsl.core.trajectory import Trajectory
+from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import Transitions, transitions, usable
-from gsl.errors import TrajectoryError
+from gsl.errors import ConfigError, TrajectoryError
 from gsl.models.calibration import calibrated
 from gsl.models.choice import Choice, best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Forward, ensemble
 from gsl.models.forward import ForwardModel
 from gsl.models.free_run import TICKS, predicted_error, segments, standstill_error
+from gsl.models.inverse import Solver
 from gsl.models.network import Samples
 from gsl.stages.drift import write_region
 from gsl.stages.train_states import forward_of_states
@@ -37,7 +38,8 @@ from gsl.stages.training import (
     parts,
     summary,
 )
-from gsl.storage.models import write_model
+from gsl.storage.models import read_inverse_model, write_model
+from gsl.storage.references import resolve
 from gsl.storage.trajectories import write
 from gsl.tasks.task import SIM
 
@@ -58,24 +60,30 @@ class TrainForward:
 
     data: Annotated[str, setting("real trajectories: a file, or a run or artifact of collect", min_length=1)]
     model: Annotated[ModelConfig, setting("what to fit")]
+    residual_to: Annotated[
+        str | None,
+        setting("inverse model (method=solve) whose model of the simulator f corrects; none: f corrects none"),
+    ] = None
     heldout: Annotated[float, setting("share of the trajectories that is held out", gt=0, lt=1)] = 0.2
     seed: Annotated[int, setting("of the split and of the fit", ge=0)] = 1
 
     def parents(self) -> Mapping[str, Path]:
-        """Return the file of trajectories, or the artifact."""
+        """Return the file of trajectories, or the artifact, and the inverse model."""
         path = data_file(self.data)
-        return {"data": path if path == Path(self.data) else path.parent}
+        below = {} if self.residual_to is None else {"residual_to": resolve(self.residual_to, kind="train_inverse")}
+        return {"data": path if path == Path(self.data) else path.parent, **below}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the model and the trajectories it has not seen."""
         path = data_file(self.data)
         data = parts(path, other=SIM, share=self.heldout, seed=self.seed)
         console.status(f"fitting a forward model to {len(data.training)} trajectories")
+        base = None if self.residual_to is None else self._simulator(self.residual_to, data.training)
         if data.training.states:
             write(folder / HELDOUT, data.heldout)
             return forward_of_states(folder, data, self.model, self.seed)
         self._check(path, data)
-        model, choice = fitted(self.model, data, self.seed)
+        model, choice = fitted(self.model, data, self.seed, base)
         write_model(folder, model)
         own = [one for part in data for one in of_policy(part, pi0=True)]
         falls = float(np.mean([one.ended_in_a_fall for one in own])) if own else 0.0
@@ -86,6 +94,23 @@ class TrainForward:
         groups = {"pi0": of_policy(data.heldout, pi0=True), "off_pi0": of_policy(data.heldout, pi0=False)}
         measured = {name: measures(model, long) for name, part in groups.items() if (long := _long(self.model, part))}
         return {**summary(choice), "trajectories": len(data.training) + len(data.validation), "heldout": measured}
+
+    def _simulator(self, reference: str, batch: Batch) -> ForwardModel:
+        """Return the model of the simulator behind an inverse model, if f can correct it."""
+        if batch.states:
+            raise ConfigError("residual_to", "is for robots; these trajectories are of an environment's states")
+        inverse = read_inverse_model(reference)
+        if not isinstance(inverse, Solver):
+            raise ConfigError("residual_to", "holds no model of the simulator; train it with method=solve")
+        base = inverse.simulator
+        if base.joints != batch.joints:
+            raise ConfigError("residual_to", "is of other joints than the trajectories")
+        if self.model.encoding != "plain":
+            raise ConfigError("model.encoding", "angles that are corrected are plain", given=self.model.encoding)
+        if (self.model.history, self.model.horizon) != (base.history.ticks, base.horizon):
+            problem = f"the model that is corrected looks {base.history.ticks} ticks back and {base.horizon} ahead"
+            raise ConfigError("model", f"{problem}; say model.history and model.horizon alike")
+        return base
 
     def _check(self, path: Path, data: Parts) -> None:
         try:
@@ -98,20 +123,27 @@ class TrainForward:
             ) from error
 
 
-def fitted(config: ModelConfig, data: Parts, seed: int) -> tuple[Forward, Choice]:
-    """Return the forward model that a configuration allows and that does best on validation trajectories."""
+def fitted(config: ModelConfig, data: Parts, seed: int, base: ForwardModel | None = None) -> tuple[Forward, Choice]:
+    """Return the forward model that a configuration allows and that does best on validation trajectories.
+
+    Args:
+        config: What is allowed.
+        data: To learn from.
+        seed: Of the fit.
+        base: What is corrected, none for a robot learned from nothing.
+    """
     judges = _long(config, of_policy(data.validation, pi0=False)) or _long(config, data.validation.episodes)
-    return best(config, lambda one: _fitted(one, data, seed), lambda model: _score(model, judges))
+    return best(config, lambda one: _fitted(one, data, seed, base), lambda model: _score(model, judges))
 
 
-def _fitted(config: ModelConfig, data: Parts, seed: int) -> Forward:
+def _fitted(config: ModelConfig, data: Parts, seed: int, base: ForwardModel | None) -> Forward:
     episodes = data.training.episodes
     if config.members == 1:
-        return _member(config, episodes, data, seed)
+        return _member(config, episodes, data, seed, base)
     rng = np.random.default_rng(derived_seed(seed, "members"))
     drawn = [rng.integers(len(episodes), size=len(episodes)) for _ in range(config.members)]
     members = [
-        _member(config, [episodes[index] for index in indices], data, seed + number)
+        _member(config, [episodes[index] for index in indices], data, seed + number, base)
         for number, indices in enumerate(drawn)
     ]
     return ensemble(tuple(members), _rows(config, data.validation.episodes).windows)
@@ -133,19 +165,22 @@ def _long(config: ModelConfig, episodes: Sequence[Trajectory]) -> tuple[Trajecto
     return tuple(one for one in episodes if usable(one) >= _needed(config))
 
 
-def _member(config: ModelConfig, episodes: Sequence[Trajectory], data: Parts, seed: int) -> ForwardModel:
+def _member(
+    config: ModelConfig, episodes: Sequence[Trajectory], data: Parts, seed: int, base: ForwardModel | None
+) -> ForwardModel:
     head = config.head
-    known, unseen = (_samples(config, part) for part in (episodes, data.validation.episodes))
+    known, unseen = (_samples(config, part, base) for part in (episodes, data.validation.episodes))
     network, memory = fit_network(known, unseen, config, seed=seed, head=head), np.zeros(unseen[1].shape[1])
     if head.draws:
-        network, memory = calibrated(network, head, [_samples(config, [one]) for one in data.validation.episodes])
+        network, memory = calibrated(network, head, [_samples(config, [one], base) for one in data.validation.episodes])
     joints = data.training.joints
-    return ForwardModel(network, config.of_body, joints, config.encoding, config.horizon, head, memory)
+    return ForwardModel(network, config.of_body, joints, config.encoding, config.horizon, head, memory, base)
 
 
-def _samples(config: ModelConfig, episodes: Sequence[Trajectory]) -> Samples:
+def _samples(config: ModelConfig, episodes: Sequence[Trajectory], base: ForwardModel | None) -> Samples:
     rows = _rows(config, episodes)
-    return rows.windows, encode(rows.change, config.encoding)
+    known = 0.0 if base is None else base.effects(rows.windows[:, : base.network.inputs])
+    return rows.windows, encode(rows.change - known, config.encoding)
 
 
 def _rows(config: ModelConfig, episodes: Sequence[Trajectory]) -> Transitions:
