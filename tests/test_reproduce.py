@@ -17,18 +17,18 @@ from gsl.tasks.distance import Distance
 from gsl.tasks.walk import Walk
 
 KEPT = {
-    "table2": ("none", "ane_02", "gat"),
+    "table2": ("none", "ane_02", "gat", "sgat_residual"),
     "table3": ("gat",),
     "table4": ("gat", "sgat"),
     "linear-walk": ("none", "gat"),
     "fig5": ("none", "gat"),
 }
 ALL = (
-    *("none", "ane_005", "ane_01", "ane_02", "ane_04", "randomised", "gat", "gat_005", "gat_gated", "sgat"),
-    *("identified", "effects", "effects_gat", "effects_sgat"),
+    *("none", "ane_005", "ane_01", "ane_02", "ane_04", "randomised", "gat", "gat_005", "gat_gated", "gat_residual"),
+    *("sgat", "sgat_residual", "identified", "effects", "effects_gat", "effects_sgat"),
 )
 OFFERED = {"table2": ALL, "table3": ("gat", "effects"), "table4": ("none", "ane_02", "gat", "sgat"),
-           "linear-walk": ("none", "ane_02", "gat"), "fig5": ("none", "ane_02", "gat")}  # fmt: skip
+           "linear-walk": ("none", "ane_02", "gat", "gat_residual"), "fig5": ("none", "ane_02", "gat")}  # fmt: skip
 FEW = ("preset=toy", "study.iterate.workers=1", "study.iterate.optimizer.candidates=4")
 
 
@@ -37,13 +37,13 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     left_out = [f"~study.methods.{name}" for name in OFFERED[what] if name not in KEPT[what]]
     left_out += ["~study.worlds.nao_weak"] if what == "table2" else []
     left_out += ["~study.simulators.nao_weak", "study.iterate.iterations=2"] if what == "table3" else []
-    left_out += ["study.iterate.budget.episodes=2", "study.iterate.optimizer.generations=1"] if what == "table4" else []
+    left_out += ["study.iterate.budget.episodes=2", "study.iterate.optimizer.generations=1"] if what in ("table4", "linear-walk") else []
     said = done("reproduce", what, *FEW, "study.iterate.task.duration=1.2", *left_out, folder=tmp_path)
     assert "minutes from nothing" in said.err
     folder = next((tmp_path / "runs").glob("*/reproduce"))
     trials = json.loads((folder / "trials.json").read_text())
     assert {one["method"] for one in trials} == set(KEPT[what])
-    iterations = {"table3": 2, "table4": 2}.get(what, 1)
+    iterations = {"table3": 2, "table4": 2, "linear-walk": 2}.get(what, 1)
     assert {one["iteration"] for one in trials} == set(range(1, iterations + 1))
     table = (folder / "table.md").read_text()
     assert all(f"| {name} " in table for name in KEPT[what])
