@@ -15,7 +15,7 @@ from test_diagnosis import PERIOD, QUICK, arm, log
 from gsl.core.history import History
 from gsl.core.labels import alike
 from gsl.core.plant import nominal
-from gsl.core.trajectory import Batch
+from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.diagnose import diagnosed
 from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import experiment
@@ -24,7 +24,7 @@ from gsl.diagnosis.records import records
 from gsl.diagnosis.replay import InTheAir
 from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import names
-from gsl.errors import GslError, InputError
+from gsl.errors import ConfigError, InputError
 from gsl.grounding.gat import LoadedTransformation
 from gsl.models.config import ModelConfig
 from gsl.models.forward import ForwardModel
@@ -199,7 +199,6 @@ def test_a_table_says_what_it_leaves_out_of_its_means() -> None:
 
 CAUSE = {"command_latency": {"delay": 0.016}}
 LINE = ("sim.robot=blind_arm.arm", "sim.floating=false", "most=1", "nulls=0", "duels=0", "workers=1", "by=gain")
-LINEAR = "gat.forward.family=linear"
 SMALL = f"without=[{','.join(sorted(set(names()) - {'command_latency', 'coulomb_friction', 'viscous_friction'}))}]"
 
 
@@ -216,7 +215,7 @@ def folds(folder: Path) -> list[dict[str, Any]]:
 
 def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
     written(both(**CAUSE), tmp_path / "logs.parquet")
-    done("cross-validate", "real=logs.parquet", *LINE, SMALL, "name=c", LINEAR, folder=tmp_path)
+    done("cross-validate", "real=logs.parquet", *LINE, SMALL, "name=c", folder=tmp_path)
     folder = tmp_path / "runs/c/cross_validate"
     assert [one["values"] for one in folds(folder)] == [[0.5], [1.0]]
     assert all(one["causes"] == ["command_latency"] for one in folds(folder))
@@ -236,6 +235,8 @@ def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
         assert said.startswith("usual") and line in said
     said = refused("cross-validate", "real=logs.parquet", *LINE, "folds=3", folder=tmp_path)
     assert said == "folds = 3: the label gain has 2 values"
+    said = refused("cross-validate", "real=logs.parquet", *LINE, "folds=2", "checks=values", folder=tmp_path)
+    assert said == "folds = 2: two groups leave no next one to check on; take three"
 
 
 def test_values_are_held_out_in_groups(tmp_path: Path) -> None:
@@ -249,44 +250,92 @@ def test_values_are_held_out_in_groups(tmp_path: Path) -> None:
 
 
 def learning(**how: Any) -> LearnedReplay:
-    return LearnedReplay(forward=ModelConfig(family="linear"), inverse=ModelConfig(family="linear"), **how)
+    return LearnedReplay(model=ModelConfig(family="linear"), **how)
 
 
 def world() -> BulletWorld:
     return BulletWorld(robot="test_diagnosis.arm", effects={}, floating=False)
 
 
+def bare() -> Simulated:
+    return Simulated(world(), InTheAir(nominal(arm()), 0.002, PERIOD), arm(), {}, none(2))
+
+
+def untouched() -> LoadedTransformation:
+    forward = ForwardModel(fit_linear(np.ones((2, 16)), np.ones((2, 2)), ridge=1.0), History(3), arm().controlled)
+    return LoadedTransformation(forward, Solver(forward, np.eye(2), 0.5), alpha=0.0)
+
+
+def shortened(one: Trajectory, ticks: int) -> Trajectory:
+    rows = slice(0, ticks + 1)
+    return replace(
+        one, time=one.time[rows], action=one.action[:ticks], position=one.position[rows], velocity=one.velocity[rows]
+    )
+
+
 def test_a_grounding_that_does_nothing_replays_as_the_chain_does() -> None:
-    made = both(**CAUSE)
-    found, simulator = records(made, arm()), InTheAir(nominal(arm()), 0.002, PERIOD)
-    network = fit_linear(np.ones((2, 16)), np.ones((2, 2)), ridge=1.0)
-    forward = ForwardModel(network, History(3), arm().controlled)
-    nothing = LoadedTransformation(forward, Solver(forward, np.eye(2), 0.5), alpha=0.0)
-    simulated = Simulated(world(), simulator, arm(), {"coulomb_friction": {"torque": 0.05}}, none(2) + 0.01)
+    found = records(both(**CAUSE), arm())
+    simulated = replace(bare(), effects={"coulomb_friction": {"torque": 0.05}}, nuisances=none(2) + 0.01)
     for one in (found[0], found[-1]):
-        other = mean_errors(simulator, simulated.effects, simulated.nuisances, [one], arm())
-        assert simulated.replayed(one, nothing, 1) == pytest.approx(other.mean(), rel=1e-3)
+        other = mean_errors(simulated.simulator, simulated.effects, simulated.nuisances, [one], arm())
+        assert simulated.replayed(one, untouched(), 1) == pytest.approx(other.mean(), rel=1e-3)
 
 
 @pytest.mark.parametrize(("cause", "residual", "left"), [(LATE, False, 0.85), (STICKY, True, 0.85)])
 def test_a_learned_grounding_brings_replays_nearer(cause: dict[str, Any], residual: bool, left: float) -> None:
-    found, simulator = records(log(cause, jitter=0.0), arm()), InTheAir(nominal(arm()), 0.002, PERIOD)
-    simulated = Simulated(world(), simulator, arm(), {}, none(2))
-    errors = learning(residual=residual).errors(simulated, found[:6], found[6:], 1)
-    assert np.mean(errors) < left * mean_errors(simulator, {}, none(2), found[6:], arm()).mean()
+    found = records(log(cause, jitter=0.0), arm())
+    errors = learning(residual=residual).errors(bare(), found[:6], found[6:], 1)
+    assert np.mean(errors) < left * mean_errors(bare().simulator, {}, none(2), found[6:], arm()).mean()
 
 
 def test_a_correction_of_a_simulator_that_knows_gains_is_better_at_another_gain_than_a_model_of_logs() -> None:
     found = records(both(viscous_friction={"coefficient": 0.4}), arm())
-    simulated = Simulated(world(), InTheAir(nominal(arm()), 0.002, PERIOD), arm(), {}, none(2))
-    errors = {how: learning(residual=how).errors(simulated, found[:9], found[9:], 1) for how in (True, False)}
+    errors = {how: learning(residual=how).errors(bare(), found[:9], found[9:], 1) for how in (True, False)}
     assert np.mean(errors[True]) < 0.7 * np.mean(errors[False])
 
 
 def test_too_few_trajectories_teach_no_grounding() -> None:
-    found, simulator = records(log({}), arm())[:2], InTheAir(nominal(arm()), 0.002, PERIOD)
-    with pytest.raises(GslError, match="GAT needs 3 trajectories to learn from, here are 2; gat=null leaves it out"):
-        learning().errors(Simulated(world(), simulator, arm(), {}, none(2)), found, found, 1)
+    made = log({})
+    short = tuple(shortened(one, 10) for one in made.episodes)
+    for episodes in (made.episodes[:2], (*made.episodes[:2], *short)):
+        found = records(replace(made, episodes=episodes, metadata={}), arm())
+        with pytest.raises(
+            ConfigError, match="fewer than 3 trajectories of 14 control periods to learn from; gat=null"
+        ):
+            learning().errors(bare(), found, found, 1)
+
+
+def test_short_trajectories_are_played_whole() -> None:
+    made = log({})
+    episodes = (*made.episodes[:2], *(shortened(one, 60) for one in made.episodes[2:4]))
+    found = records(replace(made, episodes=episodes, metadata={}), arm())
+    assert [len(one) for one in bare().played(found, {}, 0.0, 1)] == [100, 100, 60, 60]
+    assert np.isfinite(learning().errors(bare(), found, found, 1)).all()
+
+
+def test_replays_beside_others_have_no_noise_and_say_when_they_diverge() -> None:
+    found = records(log({}), arm())[:3]
+    noisy = replace(bare(), effects={"encoder_noise": {"sd": 0.01}, "action_noise": {"sd": 0.05}})
+    assert noisy.replayed(found[0], untouched(), 1) == pytest.approx(
+        bare().replayed(found[0], untouched(), 1), rel=1e-6
+    )
+    wild = replace(bare(), effects={"servo_gain": {"kd": 400.0}})
+    assert np.isnan(wild.replayed(found[0], untouched(), 1))
+
+
+@pytest.mark.parametrize(
+    ("model", "line"),
+    [
+        ({"sensors": ("gyro",)}, "gat.model.sensors: logs in the air have joints alone"),
+        ({"members": 3}, "gat.model: replays are of one model that says a point"),
+        ({"history": "auto"}, "gat.model: a correction has a history of one length, and plain angles"),
+        ({"encoding": "sincos"}, "gat.model: a correction has a history of one length, and plain angles"),
+    ],
+)
+def test_what_a_replay_cannot_learn_is_refused(model: dict[str, Any], line: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        LearnedReplay(model=ModelConfig(**model))
+    assert str(caught.value).startswith(line)
 
 
 def test_what_is_held_out_changes_nothing_of_its_diagnosis(tmp_path: Path) -> None:

@@ -37,7 +37,11 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     left_out = [f"~study.methods.{name}" for name in OFFERED[what] if name not in KEPT[what]]
     left_out += ["~study.worlds.nao_weak"] if what == "table2" else []
     left_out += ["~study.simulators.nao_weak", "study.iterate.iterations=2"] if what == "table3" else []
-    left_out += ["study.iterate.budget.episodes=2", "study.iterate.optimizer.generations=1"] if what in ("table4", "linear-walk") else []
+    left_out += (
+        ["study.iterate.budget.episodes=2", "study.iterate.optimizer.generations=1"]
+        if what in ("table4", "linear-walk")
+        else []
+    )
     said = done("reproduce", what, *FEW, "study.iterate.task.duration=1.2", *left_out, folder=tmp_path)
     assert "minutes from nothing" in said.err
     folder = next((tmp_path / "runs").glob("*/reproduce"))

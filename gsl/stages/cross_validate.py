@@ -13,6 +13,7 @@ from gsl.core.body import lumped
 from gsl.core.labels import alike
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
+from gsl.core.transitions import usable
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Hypothesis
 from gsl.diagnosis.candidates import library
@@ -98,6 +99,10 @@ class CrossValidate:
         if caveat := other_clocks(log, self.clocks):
             console.status(f"warning: {caveat}")
         groups = self._groups(log)
+        if self.gat is not None:
+            for group in groups:
+                lengths = [usable(one) for one in self._rest(log, group).episodes]
+                self.gat.check(lengths, f"the trajectories without {self.by} {', '.join(map(str, group))}")
         after = [*groups[1:], groups[0]] if self.checks == "values" and len(groups) > 2 else [[]] * len(groups)
         folds = [self._fold(log, *pair, console) for pair in zip(groups, after, strict=True)]
         documents.write_json(folder / DATA, [one.told() for one in folds])
@@ -110,6 +115,8 @@ class CrossValidate:
         values = self._values(log)
         if self.folds is None:
             return [[value] for value in values]
+        if self.folds == 2 and self.checks == "values":
+            raise ConfigError("folds", "two groups leave no next one to check on; take three", given="2")
         if self.folds > len(values):
             raise ConfigError("folds", f"the label {self.by} has {len(values)} values", given=str(self.folds))
         return [values[k :: self.folds] for k in range(self.folds)]

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.plant import Plant
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
@@ -23,6 +24,7 @@ from gsl.grounding.gat import LoadedTransformation
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Forward
 from gsl.models.forward import ForwardModel
+from gsl.models.free_run import TICKS
 from gsl.models.inverse import Solver
 from gsl.models.linear import fit_linear
 from gsl.stages import train_forward, train_inverse
@@ -30,7 +32,7 @@ from gsl.stages.chain import SHRINKING
 from gsl.stages.train_inverse import Damping
 from gsl.stages.training import parted
 from gsl.worlds.bullet import BulletEnv, BulletWorld
-from gsl.worlds.held import Windows
+from gsl.worlds.held import RUNAWAY, Windows
 from gsl.worlds.start import resting
 
 SHARE = 0.2  # of the trajectories that stop a fit, and again of those that judge it
@@ -43,22 +45,44 @@ class LearnedReplay:
     """How the grounding is learned; the defaults of its config are the recipe's.
 
     The inverse model solves one of the simulator, which learns what this does with the logs' commands and noise on top.
-    The forward model corrects that by how the robot differs (`residual`), or learns the logs alone, as in the paper.
-    Where conditions of trajectories are known, such as gains, there is a model of the simulator under each.
+    The forward model corrects that, linearly, by how the robot differs (`residual`), or learns the logs alone, as in
+    the paper. Where conditions of trajectories are known, such as gains, there is a model of the simulator under each.
     """
 
-    forward: Annotated[ModelConfig, setting("the forward model of the robot")]
-    inverse: Annotated[ModelConfig, setting("the model of the simulator that is solved for actions")]
-    residual: Annotated[bool, setting("the forward model corrects the simulator's; else it learns the logs alone")] = (
-        True
-    )
+    model: Annotated[ModelConfig, setting("of the simulator, and of the robot where that is no residual")]
+    residual: Annotated[bool, setting("the robot's model corrects the simulator's, or learns the logs alone")] = True
     damping: Damping = 0.2
     noise: Annotated[float, setting("on the commands that the simulator plays", unit="rad", ge=0)] = 0.015
 
     def __post_init__(self) -> None:
-        """Refuse body sensors: a robot in the air has none to tell of."""
-        if self.forward.sensors:
-            raise ConfigError("gat.forward.sensors", "logs in the air have joints alone; leave the sensors out")
+        """Refuse what cannot be learned from joints alone, and what a correction cannot be."""
+        if self.model.sensors:
+            raise ConfigError("gat.model.sensors", "logs in the air have joints alone; leave the sensors out")
+        if self.model.head.draws or self.model.members > 1:
+            raise ConfigError(
+                "gat.model", "replays are of one model that says a point; leave likelihood and members out"
+            )
+        if self.residual and (self.model.history == "auto" or self.model.encoding != "plain"):
+            raise ConfigError("gat.model", "a correction has a history of one length, and plain angles")
+
+    @property
+    def needed(self) -> int:
+        """Control periods a trajectory has to have to be learned from."""
+        return self.model.of_joints.span + TICKS + self.model.horizon
+
+    def check(self, lengths: Sequence[int], told: str) -> None:
+        """Refuse to learn from too little.
+
+        Args:
+            lengths: Of the trajectories [control periods].
+            told: Which they are, in words.
+
+        Raises:
+            ConfigError: Too few are long enough.
+        """
+        if sum(length >= self.needed for length in lengths) < LEAST:
+            problem = f"{told} are fewer than {LEAST} trajectories of {self.needed} control periods to learn from"
+            raise ConfigError("gat", f"{problem}; gat=null leaves it out")
 
     def errors(self, world: Simulated, known: Sequence[Record], held: Sequence[Record], seed: int) -> list[float]:
         """Return the mean absolute error of every held-out trajectory [rad], NaN where a replay diverges.
@@ -70,13 +94,10 @@ class LearnedReplay:
             seed: Of the noise and the fits.
 
         Raises:
-            GslError: There are too few trajectories to learn from.
+            ConfigError: There are too few trajectories to learn from.
         """
-        known = [one for one in map(driven, known) if len(one)]
-        if len(known) < LEAST:
-            raise GslError(
-                f"GAT needs {LEAST} trajectories to learn from, here are {len(known)}; gat=null leaves it out"
-            )
+        known = [one for one in map(driven, known) if len(one) >= self.needed]
+        self.check([len(one) for one in known], "the rest")
         every = [*known, *held]
         kinds = same([one.conditions for one in every])
         kind = {k: number for number, index in enumerate(kinds) for k in index}
@@ -90,7 +111,9 @@ class LearnedReplay:
     def _solver(self, world: Simulated, known: Sequence[Record], conditions: Mapping[str, Any], seed: int) -> Solver:
         """Return what solves the simulator under some conditions for actions."""
         played = world.batch(world.played(known, conditions, self.noise, seed))
-        found, _ = train_inverse.fitted(self.inverse, parted(played, SHARE, seed), seed, "solve", self.damping)
+        if len(played) < LEAST:
+            raise GslError("GAT cannot learn a simulator whose replays diverge; gat=null leaves it out")
+        found, _ = train_inverse.fitted(self.model, parted(played, SHARE, seed), seed, "solve", self.damping)
         assert isinstance(found, Solver)
         return found
 
@@ -100,14 +123,14 @@ class LearnedReplay:
         """Return a forward model for every solver, given which one each trajectory belongs to."""
         logged = world.batch(map(world.recorded, known))
         if not self.residual:
-            return [train_forward.fitted(self.forward, parted(logged, SHARE, seed), seed)[0]] * len(solvers)
+            return [train_forward.fitted(self.model, parted(logged, SHARE, seed), seed)[0]] * len(solvers)
         bases = [one.simulator for one in solvers]
         rows = [transitions([one], bases[0].history, bases[0].horizon, carried_out=True) for one in logged.episodes]
         windows = np.concatenate([one.windows for one in rows])
         left = np.concatenate(
             [one.change - bases[number].effects(one.windows) for one, number in zip(rows, kind, strict=True)]
         )
-        network = fit_linear(windows, left, ridge=max(self.forward.ridge, SHRINKING))
+        network = fit_linear(windows, left, ridge=max(self.model.ridge, SHRINKING))
         return [ForwardModel(network, base.history, base.joints, horizon=base.horizon, base=base) for base in bases]
 
 
@@ -133,44 +156,48 @@ class Simulated:
         self, known: Sequence[Record], conditions: Mapping[str, Any], noise: float, seed: int
     ) -> Iterator[Trajectory]:
         """Yield what the simulator does from the states and with the commands of logs, in cuts, with noise on top."""
-        period, joints = self.simulator.period, self.nuisances.shape[1]
-        length = min(round(PLAYED / period), max(map(len, known)))
-        about = [replace(one, about={**one.about, "conditions": conditions}) for one in known]
-        cut = pieces(about, self.robot, period, warm_up=0, scored=length)
-        noises = np.random.default_rng(derived_seed(seed, "played")).standard_normal((len(cut), length, joints))
-        commands = cut.windows.commands.copy()
-        commands[:, :length] += noise * noises[..., self.robot.drive]
-        assert isinstance(cut.windows, Windows)
-        told = self.simulator.told(
-            self.effects, self.nuisances, replace(cut, windows=cut.windows._replace(commands=commands))
-        )
-        for start, path, asked in zip(cut.windows.motion[:, :1, :joints], told, commands, strict=True):
-            if np.isfinite(path).all():
-                yield self._trajectory(asked[:length, :joints][::-1], np.vstack([start, path]))
+        joints, longest = self.nuisances.shape[1], round(PLAYED / self.simulator.period)
+        rng = np.random.default_rng(derived_seed(seed, "played"))
+        for one in known:
+            about, length = replace(one, about={**one.about, "conditions": conditions}), min(longest, len(one))
+            cut = pieces([about], self.robot, self.simulator.period, warm_up=0, scored=length)
+            assert isinstance(cut.windows, Windows)
+            commands = cut.windows.commands.copy()
+            commands[:, :length] += noise * rng.standard_normal((len(cut), length, joints))[..., self.robot.drive]
+            noisy = replace(cut, windows=cut.windows._replace(commands=commands))
+            told = self.simulator.told(self.effects, self.nuisances, noisy)
+            for start, path, asked in zip(cut.windows.motion[:, :1, :joints], told, commands, strict=True):
+                if np.isfinite(path).all():
+                    yield self._trajectory(asked[:length, :joints][::-1], np.vstack([start, path]))
 
     def replayed(self, one: Record, grounding: LoadedTransformation, seed: int) -> float:
-        """Return the mean absolute error of a replay whose commands pass through a grounding [rad]."""
+        """Return the mean absolute error of a replay whose commands pass through a grounding [rad]; NaN if it diverges."""
         one = driven(one)
         if not len(one):
             return float("nan")
         start = resting(self.robot, one.position[0][self.robot.drive], one.targets[0], floating=False)
         motion = np.array([one.position[0], one.velocity[0]])[:, self.robot.drive]
         start = start._replace(reading=start.reading._replace(motion=motion))
-        env = self._env(one.conditions)
-        run, told = grounding.start(env.layout, np.random.default_rng(seed)), []
-        seen, _ = env.reset(seed=seed, options={"start": start})
-        for action in one.targets[:, : len(env.layout.joints)]:
-            seen, *_ = env.step(run.transform(seen, action))
-            told.append(seen[env.layout["position"]])
-        env.close()
+        env, told = self._env(one.conditions), []
+        position, velocity = env.layout["position"], env.layout["velocity"]
+        run = grounding.start(env.layout, np.random.default_rng(seed))
+        try:
+            seen, _ = env.reset(seed=seed, options={"start": start})
+            for action in one.targets[:, : len(env.layout.joints)]:
+                seen, *_ = env.step(run.transform(seen, action))
+                if not np.all(np.abs(seen[velocity]) < RUNAWAY) or not np.isfinite(seen[position]).all():
+                    return float("nan")
+                told.append(seen[position])
+        finally:
+            env.close()
         return float(np.abs(np.array(told) - one.position[1:]).mean())
 
     def _env(self, conditions: Mapping[str, Any]) -> BulletEnv:
-        """Return the engine with this simulator, in which a grounding can act."""
+        """Return the engine with this simulator, in which a grounding can act, without noise as in all replays."""
         period, step = self.simulator.period, self.simulator.step
         world = replace(self.world, floating=False, step=step, period=period)
         plant = calibrated(applied(self.simulator.plant, built(self.effects)), self.nuisances)
-        return BulletEnv(world, applied(plant, built(conditions)))
+        return BulletEnv(world, noiseless(applied(plant, built(conditions))))
 
     def recorded(self, one: Record) -> Trajectory:
         """Return a log's trajectory as a model learns it."""
@@ -183,3 +210,9 @@ class Simulated:
     def _trajectory(self, action: np.ndarray, position: np.ndarray) -> Trajectory:
         period = self.simulator.period
         return Trajectory(period * np.arange(len(position)), action, position, slope(position, period))
+
+
+def noiseless(plant: Plant) -> Plant:
+    """Return a plant without the noise of encoders and actions."""
+    sensors = replace(plant.sensors, encoder_noise=np.zeros_like(plant.sensors.encoder_noise))
+    return replace(plant, sensors=sensors, action_noise=np.zeros_like(plant.action_noise))
