@@ -319,7 +319,7 @@ def test_replays_beside_others_have_no_noise_and_say_when_they_diverge() -> None
     assert noisy.replayed(found[0], untouched(), 1) == pytest.approx(
         bare().replayed(found[0], untouched(), 1), rel=1e-6
     )
-    wild = replace(bare(), effects={"servo_gain": {"kd": 400.0}})
+    wild = replace(bare(), effects={"viscous_friction": {"coefficient": 50.0}})
     assert np.isnan(wild.replayed(found[0], untouched(), 1))
 
 

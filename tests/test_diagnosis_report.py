@@ -143,6 +143,19 @@ def test_a_command_is_safe_to_paste() -> None:
     )
 
 
+def test_commands_for_a_robot_of_ones_own_name_it() -> None:
+    own = {"robot": "my arm.urdf", "period": 0.01, "world": "simulator"}
+    train, play = steps(made.document() | {"own": own})[:2]
+    assert train.command == "" and "with a task and a policy of yours" in train.why
+    first, again = play.command.splitlines()
+    robot = "world=robot 'world.robot=my arm.urdf' world.floating=false world.period=0.01 'world.sensors=[]'"
+    assert first == f"gsl collect {robot} task=excite policy.file=runs/worn/diagnose/next.json name=next"
+    assert again.startswith("gsl diagnose --config-dir runs/worn/diagnose sim=simulator real=next/collect_real ")
+    for kind in ("no_gap", "unknown"):
+        (step, *_) = steps(DOCUMENTS[kind]() | {"own": own})
+        assert step.command == ""
+
+
 def test_the_corrected_world_is_trained_in_by_its_folder_and_name() -> None:
     found = made.document()
     told = "gsl optimize --config-dir runs/worn/diagnose world=diagnosed grounding=none name=diagnosed"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_diagnosis import PERIOD, arm
@@ -54,6 +56,30 @@ def test_the_ladder_that_tells_them_apart_keeps_the_limits(bent: Findings) -> No
             unsure.ends[1]
         )
         assert np.ptp(targets[:, 1]) == 0.0
+
+
+def test_after_the_ladder_nothing_is_left_to_tell(bent: Findings) -> None:
+    (unsure,) = droops(bent)
+    climbed = played(OFF, dict(ladder((unsure,), arm(), PERIOD).variants), without=LEFT_OUT)
+    assert droops(climbed) == ()
+
+
+def test_a_log_with_the_base_turned_round_tells(bent: Findings) -> None:
+    """Half of the windows are said to hang the other way round; what gravity did there is then part of the answer."""
+    pieces, turned = bent.experiment.pieces, {"gravity_tilt": {"pitch": 3.14}}
+    known = replace(pieces, conditions=tuple(({}, turned)[k % 2] for k in range(len(bent.experiment.records))))
+    assert droops(replace(bent, experiment=replace(bent.experiment, pieces=known))) == ()
+
+
+def test_a_zero_that_is_named_is_one_as_well() -> None:
+    """Where the library explains it, an offset in the servo or in the log is still no load for sure."""
+    named = played(OFF, swings(0.08, 0.9, 1.2), without=LEFT_OUT[2:])
+    off = replace(named.answer.fit, nuisances=nuisance.none(2))
+    cause = next(one for one in named.selection.tried if one.names in (("zero_offset",), ("sensor_bias",)))
+    chosen = replace(cause, fit=off)
+    verdict = replace(named.verdict, word="inseparable")
+    found = replace(named, selection=replace(named.selection, chosen=chosen), verdict=verdict)
+    assert [one.joint for one in droops(found)] == ["shoulder"]
 
 
 def test_a_log_of_many_poses_shows_a_zero_as_what_it_is() -> None:

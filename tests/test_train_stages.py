@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commands import refused
 from toy_plant import LAYOUT, QUICK, SLOW, ToyEnv, a_batch
 
 from gsl.core.transitions import transitions
@@ -218,3 +219,18 @@ def test_noise_on_real_actions_is_part_of_what_was_done(tmp_path: Path) -> None:
     write(tmp_path / "real.parquet", a_batch(SLOW, "real", noise=0.05))
     metrics = TrainForward(data=str(tmp_path / "real.parquet"), model=LINEAR).run(tmp_path, QUIET)
     assert metrics["heldout"]["off_pi0"]["r2"] > 0.9999
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ("inverse_method=regression", "corrects the simulator's model, which inverse_method=solve has"),
+        ("grounding.predicts=mixture", "is linear and has no mixture; say grounding.predicts=gaussian"),
+        ("forward_model.history=auto", "need one history (a number), one horizon, and plain angles"),
+        ("inverse_model.horizon=2", "need one history (a number), one horizon, and plain angles"),
+    ],
+)
+def test_a_residual_that_cannot_be_is_refused_before_the_robot_is_asked(change: str, line: str, tmp_path: Path) -> None:
+    said = refused("iterate", "grounding=gat_residual", "preset=toy", change, folder=tmp_path)
+    assert said.startswith("grounding.residual") and line in said
+    assert not (tmp_path / "runs").exists()

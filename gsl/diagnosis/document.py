@@ -204,10 +204,8 @@ def _caveats(found: Findings) -> list[str]:
             "Inseparable in this log, in which gravity hardly changes: a shifted zero and another droop under gravity, "
             f"by a load or a gain that is off. The fit calls it a zero: {zeros}."
         )
-    if held := [one.joint for one in unsure if not one.told]:
-        said.append(
-            f"No pose of their own changes gravity enough to tell, only the base turned round: {', '.join(held)}."
-        )
+    if held := ", ".join(one.joint for one in unsure if not one.told):
+        said.append(f"No poses of one joint change gravity enough there to tell; turn the base round: {held}.")
     far = _far_off(found)
     if far:
         said.append(

@@ -15,16 +15,20 @@ from gsl.core.dynamics import forward_kinematics, jacobian
 from gsl.core.plant import Plant
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.diagnose import Findings
+from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.menu import Dish
+from gsl.diagnosis.noise_floor import MEAN
+from gsl.effects.effect import applied, built
 from gsl.policies.limits import Limits, limits
 
 WRONG = 1.0  # share of a load beyond which it is no longer taken for wrong instead of the zero
 FAR = 1.5  # spreads of the zeros of one make beyond which a zero is worth a thought
+SURE = 30.0  # squared distance, in noise, from which on a log tells the two apart
 LOOKED_AT = 60  # windows
 RUNGS = 5  # poses of the ladder
 TRIED = 21  # positions of a joint between which the farthest two are chosen
 HOLD, WAY = 0.8, 0.8  # of a rung, and least time from one to the next [s]
-APART = 2.0  # floors by which a ladder has to tell the two apart
+PLAYS = 3  # of a rung: two variants and a repeat
 
 
 @dataclass(frozen=True)
@@ -35,15 +39,17 @@ class Droop:
         joint: Its name.
         zero: Offset of the fit [rad].
         wrong: Share by which load or gain would be off instead.
-        ends: Positions between which gravity's torque changes most [rad].
-        torques: There [N·m].
+        mover: The joint whose poses change gravity's torque on it most; itself or another.
+        ends: Positions of that between which the torque changes most [rad].
+        torques: There, of the joint [N·m].
         apart: How far the two explanations are apart between these [rad].
-        told: Whether that is enough.
+        told: Whether a ladder of such poses tells them apart.
     """
 
     joint: str
     zero: float
     wrong: float
+    mover: str
     ends: tuple[float, float]
     torques: tuple[float, float]
     apart: float
@@ -52,40 +58,79 @@ class Droop:
 
 def droops(found: Findings) -> tuple[Droop, ...]:
     """Return the joints of which a log in the air does not tell a zero from a load, those of little offset left out."""
-    exp, plant = found.experiment, found.simulator.plant
+    exp, n = found.experiment, len(found.experiment.joints)
     if exp.walking:
         return ()
-    robot, n = lumped(plant.robot), len(exp.joints)
-    windows = exp.pieces.real.mean(axis=1)
-    poses = windows[np.unique(np.linspace(0, len(windows) - 1, min(LOOKED_AT, len(windows))).round().astype(int))]
-    nuisances, floor = found.answer.fit.nuisances, exp.comparison.floor[:n]
-    zero = (nuisances[nuisance.ZERO] + nuisances[nuisance.OFFSET])[:n]
-    stiffness = (plant.servo.kp[:n] * np.exp(nuisances[nuisance.KP, :n])).clip(1e-9)
-    pull = np.array([gravity_torque(plant, robot, pose) for pose in poses])[:, :n]
-    load, change = np.abs(pull.mean(axis=0)).clip(1e-9), pull.std(axis=0)
-    wrong = np.abs(zero) * stiffness / load
+    plant = _answered(found)
+    zero = _zeros(plant, n) - _zeros(found.simulator.plant, n)
+    pull, stiffness = _statics(found, plant)
+    droop = pull / stiffness
+    mean = np.abs(droop.mean(axis=0)).clip(1e-9)
+    wrong, left = np.abs(zero) / mean, np.abs(zero) * np.abs(droop - droop.mean(axis=0)) / mean
     usual = FAR * found.simulator.spread * np.hypot(*nuisance.SIZES[[nuisance.ZERO, nuisance.OFFSET]])
-    unseen = (np.abs(zero) > np.maximum(floor, usual)) & (wrong <= WRONG) & (np.abs(zero) * change / load < floor)
-    bounds = limits(exp.robot)
-    return tuple(
-        _droop(plant, robot, bounds, int(k), zero[k], wrong[k], stiffness[k], floor[k]) for k in np.flatnonzero(unseen)
-    )
+    least, count = np.maximum(exp.comparison.floor[:n], usual), len(exp.pieces) / len(droop) * _samples(exp)
+    unsure = [
+        k
+        for k in range(n)
+        if np.abs(zero[k]) > least[k] and wrong[k] <= WRONG and not _seen(found, k, left[:, k], count)
+    ]
+    return tuple(_droop(found, plant, k, float(zero[k]), float(wrong[k])) for k in unsure)
 
 
-def _droop(
-    plant: Plant, robot: Robot, bounds: Limits, k: int, zero: float, wrong: float, stiffness: float, floor: float
-) -> Droop:
-    """Return a joint with the two positions, within its room, where gravity's torque differs most."""
-    tried = np.linspace(bounds.rest[k] - bounds.down[k], bounds.rest[k] + bounds.up[k], TRIED)
-    poses = np.repeat(bounds.rest[None], TRIED, axis=0)
-    poses[:, k] = tried
-    pull = np.array([gravity_torque(plant, robot, pose)[k] for pose in poses])
-    ends = sorted((int(pull.argmin()), int(pull.argmax())))
-    apart = wrong * float(np.ptp(pull)) / stiffness
-    low, high = (float(tried[end]) for end in ends)
+def _answered(found: Findings) -> Plant:
+    """Return the simulator with what was found and the calibration that goes with it."""
+    return nuisance.calibrated(applied(found.simulator.plant, built(found.answer.effects)), found.answer.fit.nuisances)
+
+
+def _zeros(plant: Plant, n: int) -> np.ndarray:
+    """Return where joints stand off in the log, by their servos or by their sensors [rad], shape (n,)."""
+    return (plant.servo.offset + plant.sensors.bias)[:n]
+
+
+def _samples(exp: Experiment) -> float:
+    """Return how many samples of a window are worth one each: their means over MEAN ticks."""
+    return max(1.0, (exp.pieces.real.shape[1] - exp.pieces.warm_up) / MEAN)
+
+
+def _statics(found: Findings, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
+    """Return gravity's torque [N·m] and the stiffness [N·m/rad] in windows under what is known, shape (W, n_joints)."""
+    exp, n, pull, stiffness = found.experiment, len(found.experiment.joints), [], []
+    poses = exp.pieces.real.mean(axis=1)
+    every = max(1, -(-len(poses) // LOOKED_AT))
+    for known, index in exp.pieces.alike:
+        under = applied(plant, built(known))
+        robot = lumped(under.robot)
+        some = index[::every]
+        pull += [gravity_torque(under, robot, pose)[:n] for pose in poses[some, :n]]
+        stiffness += [under.servo.kp[:n].clip(1e-9)] * len(some)
+    return np.array(pull), np.array(stiffness)
+
+
+def _seen(found: Findings, k: int, left: np.ndarray, count: float) -> bool:
+    """Whether what a load would leave of a zero shows: against noise in all, and once against what does not matter."""
+    noise = found.experiment.noise.sd[k]
+    return bool(count * float(((left / noise) ** 2).sum()) > SURE and left.max() > found.tolerance)
+
+
+def _droop(found: Findings, plant: Plant, k: int, zero: float, wrong: float) -> Droop:
+    """Return a joint with the poses of a mover, within its room, between which gravity's torque on it differs most."""
+    bounds, robot = limits(found.experiment.robot), lumped(plant.robot)
+    stiffness = max(float(plant.servo.kp[k]), 1e-9)
+    best: tuple[float, int, np.ndarray, np.ndarray] = (-1.0, k, np.zeros(TRIED), np.zeros(TRIED))
+    for mover in (k, *(other for other in range(len(bounds.joints)) if other != k)):
+        tried = np.linspace(bounds.rest[mover] - bounds.down[mover], bounds.rest[mover] + bounds.up[mover], TRIED)
+        poses = np.repeat(bounds.rest[None], TRIED, axis=0)
+        poses[:, mover] = tried
+        pull = np.array([gravity_torque(plant, robot, pose)[k] for pose in poses])
+        if np.ptp(pull) > 1.2 * best[0]:  # another joint only where that is worth it
+            best = float(np.ptp(pull)), mover, tried, pull
+    most, mover, tried, pull = best
+    low, high = sorted((int(pull.argmin()), int(pull.argmax())))
+    rungs = np.abs(np.linspace(-0.5, 0.5, RUNGS)) * wrong * most / stiffness
+    count = PLAYS * max(1.0, HOLD / found.experiment.period / MEAN)
     return Droop(
-        bounds.joints[k], float(zero), float(wrong), (low, high), (float(pull[ends[0]]), float(pull[ends[1]])), apart,
-        apart > APART * floor,
+        bounds.joints[k], zero, wrong, bounds.joints[mover], (float(tried[low]), float(tried[high])),
+        (float(pull[low]), float(pull[high])), wrong * most / stiffness, _seen(found, k, rungs, count),
     )  # fmt: skip
 
 
@@ -119,7 +164,7 @@ def ladder(found: tuple[Droop, ...], robot: Robot, period: float) -> Dish:
 
 
 def _climb(bounds: Limits, one: Droop, period: float, *, reverse: bool) -> np.ndarray:
-    k = bounds.joints.index(one.joint)
+    k = bounds.joints.index(one.mover)
     rungs = np.linspace(*(one.ends[::-1] if reverse else one.ends), RUNGS)
     stops = [bounds.rest[k], *rungs, bounds.rest[k]]
     way = []

@@ -89,9 +89,9 @@ def _ladder(unsure: tuple[Droop, ...], found: Findings) -> NextExperiment:
     joints, (first, last) = ", ".join(one.joint for one in unsure), most.torques
     why = (
         f"This log cannot tell a shifted zero from another droop under gravity in {joints}. On a ladder of poses a "
-        f"zero stays and gravity's torque changes: in {most.joint} from {first:+.2f} to {last:+.2f} N·m between "
-        f"{most.ends[0]:.2f} and {most.ends[1]:.2f} rad, which sets the two {1e3 * most.apart:.0f} mrad apart; "
-        f"{seconds:.0f} s with a second variant and a repeat."
+        f"zero stays and gravity's torque changes: in {most.joint} from {first:+.2f} to {last:+.2f} N·m with "
+        f"{most.mover} between {most.ends[0]:.2f} and {most.ends[1]:.2f} rad, which sets the two "
+        f"{1e3 * most.apart:.0f} mrad apart; {seconds:.0f} s with a second variant and a repeat."
     )
     return NextExperiment("pose_ladder", (PAIR,), dish.episodes, why)
 

@@ -26,7 +26,7 @@ from gsl.grounding.states import StateTransformation, TableTransformation
 from gsl.models.counts import Counts
 from gsl.models.ensemble import Ensemble, Forward
 from gsl.models.head import Likelihood
-from gsl.models.inverse import InverseModel
+from gsl.models.inverse import InverseModel, Solver
 from gsl.models.states import StateForward
 
 REACH = 0.5  # [rad]; a servo told to go farther than this from the agent's target is at its torque limit anyway
@@ -82,6 +82,8 @@ class ActionTransformation:
             return TableTransformation(f, f_inv, draws=self.predicts != "point")
         if self.residual and (isinstance(f, StateForward) or f.base is None):
             raise ConfigError("forward_model", "corrects no simulator; train it with residual_to=<the inverse model>")
+        if self.residual and not (isinstance(f_inv, Solver) and f.base.network.same(f_inv.simulator.network)):
+            raise ConfigError("inverse_model", "is not the one that the forward model corrects; train both together")
         if self.predicts not in ("point", f.head.likelihood):
             problem = f"predicts a {f.head.likelihood}; train it with model.likelihood={self.predicts}"
             raise ConfigError("forward_model", problem)

@@ -31,6 +31,11 @@ class Network:
         """Number of inputs."""
         return int(self.layers[0][0].shape[1])
 
+    def same(self, other: Network) -> bool:
+        """Whether another network has the same weights."""
+        ours, theirs = self.arrays(), other.arrays()
+        return ours.keys() == theirs.keys() and all(np.array_equal(ours[name], theirs[name]) for name in ours)
+
     @property
     def outputs(self) -> int:
         """Number of outputs."""

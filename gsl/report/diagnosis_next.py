@@ -37,18 +37,23 @@ def steps(document: Document) -> list[Step]:
 
 
 def _as_it_is(document: Document) -> Step:
-    return Step(
-        "Train in the simulator as it is: as far as this log shows, it is the robot.", "gsl optimize grounding=none"
-    )
+    told = "Train in the simulator as it is: as far as this log shows, it is the robot."
+    return Step(told) if _own(document) else Step(told, "gsl optimize grounding=none")
 
 
 def _corrected(document: Document) -> Step:
-    return Step(f"Train in the simulator with the effects switched on{_place(document)}.", _training(document))
+    told = f"Train in the simulator with the effects switched on{_place(document)}"
+    return Step(f"{told}{_yours(document)}.", _training(document))
 
 
 def _either(document: Document) -> Step:
     told = "Until then train with one of them on: whichever it is, it predicts as well"
-    return Step(f"{told}{_place(document)}.", _training(document))
+    return Step(f"{told}{_place(document)}{_yours(document)}.", _training(document))
+
+
+def _yours(document: Document) -> str:
+    """What no command can name of a robot that is not the default one."""
+    return ", with a task and a policy of yours" if _own(document) else ""
 
 
 def _place(document: Document) -> str:
@@ -67,11 +72,18 @@ def _folder(document: Document) -> str:
 def _training(document: Document) -> str:
     folder, world = _folder(document), PurePosixPath(str(document.get("world_file"))).stem
     chosen = f"--config-dir {shlex.quote(folder)} {shlex.quote(f'world={world}')}"
-    return f"gsl optimize {chosen} grounding=none name=diagnosed" if folder else ""
+    return f"gsl optimize {chosen} grounding=none name=diagnosed" if folder and not _own(document) else ""
 
 
 def _learned(document: Document) -> Step:
+    if _own(document):
+        return Step("Let a grounding learn what no effect explains: `gsl iterate` with your worlds, task and policy.")
     return Step("Let a grounding learn what no effect explains, and check it.", "gsl iterate grounding=gat")
+
+
+def _own(document: Document) -> Document:
+    """Return what commands have to name of a robot that is not the default one."""
+    return part(document, "own")
 
 
 def _experiment(document: Document) -> list[Step]:
@@ -92,8 +104,25 @@ def _experiment(document: Document) -> list[Step]:
     file, more = wanted.get("file"), str(wanted.get("why") or "")
     if not file:
         return [Step(f"{play}.", more=more)]
-    lines = (f"gsl collect task=excite {shlex.quote(f'policy.file={file}')} name=next", _again(document))
+    lines = (
+        f"gsl collect {_robot(document)}task=excite {shlex.quote(f'policy.file={file}')} name=next",
+        _again(document),
+    )
     return [Step(f"{play}, and diagnose again.", "\n".join(lines), more)]
+
+
+def _robot(document: Document) -> str:
+    """The real robot as the world of a command, which asks for it (docs/robot-in-the-loop.md)."""
+    own = _own(document)
+    if not own:
+        return ""
+    about = (
+        f"world.robot={own['robot']}",
+        "world.floating=false",
+        f"world.period={own['period']:g}",
+        "world.sensors=[]",
+    )
+    return f"world=robot {' '.join(map(shlex.quote, about))} "
 
 
 def _again(document: Document) -> str:
@@ -103,4 +132,6 @@ def _again(document: Document) -> str:
     except ValueError:
         given = []
     kept = [word for word in given[2:] if not word.startswith(("real=", "name=", "out=", "force="))]
-    return shlex.join(["gsl", "diagnose", "real=next/collect_real", *kept, "name=next"])
+    own, folder = _own(document), _folder(document)
+    sim = ["--config-dir", folder, f"sim={own['world']}"] if own and folder else []
+    return shlex.join(["gsl", "diagnose", *sim, "real=next/collect_real", *kept, "name=next"])

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from gsl.core.setting import component, setting
-from gsl.grounding.effects import DiagnosedEffects, switched_on
+from gsl.errors import ConfigError
+from gsl.grounding.effects import DiagnosedEffects, innermost, switched_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
@@ -68,6 +69,27 @@ class Chain:
     diagnosis: DiagnosisPlan
     accept: bool
     workers: int
+
+    def check(self, grounding: Grounding | ActionTransformation) -> None:
+        """Refuse a residual that its models cannot be, before anything is asked of the real robot.
+
+        Raises:
+            ConfigError: It could not be trained.
+        """
+        inner = innermost(grounding)
+        if not isinstance(inner, ActionTransformation) or not inner.residual:
+            return
+        f, f_inverse, where = self.forward_model, self.inverse_model, "grounding.residual"
+        if self.sim.layout.states:
+            raise ConfigError(where, "is for robots; f of an environment's states has no simulator to correct")
+        if self.inverse_method != "solve":
+            raise ConfigError(where, "corrects the simulator's model, which inverse_method=solve has", given="true")
+        if inner.predicts == "mixture":
+            raise ConfigError(where, "is linear and has no mixture; say grounding.predicts=gaussian", given="true")
+        alike = (f.history, f.horizon, f.encoding) == (f_inverse.history, f_inverse.horizon, "plain")
+        if not alike or f.history == "auto":
+            problem = "forward_model and inverse_model need one history (a number), one horizon, and plain angles"
+            raise ConfigError(where, problem, given="true")
 
     def diagnosed(self, home: Path, grounding: Grounding, seed: int, console: Any) -> Grounding:
         """Return a grounding that has its diagnosis, made below `home` if it wants one of its own."""

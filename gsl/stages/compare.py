@@ -50,6 +50,11 @@ class Compare:
     ] = None
     rank: Annotated[bool, setting("set a fixed set of policies in simulation against real")] = False
 
+    def __post_init__(self) -> None:
+        """Refuse methods that could not be trained."""
+        for method in self.methods.values():
+            self.iterate.chain.check(method)
+
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
         return {}

@@ -6,7 +6,7 @@ import shlex
 import time
 from collections.abc import Mapping
 from dataclasses import field, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, ClassVar
 
 import yaml
@@ -22,7 +22,7 @@ from gsl.diagnosis.verify import in_bullet
 from gsl.diagnosis.world_file import diagnosed_effects, joined
 from gsl.errors import InputError
 from gsl.report.diagnosis import report_html
-from gsl.stages.diagnosis_files import PAGE, REPORT, WORLD, report_of
+from gsl.stages.diagnosis_files import PAGE, REPORT, SIMULATOR, WORLD, report_of
 from gsl.stages.diagnosis_settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
 from gsl.stages.experiment_file import write_next_experiment
 from gsl.stages.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
@@ -31,6 +31,8 @@ from gsl.stages.population import Workers, threads
 from gsl.stages.real_returns import RealReturns, measured_parents, real_returns
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
+
+DEFAULT_ROBOT = "nao"  # that commands mean which name none
 
 
 @component
@@ -135,12 +137,18 @@ class Diagnose:
             data=self._data(found, batch),
             seconds=seconds,
             command=self._command(),
+            own=self._own(found),
         )
         told["caveats"] += filter(None, [self._stranger(batch), other_clocks(batch, self.clocks)])
         documents.write_json(folder / REPORT, told)
         (folder / PAGE).write_text(report_html(told), encoding="utf-8")
         (folder / WORLD).parent.mkdir()
         (folder / WORLD).write_text(self._world(found, told["summary"]), encoding="utf-8")
+        if told["own"]:
+            plain = yaml.safe_dump(documents.plain(described(self.sim)), sort_keys=False, allow_unicode=True)
+            (folder / SIMULATOR).write_text(
+                f"# The simulator that was diagnosed, as it was.\n{plain}", encoding="utf-8"
+            )
         return {
             "verdict": told["verdict"],
             "causes": [one["effect"] for one in told["causes"]],
@@ -148,6 +156,12 @@ class Diagnose:
             "after": told["shrinkage"]["after"],
             "fraction": told["shrinkage"]["fraction"],
         }
+
+    def _own(self, found: Findings) -> dict[str, Any] | None:
+        """Return what commands for another robot than the default one have to name."""
+        if self.sim.robot == DEFAULT_ROBOT:
+            return None
+        return {"robot": self.sim.robot, "period": found.experiment.period, "world": PurePosixPath(SIMULATOR).stem}
 
     def _command(self) -> str:
         """Return the settings to type again, of those that say what is diagnosed; the simulator is told in the data."""

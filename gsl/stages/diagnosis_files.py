@@ -9,7 +9,8 @@ from typing import Any
 from gsl.grounding.effects import Diagnosis
 from gsl.storage.references import load
 
-REPORT, PAGE, WORLD, COMMANDS = "report.json", "report.html", "world/diagnosed.yaml", "next_experiment.json"
+REPORT, PAGE, COMMANDS = "report.json", "report.html", "next_experiment.json"
+WORLD, SIMULATOR = "world/diagnosed.yaml", "world/simulator.yaml"
 
 
 def report_of(folder: Path) -> dict[str, Any]:

@@ -76,6 +76,7 @@ class Iterate:
             raise ConfigError("sim", "is a real robot, which cannot play the simulator's part")
         object.__setattr__(self, "policy", sized(self.policy, self.sim))
         check_alike(self.sim.layout, self.real.layout)
+        self.chain.check(self.grounding)
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
