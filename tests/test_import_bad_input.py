@@ -45,6 +45,11 @@ def swapped(columns: Columns) -> Columns:
     return {"_".join([names.get(n.split("_")[0], n.split("_")[0]), *n.split("_")[1:]]): v for n, v in columns.items()}
 
 
+def exchanged(columns: Columns) -> Columns:
+    """Swap what two joints measured; the commands are right."""
+    return {**columns, "q_shoulder": columns["q_elbow"], "q_elbow": columns["q_shoulder"]}
+
+
 def scaled(factor: float, *prefixes: str) -> Callable[[Columns], Columns]:
     return lambda columns: {name: factor * v if name.startswith(prefixes) else v for name, v in columns.items()}
 
@@ -63,6 +68,14 @@ def stuck(columns: Columns) -> Columns:
 
 WRONG = {
     "command and state swapped": (swapped, f"comes {1e3 * LAG:.0f} ms before action: are the columns of commands"),
+    "joints swapped": (
+        exchanged,
+        "position.shoulder: follows action.elbow and not action.shoulder: are the columns of joints swapped",
+    ),
+    "joints swapped, one the other way round": (
+        lambda c: exchanged(scaled(-1.0, "q_shoulder")(c)),
+        "position.shoulder: follows action.elbow",
+    ),
     "degrees": (scaled(180.0 / np.pi, "q", "goal"), "position.shoulder|action.shoulder: reaches 28.6"),
     "degrees of positions only": (scaled(57.3, "q"), "are these degrees"),
     "small degrees of commands": (
@@ -94,6 +107,25 @@ def test_a_wrong_log_is_one_clear_line(tmp_path: Path, name: str) -> None:
     line = told(tmp_path, csv(tmp_path / "log.csv", change(plain())))
     assert re.search(words, line), line
     assert "log.csv" in line or line.startswith("log: ")
+
+
+def test_joints_that_are_commanded_alike_or_dragged_along_are_not_swapped(tmp_path: Path) -> None:
+    both = {name: plain()[name.replace("elbow", "shoulder")] for name in plain()}
+    still = {**plain(), "goal_elbow": 0.0 * TIME, "q_elbow": 0.03 * plain()["q_shoulder"]}
+    for name, columns in (("both", both), ("still", still)):
+        said = gsl(
+            *("import", f"source={csv(tmp_path / f'{name}.csv', columns)}", mapping(tmp_path / "m.yaml")),
+            "--check",
+            folder=tmp_path,
+        )
+        assert said.code == 0 and "follows" not in said.out, said
+
+
+def test_swapped_joints_are_seen_where_another_episode_commands_them_alike(tmp_path: Path) -> None:
+    alike = {name: plain()[name.replace("elbow", "shoulder")] for name in plain()}
+    csv(tmp_path / "a.csv", alike)
+    csv(tmp_path / "b.csv", exchanged(plain()))
+    assert "follows action.elbow and not action.shoulder" in told(tmp_path, tmp_path)
 
 
 def test_what_looks_wrong_can_be_accepted(tmp_path: Path) -> None:
@@ -271,6 +303,10 @@ SETTINGS = {
         {"signals": {"action": "goal_elbow", "position": "q_{joint}"}},
         "column goal_elbow: 1 values a row for action, but 2 joints",
     ),
+    "one column for two joints": (
+        {"signals": {"action": "goal_{joint}", "position": ["q_elbow", "q_elbow"]}},
+        "mapping.signals.position.column = q_elbow: is that of several joints for position; every joint has",
+    ),
     "an entry too far": (
         {"signals": {"action": "goal_{joint}", "position": ["q_elbow[0]", "q_elbow[3]"]}},
         "column q_elbow: has 1 values a row; [3] counts from 0",
@@ -278,6 +314,12 @@ SETTINGS = {
     "a word for signals": ({"signals": "all"}, "mapping.signals = all: must be settings"),
     "two clocks": ({"command_offset": 99.0}, "two clocks? Say what the commands' is ahead"),
 }
+
+
+def test_a_column_that_is_used_already_is_not_what_was_meant(tmp_path: Path) -> None:
+    columns = {"t": TIME, "goal_j1": ACTION[:, 0], "goal_j2": ACTION[:, 1], "q_j1": POSITION[:, 0]}
+    line = told(tmp_path, csv(tmp_path / "log.csv", columns), joints=["j1", "j2"])
+    assert "column q_2: is missing; the file has t, goal_j1" in line
 
 
 @pytest.mark.parametrize("name", SETTINGS)

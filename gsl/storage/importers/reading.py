@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.errors import ConfigError, TrajectoryError
-from gsl.storage.importers.columns import Reference, joints_of, output_names, references, side_by_side
+from gsl.storage.importers.columns import Reference, joints_of, output_names, references, side_by_side, taken
 from gsl.storage.importers.formats import table
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, fields_of
@@ -64,7 +64,8 @@ def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[R
     joints = joints_of(mapping, tables[mapping.signals["position"].file])
     mapping.check_joints(list(joints))
     named = {name: one for name, one in mapping.signals.items() if _there(name, one, joints, tables)}
-    found = {name: references(name, one, joints, tables[one.file]) for name, one in named.items()}
+    others = {role: taken(mapping, joints, role) for role in tables}
+    found = {name: references(name, one, joints, tables[one.file], others[one.file]) for name, one in named.items()}
     values = {role: _columns(one, role, mapping, named, found) for role, one in tables.items()}
     fields = {name: value for one in tables.values() for name, value in one.fields.items()}
     fields |= {FILE: place.name, **fields_of(place.name, mapping.path)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -32,10 +32,10 @@ class Table(Protocol):
         ...
 
 
-def missing_column(table: Table, name: str) -> TrajectoryError:
-    """Return the error for a column that a table lacks."""
+def missing_column(table: Table, name: str, others: Collection[str] = ()) -> TrajectoryError:
+    """Return the error for a column that a table lacks; `others` are named already: they were not meant."""
     shown = ", ".join(table.names[:SHOWN]) + (f" and {len(table.names) - SHOWN} more" * (len(table.names) > SHOWN))
-    near = suggestion(name, table.names)
+    near = suggestion(name, set(table.names) - set(others))
     return TrajectoryError(table.path, f"is missing{near or ''}; the file has {shown or 'no column'}", column=name)
 
 
