@@ -297,7 +297,14 @@ SETTINGS = {
     ),
     "joints twice": ({"joints": ["a", "a"]}, "mapping.joints = a, a: must be different names"),
     "a negative period": ({"period": -1}, "mapping.period = -1: must be above 0 (s)"),
-    "a field": ({"about": {"kp": "{gain}"}}, "mapping.about.kp = {gain}: there is no field gain; there is file"),
+    "a field": (
+        {"about": {"kp": "{gain}"}},
+        "mapping.about.kp = {gain}: there is no field or column gain; there is file",
+    ),
+    "a label that changes": (
+        {"about": {"at": "{q_elbow}"}},
+        "column q_elbow, row 1: changes from 0.1",
+    ),
     "a path": ({"path": "{day}/{motion}"}, "mapping.path = {day}/{motion}: does not fit the episode log"),
     "too few columns": (
         {"signals": {"action": "goal_elbow", "position": "q_{joint}"}},
@@ -319,7 +326,7 @@ SETTINGS = {
 def test_a_column_that_is_used_already_is_not_what_was_meant(tmp_path: Path) -> None:
     columns = {"t": TIME, "goal_j1": ACTION[:, 0], "goal_j2": ACTION[:, 1], "q_j1": POSITION[:, 0]}
     line = told(tmp_path, csv(tmp_path / "log.csv", columns), joints=["j1", "j2"])
-    assert "column q_2: is missing; the file has t, goal_j1" in line
+    assert "column q_j2: is missing; the file has t, goal_j1" in line
 
 
 @pytest.mark.parametrize("name", SETTINGS)

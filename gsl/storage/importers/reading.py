@@ -11,6 +11,7 @@ import numpy as np
 from gsl.errors import ConfigError, TrajectoryError
 from gsl.storage.importers.columns import Reference, joints_of, output_names, references, side_by_side, taken
 from gsl.storage.importers.formats import table
+from gsl.storage.importers.labels import constant, told_by_columns
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, fields_of
 from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, FLAGS, Signal
@@ -66,11 +67,15 @@ def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[R
     named = {name: one for name, one in mapping.signals.items() if _there(name, one, joints, tables)}
     others = {role: taken(mapping, joints, role) for role in tables}
     found = {name: references(name, one, joints, tables[one.file], others[one.file]) for name, one in named.items()}
-    values = {role: _columns(one, role, mapping, named, found) for role, one in tables.items()}
     fields = {name: value for one in tables.values() for name, value in one.fields.items()}
     fields |= {FILE: place.name, **fields_of(place.name, mapping.path)}
+    told = told_by_columns(mapping, fields, tables)
+    values = {role: _columns(one, role, mapping, named, found, told[role]) for role, one in tables.items()}
     for key, rows in _groups(values, mapping, tables):
         own = {**fields, **({mapping.episode: key} if key is not None else {})}
+        for role, own_rows in rows.items():
+            cells = {column: values[role][column][own_rows] for column in told[role]}
+            own |= {column: constant(tables[role], column, part, own_rows) for column, part in cells.items()}
         name = place.name if key is None else f"{place.name}/{key}"
         signals, dropped = {}, 0
         for signal, one in named.items():
@@ -98,7 +103,12 @@ def _there(name: str, signal: Signal, joints: Mapping[str, str], tables: Mapping
 
 
 def _columns(
-    one: Table, role: str, mapping: LogMapping, named: Mapping[str, Signal], found: Mapping[str, Sequence[Reference]]
+    one: Table,
+    role: str,
+    mapping: LogMapping,
+    named: Mapping[str, Signal],
+    found: Mapping[str, Sequence[Reference]],
+    told: Sequence[str],
 ) -> dict[str, np.ndarray]:
     """Return all columns that are needed of a file, read once."""
     signals = [name for name, signal in named.items() if signal.file == role]
@@ -107,6 +117,7 @@ def _columns(
         wanted += [named[name].time or mapping.time.column for name in signals]
     if mapping.episode != FILE:
         wanted.append(mapping.episode)
+    wanted += told
     for name in wanted:
         if name not in one.names:
             raise missing_column(one, name)
