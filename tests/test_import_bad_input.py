@@ -336,6 +336,15 @@ def test_a_wrong_mapping_is_one_clear_line(tmp_path: Path, name: str) -> None:
     assert words in line, line
 
 
+def test_a_log_that_was_not_imported_says_what_to_do_first(tmp_path: Path) -> None:
+    for place in ("log.csv", "logs/log.csv"):
+        (tmp_path / place).parent.mkdir(exist_ok=True)
+        csv(tmp_path / place, plain())
+    for given in ("log.csv", "logs"):
+        line = refused("diagnose", f"real={given}", "sim=so101", "out=runs/refused", folder=tmp_path)
+        assert f"gsl import source={given} " in line
+
+
 def test_sources_and_mappings_that_are_not_there_are_one_clear_line(tmp_path: Path) -> None:
     chosen = mapping(tmp_path / "m.yaml")
     assert "source: has no value yet" in refused("import", chosen, folder=tmp_path)
@@ -344,6 +353,9 @@ def test_sources_and_mappings_that_are_not_there_are_one_clear_line(tmp_path: Pa
     assert "empty: holds no file that ends with" in refused("import", chosen, "source=empty", folder=tmp_path)
     line = refused("import", "mapping=so101", "source=empty", folder=tmp_path)
     assert "no mapping called so101; did you mean so101_arm" in line
+    (tmp_path / "arm.urdf").write_text("<robot/>")
+    line = refused("import", "mapping=arm.urdf", "source=empty", folder=tmp_path)
+    assert "mapping = arm.urdf: is no mapping, whose file's name must end with .yaml" in line
     assert "no.yaml: there is no such file" in refused("import", "mapping=no.yaml", folder=tmp_path)
     csv(tmp_path / "log.csv", plain())
     line = refused("import", "source=log.csv", folder=tmp_path)
