@@ -85,17 +85,28 @@ WRONG = {
     "ticks": (lambda c: {n: np.round(2048 + 652 * v) if n != "t" else v for n, v in c.items()}, "are these ticks"),
     "milliseconds for seconds": (scaled(1e6, "t"), "rows are 1e\\+04 s apart; is time"),
     "microseconds in a mapping of seconds": (scaled(1e-6, "t"), "rows are 1e-08 s apart"),
-    "a clock that jumps back": (from_row(100, -0.5), "column t, row 100: the clock jumps back by 0.49 s; cut the file"),
-    "a stamp twice": (stuck, "column t, row 40: the stamp of the row before again .* mapping.duplicates=drop"),
+    "a clock that starts again": (
+        lambda c: {name: np.concatenate([values, values]) for name, values in c.items()},
+        "column t, line 303: the clock jumps back by 3 s; cut the file there, or sort its rows",
+    ),
+    "a clock that jumps back": (
+        from_row(100, -0.5),
+        "column t, line 102: the clock jumps back by 0.49 s; .* cut the file",
+    ),
+    "a stamp twice": (stuck, "column t, line 42: the stamp of the row before again .* mapping.duplicates=drop"),
+    "a block that was logged twice": (
+        lambda c: {name: np.concatenate([values[:90], values[50:]]) for name, values in c.items()},
+        "column t, line 92: the clock jumps back by 0.39 s; these stamps were there before: drop the rows that repe",
+    ),
     "a missing joint": (without("q_elbow"), "column q_elbow: is missing; the file has t, goal_shoulder"),
     "a column misspelt": (lambda c: {n.replace("q_e", "qe"): v for n, v in c.items()}, "did you mean qelbow"),
     "no stamps": (without("t"), "column t: is missing"),
-    "NaN": (changed("q_elbow", at(7, "nan")), "column q_elbow, row 7: is not a finite number; .* mapping.blanks=skip"),
-    "infinity": (changed("q_elbow", at(7, "inf")), "column q_elbow, row 7: is not a finite number"),
-    "an empty cell": (changed("goal_elbow", at(9, "")), "column goal_elbow, row 9: is not a finite number"),
-    "a word": (changed("q_elbow", at(7, "stall")), "column q_elbow, row 7: 'stall' is not a number"),
+    "NaN": (changed("q_elbow", at(7, "nan")), "column q_elbow, line 9: is not a finite number; .* mapping.blanks=skip"),
+    "infinity": (changed("q_elbow", at(7, "inf")), "column q_elbow, line 9: is not a finite number"),
+    "an empty cell": (changed("goal_elbow", at(9, "")), "column goal_elbow, line 11: is not a finite number"),
+    "a word": (changed("q_elbow", at(7, "stall")), "column q_elbow, line 9: 'stall' is not a number"),
     "texts": (lambda c: {**c, "q_elbow": np.full(len(TIME), "up")}, "column q_elbow: holds texts"),
-    "an empty stamp": (changed("t", at(5, "")), "column t, row 5: is not a finite number"),
+    "an empty stamp": (changed("t", at(5, "")), "column t, line 7: is not a finite number"),
     "one row": (lambda c: {name: values[:1] for name, values in c.items()}, "has 1 row of positions"),
     "no rows": (lambda c: {name: values[:0] for name, values in c.items()}, "has no rows; log it again"),
 }
@@ -149,7 +160,7 @@ def test_a_check_tells_every_problem_and_ends_with_the_code_of_a_refusal(tmp_pat
     document = json.loads(said.out)
     assert said.code == 2 == document["exit_code"] and len(document["episodes"]) == 1
     assert [line.partition(":")[0].rpartition("/")[2] for line in document["refused"]] == [
-        "b.csv, column t, row 100",
+        "b.csv, column t, line 102",
         "c.csv",
     ]
     assert not (tmp_path / "runs").exists()
@@ -303,7 +314,7 @@ SETTINGS = {
     ),
     "a label that changes": (
         {"about": {"at": "{q_elbow}"}},
-        "column q_elbow, row 1: changes from 0.1",
+        "column q_elbow, line 3: changes from 0.1",
     ),
     "a path": ({"path": "{day}/{motion}"}, "mapping.path = {day}/{motion}: does not fit the episode log"),
     "too few columns": (

@@ -64,6 +64,10 @@ def robot(name: str) -> Robot:
 def _there(name: str) -> Path:
     path = Path(name)
     if not path.exists():
-        where = "" if path.is_absolute() else ", as seen from the current folder, from where a world's `robot:` is seen"
+        where = (
+            ""
+            if path.is_absolute()
+            else ", as seen from the current folder; the `robot:` of a world is seen from there too"
+        )
         raise InputError(f"{name}: there is no such file{where}")
     return path

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -62,6 +62,21 @@ def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[R
         InputError: A file is missing something, or is empty, damaged or too large.
     """
     tables = _tables(place, mapping, memory)
+    try:
+        yield from _episodes(place, mapping, tables)
+    except TrajectoryError as error:
+        raise _in_lines(error, tables.values()) from error
+
+
+def _in_lines(error: TrajectoryError, tables: Iterable[Table]) -> TrajectoryError:
+    """Return an error with the line of its row, as an editor counts, where the file has one row a line."""
+    first = next((one.first_line for one in tables if one.path == error.path), None)
+    if first is None or error.row is None:
+        return error
+    return TrajectoryError(error.path, error.problem, column=error.column, line=error.row + first)
+
+
+def _episodes(place: Place, mapping: LogMapping, tables: Mapping[str, Table]) -> Iterator[Raw]:
     joints = joints_of(mapping, tables[mapping.signals["position"].file])
     mapping.check_joints(list(joints))
     named = {name: one for name, one in mapping.signals.items() if _there(name, one, joints, tables)}

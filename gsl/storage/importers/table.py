@@ -21,11 +21,13 @@ class Table(Protocol):
         path: The file.
         names: Its columns.
         fields: What it says once, such as a JSON document's single values, by name.
+        first_line: Where its first row is in a file that has one row a line, counted from 1; else None.
     """
 
     path: Path
     names: Sequence[str]
     fields: Mapping[str, Any]
+    first_line: int | None
 
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return columns that are there: numbers, truth values or texts (T,), or several numbers a row (T, n)."""
