@@ -176,9 +176,11 @@ def init(
     json: Json = False,
 ) -> None:
     """Write the configuration of your own robot from its URDF."""
+    from gsl.commandline.composer import configuration_folder
     from gsl.stages.init import write_configuration
 
-    write_configuration(settings or [], Console(json=json))
+    worlds = [path.stem for path in (configuration_folder() / "world").glob("*.yaml")]
+    write_configuration(settings or [], worlds, Console(json=json))
 
 
 @app.command()

@@ -69,9 +69,18 @@ class ArtifactError(InputError):
 
 
 class TrajectoryError(InputError):
-    """A trajectory file breaks the contract."""
+    """A trajectory file breaks the contract; rows are counted from 0, lines of a text file from 1."""
 
-    def __init__(self, path: Path | str, problem: str, *, column: str | None = None, row: int | None = None) -> None:
-        where = "".join([f", column {column}" if column else "", f", row {row}" if row is not None else ""])
+    def __init__(
+        self,
+        path: Path | str,
+        problem: str,
+        *,
+        column: str | None = None,
+        row: int | None = None,
+        line: int | None = None,
+    ) -> None:
+        places = (("column", column), ("row", row), ("line", line))
+        where = "".join(f", {name} {place}" for name, place in places if place not in (None, ""))
         super().__init__(f"{path}{where}: {problem}")
-        self.path, self.column, self.row = Path(path), column, row
+        self.path, self.problem, self.column, self.row = Path(path), problem, column, row

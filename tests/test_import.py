@@ -262,6 +262,17 @@ def test_a_column_can_tell_episodes_apart_and_empty_cells_can_mean_no_news(tmp_p
     np.testing.assert_allclose(batch.episodes[1].position, POSITION)
 
 
+def test_columns_that_are_the_same_in_all_rows_of_an_episode_tell_of_it(tmp_path: Path) -> None:
+    columns = {name: np.concatenate([values, values]) for name, values in plain().items()}
+    columns |= {"run": np.repeat([3, 7], len(TIME)), "load": np.repeat([0.0, 0.25], len(TIME))}
+    columns["motion"] = np.repeat(["slow waves", "fast"], len(TIME))
+    about = {"payload": "{load}", "told": "{motion} with {load} kg"}
+    chosen = mapping(tmp_path / "m.yaml", episode="run", name="{motion}", about=about)
+    first, second = imported(tmp_path, csv(tmp_path / "log.csv", columns), chosen).metadata["episodes"]
+    assert (first["policy"], first["payload"]) == ("slow waves", 0.0)
+    assert (second["policy"], second["payload"], second["told"]) == ("fast", 0.25, "fast with 0.25 kg")
+
+
 def test_the_same_log_twice_is_the_same_bytes_and_no_work(tmp_path: Path) -> None:
     source, chosen = csv(tmp_path / "log.csv", plain()), mapping(tmp_path / "m.yaml")
     done("import", f"source={source}", chosen, "name=a", folder=tmp_path)

@@ -45,6 +45,11 @@ def swapped(columns: Columns) -> Columns:
     return {"_".join([names.get(n.split("_")[0], n.split("_")[0]), *n.split("_")[1:]]): v for n, v in columns.items()}
 
 
+def exchanged(columns: Columns) -> Columns:
+    """Swap what two joints measured; the commands are right."""
+    return {**columns, "q_shoulder": columns["q_elbow"], "q_elbow": columns["q_shoulder"]}
+
+
 def scaled(factor: float, *prefixes: str) -> Callable[[Columns], Columns]:
     return lambda columns: {name: factor * v if name.startswith(prefixes) else v for name, v in columns.items()}
 
@@ -63,6 +68,14 @@ def stuck(columns: Columns) -> Columns:
 
 WRONG = {
     "command and state swapped": (swapped, f"comes {1e3 * LAG:.0f} ms before action: are the columns of commands"),
+    "joints swapped": (
+        exchanged,
+        "position.shoulder: follows action.elbow and not action.shoulder: are the columns of joints swapped",
+    ),
+    "joints swapped, one the other way round": (
+        lambda c: exchanged(scaled(-1.0, "q_shoulder")(c)),
+        "position.shoulder: follows action.elbow",
+    ),
     "degrees": (scaled(180.0 / np.pi, "q", "goal"), "position.shoulder|action.shoulder: reaches 28.6"),
     "degrees of positions only": (scaled(57.3, "q"), "are these degrees"),
     "small degrees of commands": (
@@ -72,17 +85,28 @@ WRONG = {
     "ticks": (lambda c: {n: np.round(2048 + 652 * v) if n != "t" else v for n, v in c.items()}, "are these ticks"),
     "milliseconds for seconds": (scaled(1e6, "t"), "rows are 1e\\+04 s apart; is time"),
     "microseconds in a mapping of seconds": (scaled(1e-6, "t"), "rows are 1e-08 s apart"),
-    "a clock that jumps back": (from_row(100, -0.5), "column t, row 100: the clock jumps back by 0.49 s; cut the file"),
-    "a stamp twice": (stuck, "column t, row 40: the stamp of the row before again .* mapping.duplicates=drop"),
+    "a clock that starts again": (
+        lambda c: {name: np.concatenate([values, values]) for name, values in c.items()},
+        "column t, line 303: the clock jumps back by 3 s; cut the file there, or sort its rows",
+    ),
+    "a clock that jumps back": (
+        from_row(100, -0.5),
+        "column t, line 102: the clock jumps back by 0.49 s; .* cut the file",
+    ),
+    "a stamp twice": (stuck, "column t, line 42: the stamp of the row before again .* mapping.duplicates=drop"),
+    "a block that was logged twice": (
+        lambda c: {name: np.concatenate([values[:90], values[50:]]) for name, values in c.items()},
+        "column t, line 92: the clock jumps back by 0.39 s; these stamps were there before: drop the rows that repe",
+    ),
     "a missing joint": (without("q_elbow"), "column q_elbow: is missing; the file has t, goal_shoulder"),
     "a column misspelt": (lambda c: {n.replace("q_e", "qe"): v for n, v in c.items()}, "did you mean qelbow"),
     "no stamps": (without("t"), "column t: is missing"),
-    "NaN": (changed("q_elbow", at(7, "nan")), "column q_elbow, row 7: is not a finite number; .* mapping.blanks=skip"),
-    "infinity": (changed("q_elbow", at(7, "inf")), "column q_elbow, row 7: is not a finite number"),
-    "an empty cell": (changed("goal_elbow", at(9, "")), "column goal_elbow, row 9: is not a finite number"),
-    "a word": (changed("q_elbow", at(7, "stall")), "column q_elbow, row 7: 'stall' is not a number"),
+    "NaN": (changed("q_elbow", at(7, "nan")), "column q_elbow, line 9: is not a finite number; .* mapping.blanks=skip"),
+    "infinity": (changed("q_elbow", at(7, "inf")), "column q_elbow, line 9: is not a finite number"),
+    "an empty cell": (changed("goal_elbow", at(9, "")), "column goal_elbow, line 11: is not a finite number"),
+    "a word": (changed("q_elbow", at(7, "stall")), "column q_elbow, line 9: 'stall' is not a number"),
     "texts": (lambda c: {**c, "q_elbow": np.full(len(TIME), "up")}, "column q_elbow: holds texts"),
-    "an empty stamp": (changed("t", at(5, "")), "column t, row 5: is not a finite number"),
+    "an empty stamp": (changed("t", at(5, "")), "column t, line 7: is not a finite number"),
     "one row": (lambda c: {name: values[:1] for name, values in c.items()}, "has 1 row of positions"),
     "no rows": (lambda c: {name: values[:0] for name, values in c.items()}, "has no rows; log it again"),
 }
@@ -94,6 +118,25 @@ def test_a_wrong_log_is_one_clear_line(tmp_path: Path, name: str) -> None:
     line = told(tmp_path, csv(tmp_path / "log.csv", change(plain())))
     assert re.search(words, line), line
     assert "log.csv" in line or line.startswith("log: ")
+
+
+def test_joints_that_are_commanded_alike_or_dragged_along_are_not_swapped(tmp_path: Path) -> None:
+    both = {name: plain()[name.replace("elbow", "shoulder")] for name in plain()}
+    still = {**plain(), "goal_elbow": 0.0 * TIME, "q_elbow": 0.03 * plain()["q_shoulder"]}
+    for name, columns in (("both", both), ("still", still)):
+        said = gsl(
+            *("import", f"source={csv(tmp_path / f'{name}.csv', columns)}", mapping(tmp_path / "m.yaml")),
+            "--check",
+            folder=tmp_path,
+        )
+        assert said.code == 0 and "follows" not in said.out, said
+
+
+def test_swapped_joints_are_seen_where_another_episode_commands_them_alike(tmp_path: Path) -> None:
+    alike = {name: plain()[name.replace("elbow", "shoulder")] for name in plain()}
+    csv(tmp_path / "a.csv", alike)
+    csv(tmp_path / "b.csv", exchanged(plain()))
+    assert "follows action.elbow and not action.shoulder" in told(tmp_path, tmp_path)
 
 
 def test_what_looks_wrong_can_be_accepted(tmp_path: Path) -> None:
@@ -117,7 +160,7 @@ def test_a_check_tells_every_problem_and_ends_with_the_code_of_a_refusal(tmp_pat
     document = json.loads(said.out)
     assert said.code == 2 == document["exit_code"] and len(document["episodes"]) == 1
     assert [line.partition(":")[0].rpartition("/")[2] for line in document["refused"]] == [
-        "b.csv, column t, row 100",
+        "b.csv, column t, line 102",
         "c.csv",
     ]
     assert not (tmp_path / "runs").exists()
@@ -265,11 +308,22 @@ SETTINGS = {
     ),
     "joints twice": ({"joints": ["a", "a"]}, "mapping.joints = a, a: must be different names"),
     "a negative period": ({"period": -1}, "mapping.period = -1: must be above 0 (s)"),
-    "a field": ({"about": {"kp": "{gain}"}}, "mapping.about.kp = {gain}: there is no field gain; there is file"),
+    "a field": (
+        {"about": {"kp": "{gain}"}},
+        "mapping.about.kp = {gain}: there is no field or column gain; there is file",
+    ),
+    "a label that changes": (
+        {"about": {"at": "{q_elbow}"}},
+        "column q_elbow, line 3: changes from 0.1",
+    ),
     "a path": ({"path": "{day}/{motion}"}, "mapping.path = {day}/{motion}: does not fit the episode log"),
     "too few columns": (
         {"signals": {"action": "goal_elbow", "position": "q_{joint}"}},
         "column goal_elbow: 1 values a row for action, but 2 joints",
+    ),
+    "one column for two joints": (
+        {"signals": {"action": "goal_{joint}", "position": ["q_elbow", "q_elbow"]}},
+        "mapping.signals.position.column = q_elbow: is that of several joints for position; every joint has",
     ),
     "an entry too far": (
         {"signals": {"action": "goal_{joint}", "position": ["q_elbow[0]", "q_elbow[3]"]}},
@@ -280,11 +334,26 @@ SETTINGS = {
 }
 
 
+def test_a_column_that_is_used_already_is_not_what_was_meant(tmp_path: Path) -> None:
+    columns = {"t": TIME, "goal_j1": ACTION[:, 0], "goal_j2": ACTION[:, 1], "q_j1": POSITION[:, 0]}
+    line = told(tmp_path, csv(tmp_path / "log.csv", columns), joints=["j1", "j2"])
+    assert "column q_j2: is missing; the file has t, goal_j1" in line
+
+
 @pytest.mark.parametrize("name", SETTINGS)
 def test_a_wrong_mapping_is_one_clear_line(tmp_path: Path, name: str) -> None:
     settings, words = SETTINGS[name]
     line = told(tmp_path, csv(tmp_path / "log.csv", plain()), **settings)
     assert words in line, line
+
+
+def test_a_log_that_was_not_imported_says_what_to_do_first(tmp_path: Path) -> None:
+    for place in ("log.csv", "logs/log.csv"):
+        (tmp_path / place).parent.mkdir(exist_ok=True)
+        csv(tmp_path / place, plain())
+    for given in ("log.csv", "logs"):
+        line = refused("diagnose", f"real={given}", "sim=so101", "out=runs/refused", folder=tmp_path)
+        assert f"gsl import source={given} " in line
 
 
 def test_sources_and_mappings_that_are_not_there_are_one_clear_line(tmp_path: Path) -> None:
@@ -295,6 +364,9 @@ def test_sources_and_mappings_that_are_not_there_are_one_clear_line(tmp_path: Pa
     assert "empty: holds no file that ends with" in refused("import", chosen, "source=empty", folder=tmp_path)
     line = refused("import", "mapping=so101", "source=empty", folder=tmp_path)
     assert "no mapping called so101; did you mean so101_arm" in line
+    (tmp_path / "arm.urdf").write_text("<robot/>")
+    line = refused("import", "mapping=arm.urdf", "source=empty", folder=tmp_path)
+    assert "mapping = arm.urdf: is no mapping, whose file's name must end with .yaml" in line
     assert "no.yaml: there is no such file" in refused("import", "mapping=no.yaml", folder=tmp_path)
     csv(tmp_path / "log.csv", plain())
     line = refused("import", "source=log.csv", folder=tmp_path)

@@ -27,14 +27,14 @@ def test_what_it_says_to_type_works(place: Path) -> None:
     picture, collect, diagnose = (shlex.split(line, comments=True)[1:] for line in said["next"])
     done(*picture, folder=place)
     done(*collect, *SHORT, folder=place)
-    parents = json.loads((place / "runs/mine/collect_real/manifest.json").read_text())["parents"]
+    parents = json.loads((place / "runs/mine_sim/collect_real/manifest.json").read_text())["parents"]
     assert sorted(one["role"] for one in parents) == ["world.robot", "world.robot.urdf"]
     composed = json.loads(done(*diagnose, "--cfg", "job", "--json", folder=place).out)
     assert composed["sim"]["robot"] == "mine/robot.yaml"
 
 
 def test_it_writes_out_what_the_urdf_alone_would_give(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    done("init", "urdf=models/arm.urdf", "name=mine", "out=some/where", folder=place)
+    done("init", "urdf=models/arm.urdf", "name=mine", "out=some/where", "period=0.005", folder=place)
     monkeypatch.chdir(place)
     alone, written = robot("models/arm.urdf"), robot("some/where/robot.yaml")
     assert written.controlled == alone.controlled
@@ -42,7 +42,7 @@ def test_it_writes_out_what_the_urdf_alone_would_give(place: Path, monkeypatch: 
         assert written.joint(name).armature == pytest.approx(alone.joint(name).armature, rel=1e-3)
         assert written.gains[name] == pytest.approx(alone.gains[name], rel=1e-3)
     world = yaml.safe_load((place / "some/where/world/mine.yaml").read_text())
-    assert world["robot"] == "some/where/robot.yaml"
+    assert (world["robot"], world["period"]) == ("some/where/robot.yaml", 0.005)
 
 
 def test_it_takes_torque_and_speed_for_placeholders_and_a_choice_of_joints(place: Path) -> None:
@@ -61,7 +61,10 @@ def test_it_takes_torque_and_speed_for_placeholders_and_a_choice_of_joints(place
         ("urdf=models/arm.urdf", "name: has no value"),
         ("urdf=models/arm.urdf name=", "name=: has no value; write key=value"),
         ("urdf=models/arm.urdf name=my/arm", "name = my/arm: must be a word of letters, digits, _ and -"),
-        ("urdf=models/arm.urdf name=urdf", "name = urdf: is that of the world that yours is made from"),
+        ("urdf=models/arm.urdf name=urdf", "name = urdf: is that of a world or a robot that comes with gsl"),
+        ("urdf=models/arm.urdf name=so101", "name = so101: is that of a world or a robot that comes with gsl"),
+        ("urdf=models/arm.urdf name=pendulum", "name = pendulum: is that of a world or a robot that comes with gsl"),
+        ("urdf=models/arm.urdf name=arm period=0", "period = 0: must be above 0 (s)"),
         ("urdf=models/arm.urdf name=arm nme=x", "nme: no such setting; did you mean name?"),
         ("urdf=models/none.urdf name=arm", "models/none.urdf: cannot be read: No such file or directory"),
         ("urdf=models name=arm", "models: cannot be read: Is a directory"),
@@ -91,7 +94,10 @@ def test_an_edited_urdf_is_noticed_and_a_moved_one_is_not(place: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        ("world=urdf world.robot=none.urdf task=excite", "none.urdf: cannot be read: No such file or directory"),
+        (
+            "world=urdf world.robot=none.urdf task=excite",
+            "none.urdf: there is no such file, as seen from the current folder",
+        ),
         ("world=urdf task=excite", "world.robot: has no value yet; say world.robot=..."),
         (
             "world=urdf world.robot=models/arm.urdf world.floating=true",

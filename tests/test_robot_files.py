@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import done
 from robots_of_files import as_bullet_reads, holding
 
 from gsl.core.body import Robot, lumped
@@ -133,6 +134,31 @@ def test_a_file_beside_it_chooses_joints_and_says_what_is_known(written: Callabl
         np.testing.assert_allclose(holding(ours, pose), [expected[name] for name in ours.controlled], atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "remark"),
+    [
+        (
+            "lower='-1' upper='1'",
+            "lower='-90' upper='90'",
+            "joint j has the limits -90 and 90 rad: are they in degrees?",
+        ),
+        ("izz='1'", "izz='3'", "link b has the principal moments 1, 1, 3 kg·m²: no body has one that is more than"),
+        ("izz='1'", "izz='2'", None),
+    ],
+)
+def test_what_looks_wrong_in_a_urdf_is_a_remark(old: str, new: str, remark: str | None, tmp_path: Path) -> None:
+    (tmp_path / "it.urdf").write_text(but(old, new))
+    told = robot(str(tmp_path / "it.urdf")).remarks
+    assert told == () if remark is None else told[0].startswith(remark)
+
+
+def test_a_robot_without_shapes_has_no_picture(tmp_path: Path) -> None:
+    (tmp_path / "nobody.yaml").write_text("joints: {a: {effort: 1, velocity: 5}}")
+    said = done("robot", "nobody.yaml", folder=tmp_path)
+    assert "remark: no picture" in said.out and not said.err
+    assert [path.name for path in (tmp_path / "runs/robot").iterdir()] == ["nobody.urdf"]
+
+
 def test_servos_without_a_body_turn_loads_of_their_own(written: Callable[[str], Path]) -> None:
     ours = robot(str(written("joints: {a: {effort: 1, velocity: 5}, b: {effort: 2, velocity: 5, inertia: 0.02}}")))
     inertia = mass_matrix(lumped(ours), {})[6:, 6:]
@@ -213,8 +239,11 @@ def test_a_urdf_that_describes_no_robot(text: str, line: str, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("urdf: none.urdf", "none.urdf: cannot be read: No such file or directory"),
-        ("{", "is not YAML, or damaged"),
+        ("urdf: none.urdf", "urdf = none.urdf: there is no such file, as seen from the robot's file"),
+        (
+            "{",
+            "is not YAML, or damaged: while parsing a flow node expected the node content, but found '<stream end>'",
+        ),
         ("- arm", "says nothing of a robot; see docs/robots.md"),
         ("urdf: arm.urdf\ngain: 3", "gain: no such setting"),
         ("urdf: arm.urdf\njoints: {elbo: {}}", "joints.elbo: the URDF has no such joint; did you mean elbow?"),
@@ -229,7 +258,7 @@ def test_a_urdf_that_describes_no_robot(text: str, line: str, tmp_path: Path) ->
         ("urdf: arm.urdf\nencoder_side: left", "encoder_side = left: must be one of 'output' or 'motor'"),
         ("urdf: arm.urdf\ngroups: {hand: [finger]}", "groups.hand: 'finger' is no controlled joint; did you mean"),
         ("urdf: arm.urdf\nranges: {backlash: {size: [0, 1]}}", "ranges.backlash.size: the effect has no parameter"),
-        ("urdf: arm.urdf\nranges: {slack: {}}", "effects.slack: no effect of this name"),
+        ("urdf: arm.urdf\nranges: {slack: {}}", "ranges.slack: no effect of this name"),
         ("urdf: arm.urdf\nranges: {backlash: {width: [1, 0]}}", "ranges.backlash.width: 1 to 0 is no range"),
         ("urdf: arm.urdf\nranges: {command_latency: {delay: [0, 1]}}", "0 to 1 is no range that it can have, 0.3 at"),
         ("name: lone", "joints: names no joint; without a urdf they have to be named"),

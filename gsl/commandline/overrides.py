@@ -68,7 +68,7 @@ def _rewritten(argument: str, roles: Mapping[str, str], chosen: Collection[str])
         raise ConfigError(argument, "has no value; write key=value")
     if key.startswith("+"):
         return argument
-    if key in FILE_GROUPS and value.endswith((".yaml", ".yml")):
+    if key in FILE_GROUPS and (value.endswith((".yaml", ".yml")) or Path(value).is_file()):
         return f"{key}={_as_option(key, Path(value))}"
     if key in roles:
         return f"{roles[key]}={value}"
@@ -82,7 +82,7 @@ def _rewritten(argument: str, roles: Mapping[str, str], chosen: Collection[str])
 def _as_option(group: str, path: Path) -> str:
     """Return the name under which hydra finds a yaml file that lies anywhere."""
     if path.suffix != ".yaml":
-        raise InputError(f"{group} = {path}: must end with .yaml")
+        raise InputError(f"{group} = {path}: is no {group}, whose file's name must end with .yaml")
     if not path.is_file():
         raise InputError(f"{group} = {path}: there is no such file")
     name = _ROOT + path.resolve().with_suffix("").as_posix().lstrip("/")

@@ -8,6 +8,7 @@ import numpy as np
 
 SAME = 1e-6  # stamps that differ by less are one: as numbers, seconds since 1970 are told to 2e-7 [s]
 FINEST = 400  # points of a signal's grid a second, when lags are measured
+COARSE = 50  # where it only counts whether there is one
 POINTS = 60_000  # of a grid at most
 
 
@@ -57,18 +58,33 @@ def lag(command: np.ndarray, measured: np.ndarray, time: np.ndarray, longest: fl
         time: Of the rows [s], shape (T,).
         longest: Lag that is looked for, either way [s].
     """
-    step = max(float(np.median(np.diff(time))), 1.0 / FINEST)
-    grid = np.arange(time[0], time[-1], step)[:POINTS]
-    reach = min(int(round(longest / step)), (len(grid) - 8) // 2)
-    if reach < 1:
+    step, score = _scores(command, measured, time, longest, FINEST, POINTS)
+    if not len(score):
         return Lag(0.0, 0.0, 0.0)
-    a, b = held(time, command, grid), np.interp(grid, time, measured)
-    score = np.array([_correlation(a, b, shift) for shift in range(-reach, reach + 1)])
-    best = int(np.argmax(score))
+    reach, best = len(score) // 2, int(np.argmax(score))
     other = score[: reach + 1] if best > reach else score[reach:]
     inside = 0 < best < len(score) - 1
     contrast = float(score[best] - other.max()) if inside and best != reach else 0.0
     return Lag((best - reach + _top(score, best)) * step, float(score[best]), contrast)
+
+
+def likeness(command: np.ndarray, measured: np.ndarray, time: np.ndarray, longest: float = 0.5) -> float:
+    """Return the highest correlation of the two over the lags that `lag` looks at, whatever its sign; coarser."""
+    _, score = _scores(command, measured, time, longest, COARSE, POINTS // 10)
+    return float(np.abs(score).max(initial=0.0))
+
+
+def _scores(
+    command: np.ndarray, measured: np.ndarray, time: np.ndarray, longest: float, finest: float, points: int
+) -> tuple[float, np.ndarray]:
+    """Return the grid's step [s] and the correlation at each lag from -longest to longest; none of a short series."""
+    step = max(float(np.median(np.diff(time))), 1.0 / finest)
+    grid = np.arange(time[0], time[-1], step)[:points]
+    reach = min(int(round(longest / step)), (len(grid) - 8) // 2)
+    if reach < 1:
+        return step, np.zeros(0)
+    a, b = held(time, command, grid), np.interp(grid, time, measured)
+    return step, np.array([_correlation(a, b, shift) for shift in range(-reach, reach + 1)])
 
 
 def _correlation(a: np.ndarray, b: np.ndarray, shift: int) -> float:

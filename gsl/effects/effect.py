@@ -75,7 +75,10 @@ def check_ranges(name: str, ranges: Mapping[str, tuple[float, float]]) -> None:
     Raises:
         ConfigError: One of them.
     """
-    known = settings_of(effect_class(name))
+    try:
+        known = settings_of(effect_class(name))
+    except ConfigError as error:
+        raise ConfigError(f"ranges.{name}", error.problem) from error
     for key, (lower, upper) in ranges.items():
         if key not in known or known[key].lower is None:
             raise ConfigError(f"ranges.{name}.{key}", "the effect has no parameter of this name with a range")

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from gsl.core.body import Robot
 from gsl.core.validation import did_you_mean
-from gsl.errors import ConfigError
+from gsl.errors import ConfigError, InputError
 from gsl.robots.robot_file import SUFFIXES, files_of, from_file
 
 _NOT_ROBOTS = (
     *("catalogue", "defaults", "frames", "hinges", "nao_legs", "nao_shapes", "robot_file", "so101_shapes"),
-    *("urdf", "urdf_xml"),
+    *("urdf", "urdf_remarks", "urdf_xml"),
 )
 
 
@@ -31,7 +31,7 @@ def is_file(name: str) -> bool:
 
 def files(name: str) -> tuple[Path, ...]:
     """Return the files that a robot is read from; none of those that come with gsl."""
-    return files_of(Path(name)) if is_file(name) else ()
+    return files_of(_there(name)) if is_file(name) else ()
 
 
 def read_files(name: str) -> dict[str, Path]:
@@ -49,7 +49,7 @@ def robot(name: str) -> Robot:
         InputError: if it is a file that describes no robot.
     """
     if is_file(name):
-        return from_file(Path(name))
+        return from_file(_there(name))
     place, _, function = name.rpartition(".") if "." in name else (f"gsl.robots.{name}", "", name)
     if not (name in names() or "." in name):
         hint = f"{did_you_mean(name, names(), listed=True)}, or a file such as arm.urdf"
@@ -59,3 +59,15 @@ def robot(name: str) -> Robot:
         return built
     except (ImportError, AttributeError) as error:
         raise ConfigError("robot", f"'{name}' cannot be imported: {error}") from error
+
+
+def _there(name: str) -> Path:
+    path = Path(name)
+    if not path.exists():
+        where = (
+            ""
+            if path.is_absolute()
+            else ", as seen from the current folder; the `robot:` of a world is seen from there too"
+        )
+        raise InputError(f"{name}: there is no such file{where}")
+    return path

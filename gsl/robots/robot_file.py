@@ -72,6 +72,8 @@ def from_file(path: Path) -> Robot:
     try:
         joints = None if told.joints is None else _joints(told.joints)
         if told.urdf is not None:
+            if not (path.parent / told.urdf).exists():
+                raise ConfigError("urdf", "there is no such file, as seen from the robot's file", given=told.urdf)
             robot = from_description(read_description(path.parent / told.urdf), joints, told.held, told.stance)
         else:
             robot = lone(told.name or path.stem, joints or {})
@@ -112,7 +114,8 @@ def _settings(path: Path) -> RobotSettings:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is not YAML, or damaged: {' '.join(str(error).split())}") from error
+        told = " ".join(str(error).replace('in "<unicode string>", ', "in ").split())
+        raise InputError(f"{path}: is not YAML, or damaged: {told}") from error
     if not isinstance(told, Mapping):
         raise InputError(f"{path}: says nothing of a robot; see docs/robots.md")
     try:

@@ -14,6 +14,7 @@ from gsl.core.body import Link, Shape
 from gsl.core.validation import did_you_mean
 from gsl.errors import InputError
 from gsl.robots.frames import euler, rpy
+from gsl.robots.urdf_remarks import remarks
 
 T = TypeVar("T")
 
@@ -74,11 +75,12 @@ def read_description(path: Path) -> Description:
     """
     root = _root(path)
     try:
-        remarks = [*_meshes(root), *_dynamics(root)]
         links = {link.name: link for link in _each(root, "link", _link)}
         base, hinges = _tree(links, _each(root, "joint", _hinge))
         ordered = {name: links[name] for name in (base, *(hinge.child for hinge in hinges))}
-        return Description(root.get("name") or path.stem, ordered, hinges, tuple(remarks))
+        return Description(
+            root.get("name") or path.stem, ordered, hinges, tuple(remarks(root, ordered.values(), hinges))
+        )
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
 
@@ -204,21 +206,6 @@ def _knot(roots: Sequence[str], children: Sequence[str]) -> str:
         return f"{' and '.join(roots)} hang on nothing; one link alone is the base"
     twice = [name for name in children if children.count(name) > 1]
     return f"{twice[0]} is the child of two joints" if twice else "its links hang in a loop"
-
-
-def _meshes(root: xml.Element) -> list[str]:
-    files = sorted({mesh.get("filename", "") for mesh in root.iter("mesh")})
-    if not files:
-        return []
-    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
-    return [f"meshes are not read ({Path(files[0]).name}{more}): they do not show, and nothing collides with them"]
-
-
-def _dynamics(root: xml.Element) -> list[str]:
-    found = [joint.get("name", "") for joint in root.findall("joint") if joint.find("dynamics") is not None]
-    if not found:
-        return []
-    return [f"<dynamics> is not read ({', '.join(found)}): write friction as effects of the world"]
 
 
 def _origin(node: xml.Element) -> tuple[np.ndarray, np.ndarray]:

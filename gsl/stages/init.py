@@ -6,7 +6,7 @@ import os
 import re
 import shlex
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,6 +17,7 @@ from gsl.core.body import Robot
 from gsl.core.setting import component, setting
 from gsl.core.validation import make
 from gsl.errors import ConfigError, InputError
+from gsl.robots.catalogue import names
 from gsl.robots.hinges import JointSettings, drivable, from_description
 from gsl.robots.urdf_xml import read_description
 from gsl.storage.whole import explained
@@ -32,7 +33,7 @@ _WORLD_TEXT = """\
 # {name}, its base fixed. What you know that the simulator lacks is for effects to say (docs/effects.md).
 defaults: [urdf, _self_]
 robot: {robot}   # as seen from where you type gsl
-period: 0.02   # [s]: the control period of your logs
+period: {period:g}   # [s]: the control period of your logs
 effects: {{}}
 """
 
@@ -49,13 +50,15 @@ class Init:
     )
     effort: Annotated[float | None, setting("peak torque of all, over the URDF's", unit="N·m", gt=0)] = None
     velocity: Annotated[float | None, setting("speed without load of all, over the URDF's", unit="rad/s", gt=0)] = None
+    period: Annotated[float, setting("control period of your logs", unit="s", gt=0)] = 0.02
 
 
-def write_configuration(arguments: Sequence[str], console: Any) -> None:
+def write_configuration(arguments: Sequence[str], worlds: Collection[str], console: Any) -> None:
     """Write the folder and say what to type next.
 
     Args:
         arguments: Of the form key=value, the settings of `Init`.
+        worlds: Names of the worlds that come with gsl.
         console: Where to say it.
 
     Raises:
@@ -67,8 +70,8 @@ def write_configuration(arguments: Sequence[str], console: Any) -> None:
         raise ConfigError(
             "name", "must be a word of letters, digits, _ and -, not beginning with a digit", given=told.name
         )
-    if told.name == "urdf":
-        raise ConfigError("name", "is that of the world that yours is made from; take another", given=told.name)
+    if told.name in {*worlds, *names()}:
+        raise ConfigError("name", "is that of a world or a robot that comes with gsl; take another", given=told.name)
     if folder.exists():
         raise InputError(f"{folder}: exists; choose another folder with out=")
     description = read_description(urdf)
@@ -77,8 +80,8 @@ def write_configuration(arguments: Sequence[str], console: Any) -> None:
         robot = from_description(description, dict.fromkeys(told.joints or drivable(description.hinges), known), {}, {})
     except ConfigError as error:
         raise InputError(f"{urdf}: {error}") from error
-    _write(folder, told.name, urdf, robot)
-    _tell(folder, told.name, robot, console)
+    _write(folder, told, urdf, robot)
+    _tell(folder, told, robot, console)
 
 
 def _settings(arguments: Sequence[str]) -> dict[str, Any]:
@@ -91,15 +94,16 @@ def _settings(arguments: Sequence[str]) -> dict[str, Any]:
     return found
 
 
-def _write(folder: Path, name: str, urdf: Path, robot: Robot) -> None:
+def _write(folder: Path, told: Init, urdf: Path, robot: Robot) -> None:
     """Write the folder whole or not at all."""
     place = folder.with_name(f".{folder.name}.tmp-{os.getpid()}")
-    world = place / WORLD.format(name)
+    world = place / WORLD.format(told.name)
     with explained(folder):
         try:
             world.parent.mkdir(parents=True)
             (place / ROBOT).write_text(_robot_text(robot, Path(os.path.relpath(urdf, folder))), encoding="utf-8")
-            world.write_text(_WORLD_TEXT.format(name=name, robot=(folder / ROBOT).as_posix()), encoding="utf-8")
+            known = {"name": told.name, "robot": (folder / ROBOT).as_posix(), "period": told.period}
+            world.write_text(_WORLD_TEXT.format(**known), encoding="utf-8")
             os.rename(place, folder)
         finally:
             shutil.rmtree(place, ignore_errors=True)
@@ -133,15 +137,17 @@ def _plain(text: str) -> str:
     return yaml.safe_dump(text, allow_unicode=True, width=1000).splitlines()[0]
 
 
-def _tell(folder: Path, name: str, robot: Robot, console: Any) -> None:
+def _tell(folder: Path, told: Init, robot: Robot, console: Any) -> None:
+    name = told.name
     files = [(folder / part).as_posix() for part in (ROBOT, WORLD.format(name))]
     mine = shlex.quote(folder.as_posix())
     following = [
         f"gsl robot {shlex.quote(files[0])}   # a picture",
-        f"gsl collect --config-dir {mine} world={name} task=excite name={name}   # safe motions, in simulation",
+        f"gsl collect --config-dir {mine} world={name} task=excite name={name}_sim   # safe motions",
         f"gsl diagnose --config-dir {mine} sim={name} real=LOG name={name}   # a log of the real one",
     ]
     joints = f"{robot.name}: {len(robot.controlled)} controlled joints, {', '.join(robot.controlled)}"
-    lines = [joints, *(f"remark: {remark}" for remark in robot.remarks), *files, "", "what to type next:"]
+    period = f"its control period is {told.period:g} s; if your logs have another, write it into the world's file"
+    lines = [joints, *(f"remark: {remark}" for remark in robot.remarks), *files, period, "", "what to type next:"]
     document = {"files": files, "joints": list(robot.controlled), "remarks": list(robot.remarks), "next": following}
     console.result(document, text="\n".join([*lines, *(f"  {line}" for line in following)]))

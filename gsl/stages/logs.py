@@ -10,9 +10,10 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.experiment import SCORED, WARM_UP
-from gsl.errors import InputError, TrajectoryError
+from gsl.errors import ArtifactError, InputError, TrajectoryError
 from gsl.stages.training import data_file
-from gsl.storage.trajectories import read
+from gsl.storage.importers.formats import readable
+from gsl.storage.trajectories import imported, read
 
 CLOCKS, APART = "clocks", "unsynchronised"  # of a log's metadata, as gsl import writes them
 MOVES = 1e-4  # a command that changes less is constant [rad]
@@ -25,14 +26,20 @@ def log_files(reference: str) -> list[Path]:
     """Return the trajectory files that a run, a file or a folder of parquet files stands for.
 
     Raises:
-        ArtifactError: if there are none.
+        InputError: if there are none.
     """
     folder = Path(reference)
     if folder.is_dir() and not (folder / "manifest.json").exists():
         files = sorted(folder.glob("*.parquet"))
         if files:
             return files
-    return [data_file(reference)]
+    try:
+        return [data_file(reference)]
+    except ArtifactError as error:
+        if folder.is_dir() and any(readable(path) for path in folder.iterdir()):
+            problem = f"holds no trajectory file; make one of its logs first: {imported(folder)}"
+            raise InputError(f"{folder}: {problem}") from error
+        raise
 
 
 def log_parents(**references: str | None) -> dict[str, Path]:

@@ -12,7 +12,7 @@ from gsl.storage.whole import explained
 
 
 def write_robot(name: str, folder: Path, console: Any) -> None:
-    """Write <name>.urdf and <name>.png.
+    """Write <name>.urdf and, of a robot that has shapes, <name>.png.
 
     Args:
         name: Of the robot, such as `nao`, or its file.
@@ -24,17 +24,21 @@ def write_robot(name: str, folder: Path, console: Any) -> None:
     """
     body = robot(name)
     model, picture = folder / f"{body.name}.urdf", folder / f"{body.name}.png"
+    shown = any(link.shapes for link in body.links.values())
+    files = [str(model), str(picture)] if shown else [str(model)]
+    remarks = [*body.remarks, *([] if shown else ["no picture: none of its links has a shape that could be shown"])]
     with explained(folder):
         folder.mkdir(parents=True, exist_ok=True)
         model.write_text(urdf(body), encoding="utf-8")
-        portrait(body, picture)
+        if shown:
+            portrait(body, picture)
     about = f"{body.name}: {len(body.controlled)} controlled joints, {len(body.links)} links, {body.mass:.3f} kg"
-    told = [about, *(f"remark: {remark}" for remark in body.remarks), str(model), str(picture)]
+    told = [about, *(f"remark: {remark}" for remark in remarks), *files]
     document = {
         "robot": body.name,
         "mass_kg": body.mass,
         "joints": list(body.controlled),
-        "remarks": list(body.remarks),
-        "files": [str(model), str(picture)],
+        "remarks": remarks,
+        "files": files,
     }
     console.result(document, text="\n".join(told))

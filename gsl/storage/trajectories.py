@@ -72,6 +72,11 @@ def read(path: Path, *, joints: tuple[str, ...] | None = None) -> Batch:
     return batch_of(columns, metadata, check_rows(path, columns))
 
 
+def imported(path: Path) -> str:
+    """Return what to type to make a trajectory file of foreign logs."""
+    return f"gsl import source={path} mapping=... (docs/import.md)"
+
+
 def _table(path: Path) -> pa.Table:
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -85,9 +90,10 @@ def _table(path: Path) -> pa.Table:
             check_declared(path, file.metadata)
             return file.read()
     except (pa.ArrowException, OSError) as error:
-        raise TrajectoryError(
-            path, "is not a parquet file, or truncated or damaged; copy or collect it again"
-        ) from error
+        problem = "is not a parquet file, or truncated or damaged; copy or collect it again"
+        if path.suffix != ".parquet":
+            problem = f"is no trajectory file; make one of a log first: {imported(path)}"
+        raise TrajectoryError(path, problem) from error
 
 
 def _stored_metadata(path: Path, table: pa.Table) -> Any:

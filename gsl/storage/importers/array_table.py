@@ -18,6 +18,8 @@ from gsl.storage.importers.table import missing_column
 class ArrayTable:
     """An npz file; arrays of one value are what it says once."""
 
+    first_line: int | None = None
+
     def __init__(self, path: Path, memory: float) -> None:
         self.path, self.memory = path, memory
         try:

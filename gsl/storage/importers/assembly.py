@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,13 +12,13 @@ from gsl.core.labels import alike
 from gsl.core.series import SAME, held, interpolated, pieces
 from gsl.core.trajectory import Trajectory
 from gsl.effects.effect import together
-from gsl.errors import ConfigError, InputError
+from gsl.errors import InputError
+from gsl.storage.importers.labels import filled
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.reading import Raw, Series
 from gsl.storage.importers.signal import COMMANDS, FLAGS
 
 ARRAYS = (*COMMANDS, "position", "velocity")
-_FIELD = re.compile(r"\{([^{}]+)\}")
 
 
 @dataclass(frozen=True)
@@ -106,8 +105,8 @@ def labelled(raw: Raw, mapping: LogMapping) -> dict[str, Any]:
     Raises:
         ConfigError: A {field} is neither in its files nor in its path.
     """
-    name = _filled(mapping.name, raw.fields, "mapping.name") if mapping.name else raw.name
-    about = {key: _filled(value, raw.fields, f"mapping.about.{key}") for key, value in mapping.about.items()}
+    name = filled(mapping.name, raw.fields, "mapping.name") if mapping.name else raw.name
+    about = {key: filled(value, raw.fields, f"mapping.about.{key}") for key, value in mapping.about.items()}
     known = together(
         effects
         for label, values in mapping.conditions.items()
@@ -125,15 +124,3 @@ def unmatched(found: Sequence[Episode], mapping: LogMapping) -> Iterator[str]:
             if not any(alike(value, one) for one in there):
                 told = ", ".join(dict.fromkeys(map(str, there)))
                 yield f"mapping.conditions.{label}.{value}: no episode has it; {label} is {told}"
-
-
-def _filled(value: Any, fields: Mapping[str, Any], where: str) -> Any:
-    """Return a value with its {fields} filled in; one that is a field alone keeps its type."""
-    if not isinstance(value, str):
-        return value if isinstance(value, int | float | bool | list | dict) else str(value)
-    for field in _FIELD.findall(value):
-        if field not in fields:
-            there = ", ".join(sorted(fields))
-            raise ConfigError(where, f"there is no field {field}; there is {there}", given=value)
-    alone = _FIELD.fullmatch(value)
-    return fields[alone.group(1)] if alone else _FIELD.sub(lambda match: str(fields[match.group(1)]), value)

@@ -22,6 +22,8 @@ class BagTable:
     Where a message names its entries, as a JointState does, they are columns by that name: `position.knee`.
     """
 
+    first_line: int | None = None
+
     def __init__(self, path: Path, topic: str, memory: float) -> None:
         self.path, self.topic, self.memory = path, topic, memory
         first = next(self._messages(), None)

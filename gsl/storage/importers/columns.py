@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -47,18 +47,31 @@ def joints_of(mapping: LogMapping, table: Table) -> dict[str, str]:
     return {name: name for name in names}
 
 
-def references(name: str, signal: Signal, joints: Mapping[str, str], table: Table) -> list[Reference]:
-    """Return the columns of a signal.
+def references(
+    name: str, signal: Signal, joints: Mapping[str, str], table: Table, others: Collection[str] = ()
+) -> list[Reference]:
+    """Return the columns of a signal; `others` are named already.
 
     Raises:
         TrajectoryError: The table lacks one.
-        ConfigError: A joint has none.
+        ConfigError: A joint has none, or that of another.
     """
     found = [_reference(one, table) for one in _words(name, signal, joints)]
+    twice = [one for one in found if found.count(one) > 1]
+    if twice and name in PER_JOINT:
+        problem = f"is that of several joints for {name}; every joint has one of its own"
+        raise ConfigError(f"mapping.signals.{name}.column", problem, given=_told(twice[0]))
     for reference in found:
         if reference.column not in table.names:
-            raise missing_column(table, reference.column)
+            raise missing_column(table, reference.column, others)
     return found
+
+
+def taken(mapping: LogMapping, joints: Mapping[str, str], file: str) -> set[str]:
+    """Return the columns that the mapping names of a file."""
+    own = {name: signal for name, signal in mapping.signals.items() if signal.file == file}
+    words = {word for name, signal in own.items() for word in _words(name, signal, joints)}
+    return words | {mapping.time.column, mapping.episode} | {one.time for one in own.values()}
 
 
 def _words(name: str, signal: Signal, joints: Mapping[str, str]) -> list[str]:
@@ -79,6 +92,10 @@ def _words(name: str, signal: Signal, joints: Mapping[str, str]) -> list[str]:
 def _reference(word: str, table: Table) -> Reference:
     entry = _ENTRY.fullmatch(word)
     return Reference(word) if word in table.names or not entry else Reference(entry.group(1), int(entry.group(2)))
+
+
+def _told(reference: Reference) -> str:
+    return reference.column if reference.entry is None else f"{reference.column}[{reference.entry}]"
 
 
 def side_by_side(

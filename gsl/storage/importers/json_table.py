@@ -23,6 +23,7 @@ class JsonTable:
     def __init__(self, path: Path, records: str, memory: float) -> None:
         self.path, self.records, self.memory = path, records, memory
         self.lines = path.name.removesuffix(".gz").endswith(LINES)
+        self.first_line: int | None = 1 if self.lines else None
         document = [] if self.lines else _document(path, memory)
         place = document if self.lines or not records else _at(document, records)
         if place is None and not self.lines:
@@ -73,12 +74,12 @@ def _document(path: Path, memory: float) -> Any:
 
 def _records(path: Path, memory: float) -> Iterator[Any]:
     with opened(path, most=100.0 * memory, lines=True) as file:
-        for number, line in enumerate(file):
+        for number, line in enumerate(file, 1):
             if line.strip():
                 yield _parsed(path, line, number)
 
 
-def _parsed(path: Path, text: bytes, row: int | None) -> Any:
+def _parsed(path: Path, text: bytes, line: int | None) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -86,7 +87,7 @@ def _parsed(path: Path, text: bytes, row: int | None) -> Any:
             f"line {error.lineno}: {error.msg}" if isinstance(error, json.JSONDecodeError) else "not text, or too deep"
         )
         more = "; one record a line is a .jsonl" if "Extra data" in where else ""
-        raise TrajectoryError(path, f"is not JSON ({where}){more}", row=row) from error
+        raise TrajectoryError(path, f"is not JSON ({where}){more}", line=line) from error
 
 
 def _at(value: Any, name: str) -> Any:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 class ParquetTable:
     """A parquet file."""
 
+    first_line: int | None = None
+
     def __init__(self, path: Path, memory: float) -> None:
         import pyarrow as pa
         import pyarrow.parquet as pq

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gsl.errors import ConfigError, TrajectoryError
-from gsl.storage.importers.columns import Reference, joints_of, output_names, references, side_by_side
+from gsl.storage.importers.columns import Reference, joints_of, output_names, references, side_by_side, taken
 from gsl.storage.importers.formats import table
+from gsl.storage.importers.labels import constant, told_by_columns
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, fields_of
 from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, FLAGS, Signal
@@ -61,15 +62,35 @@ def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[R
         InputError: A file is missing something, or is empty, damaged or too large.
     """
     tables = _tables(place, mapping, memory)
+    try:
+        yield from _episodes(place, mapping, tables)
+    except TrajectoryError as error:
+        raise _in_lines(error, tables.values()) from error
+
+
+def _in_lines(error: TrajectoryError, tables: Iterable[Table]) -> TrajectoryError:
+    """Return an error with the line of its row, as an editor counts, where the file has one row a line."""
+    first = next((one.first_line for one in tables if one.path == error.path), None)
+    if first is None or error.row is None:
+        return error
+    return TrajectoryError(error.path, error.problem, column=error.column, line=error.row + first)
+
+
+def _episodes(place: Place, mapping: LogMapping, tables: Mapping[str, Table]) -> Iterator[Raw]:
     joints = joints_of(mapping, tables[mapping.signals["position"].file])
     mapping.check_joints(list(joints))
     named = {name: one for name, one in mapping.signals.items() if _there(name, one, joints, tables)}
-    found = {name: references(name, one, joints, tables[one.file]) for name, one in named.items()}
-    values = {role: _columns(one, role, mapping, named, found) for role, one in tables.items()}
+    others = {role: taken(mapping, joints, role) for role in tables}
+    found = {name: references(name, one, joints, tables[one.file], others[one.file]) for name, one in named.items()}
     fields = {name: value for one in tables.values() for name, value in one.fields.items()}
     fields |= {FILE: place.name, **fields_of(place.name, mapping.path)}
+    told = told_by_columns(mapping, fields, tables)
+    values = {role: _columns(one, role, mapping, named, found, told[role]) for role, one in tables.items()}
     for key, rows in _groups(values, mapping, tables):
         own = {**fields, **({mapping.episode: key} if key is not None else {})}
+        for role, own_rows in rows.items():
+            cells = {column: values[role][column][own_rows] for column in told[role]}
+            own |= {column: constant(tables[role], column, part, own_rows) for column, part in cells.items()}
         name = place.name if key is None else f"{place.name}/{key}"
         signals, dropped = {}, 0
         for signal, one in named.items():
@@ -97,7 +118,12 @@ def _there(name: str, signal: Signal, joints: Mapping[str, str], tables: Mapping
 
 
 def _columns(
-    one: Table, role: str, mapping: LogMapping, named: Mapping[str, Signal], found: Mapping[str, Sequence[Reference]]
+    one: Table,
+    role: str,
+    mapping: LogMapping,
+    named: Mapping[str, Signal],
+    found: Mapping[str, Sequence[Reference]],
+    told: Sequence[str],
 ) -> dict[str, np.ndarray]:
     """Return all columns that are needed of a file, read once."""
     signals = [name for name, signal in named.items() if signal.file == role]
@@ -106,6 +132,7 @@ def _columns(
         wanted += [named[name].time or mapping.time.column for name in signals]
     if mapping.episode != FILE:
         wanted.append(mapping.episode)
+    wanted += told
     for name in wanted:
         if name not in one.names:
             raise missing_column(one, name)

@@ -56,7 +56,10 @@ def ordered(path: Path, stamps: np.ndarray, column: str, rows: np.ndarray, *, dr
     if (steps < 0.0).any():
         at, times = int(np.argmax(steps < 0.0)) + 1, int((steps < 0.0).sum())
         many = f" ({times} times in all)" if times > 1 else ""
-        problem = f"the clock jumps back by {-steps[at - 1]:.4g} s{many}; cut the file there, or sort its rows"
+        again = stamps[at] != stamps[0] and stamps[at] in stamps[:at]
+        repeated = "these stamps were there before: drop the rows that repeat, or cut the file there"
+        advice = repeated if again else "cut the file there, or sort its rows"
+        problem = f"the clock jumps back by {-steps[at - 1]:.4g} s{many}; {advice}"
         raise TrajectoryError(path, problem, column=column, row=int(rows[at]))
     keep[1:] = steps > 0.0
     if not (drop or keep.all()):

@@ -9,6 +9,7 @@ import numpy as np
 
 from gsl.core.series import Lag, lag
 from gsl.storage.importers.assembly import Episode
+from gsl.storage.importers.exchanged import exchanged
 
 MOVES = 0.02  # range of a command below which it tells nothing of what follows it [rad]
 ALIKE = 0.8  # correlation above which a signal is taken to follow a command
@@ -40,7 +41,7 @@ def suspicions(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> list[
         lags: Of each trajectory and joint, from command to position.
     """
     joints = found[0].joints
-    told = [*_time(found), *_order(found, lags)]
+    told = [*_time(found), *_order(found, lags), *_exchanged(found)]
     for index, joint in enumerate(joints):
         told += _joint(joint, index, found)
     return told
@@ -90,6 +91,14 @@ def _order(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> Iterator[
             "commands' clock ahead (mapping.command_offset)?"
         )
         yield Suspicion("position", problem, True)
+
+
+def _exchanged(found: Sequence[Episode]) -> Iterator[Suspicion]:
+    """Tell of positions that follow another joint's command and not their own."""
+    joints = found[0].joints
+    for joint, other in exchanged([one.trajectory for one in found], MOVES).items():
+        problem = f"follows action.{joints[other]} and not action.{joints[joint]}: are the columns of joints swapped?"
+        yield Suspicion(f"position.{joints[joint]}", problem, True)
 
 
 def is_clear(one: Lag) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -21,21 +21,23 @@ class Table(Protocol):
         path: The file.
         names: Its columns.
         fields: What it says once, such as a JSON document's single values, by name.
+        first_line: Where its first row is in a file that has one row a line, counted from 1; else None.
     """
 
     path: Path
     names: Sequence[str]
     fields: Mapping[str, Any]
+    first_line: int | None
 
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return columns that are there: numbers, truth values or texts (T,), or several numbers a row (T, n)."""
         ...
 
 
-def missing_column(table: Table, name: str) -> TrajectoryError:
-    """Return the error for a column that a table lacks."""
+def missing_column(table: Table, name: str, others: Collection[str] = ()) -> TrajectoryError:
+    """Return the error for a column that a table lacks; `others` are named already: they were not meant."""
     shown = ", ".join(table.names[:SHOWN]) + (f" and {len(table.names) - SHOWN} more" * (len(table.names) > SHOWN))
-    near = suggestion(name, table.names)
+    near = suggestion(name, set(table.names) - set(others))
     return TrajectoryError(table.path, f"is missing{near or ''}; the file has {shown or 'no column'}", column=name)
 
 

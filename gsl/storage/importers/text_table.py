@@ -37,6 +37,7 @@ class TextTable:
         self.separator = _separator(first)
         cells = _cells(first.lstrip("#% "), self.separator)
         self.header = not all(_NUMBER.fullmatch(cell.lower()) for cell in cells)
+        self.first_line: int | None = 1 + int(self.header)
         self.names: Sequence[str] = cells if self.header else [str(index) for index in range(len(cells))]
         values = _cells(second if self.header else first, self.separator)
         self.decimal = "," if self.separator != "," and any(map(_DECIMAL_COMMA.fullmatch, values)) else "."

@@ -1,0 +1,71 @@
+"""Remarks on a URDF: what of it is not read, and what looks wrong in it but can be simulated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Protocol
+from xml.etree import ElementTree as xml
+
+import numpy as np
+
+from gsl.core.body import Link
+
+FAR = 4.0 * math.pi  # a limit beyond this is hardly in radians [rad]
+ROUNDED = 1.01  # by which a moment of a thin plate may exceed the other two as it is written
+
+
+class Limited(Protocol):
+    """A joint as far as its limits go: what <limit> says, lower and upper [rad]."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def kind(self) -> str:
+        """Its type."""
+
+    @property
+    def limit(self) -> Mapping[str, float]:
+        """Its limits."""
+
+
+def remarks(root: xml.Element, links: Iterable[Link], hinges: Iterable[Limited]) -> list[str]:
+    """Return what there is to say of a file and what it holds."""
+    return [*_meshes(root), *_dynamics(root), *_limits(hinges), *_inertias(links)]
+
+
+def _limits(hinges: Iterable[Limited]) -> Iterator[str]:
+    for hinge in hinges:
+        ends = [hinge.limit[key] for key in ("lower", "upper") if key in hinge.limit]
+        if hinge.kind == "revolute" and ends and max(map(abs, ends)) > FAR:
+            told = " and ".join(f"{end:g}" for end in ends)
+            yield f"joint {hinge.name} has the limits {told} rad: are they in degrees? A URDF's are in radians"
+
+
+def _inertias(links: Iterable[Link]) -> Iterator[str]:
+    for link in links:
+        first, second, greatest = np.linalg.eigvalsh(link.inertia)
+        if greatest > ROUNDED * (first + second):
+            told = ", ".join(f"{moment:.3g}" for moment in (first, second, greatest))
+            yield (
+                f"link {link.name} has the principal moments {told} kg·m²: no body has one that is more than the other "
+                "two together; look at its <inertia>"
+            )
+
+
+def _meshes(root: xml.Element) -> list[str]:
+    files = sorted({mesh.get("filename", "") for mesh in root.iter("mesh")})
+    if not files:
+        return []
+    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    return [f"meshes are not read ({Path(files[0]).name}{more}): they do not show, and nothing collides with them"]
+
+
+def _dynamics(root: xml.Element) -> list[str]:
+    found = [joint.get("name", "") for joint in root.findall("joint") if joint.find("dynamics") is not None]
+    if not found:
+        return []
+    return [f"<dynamics> is not read ({', '.join(found)}): write friction as effects of the world"]
