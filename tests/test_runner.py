@@ -24,6 +24,7 @@ from gsl.runner import journal
 from gsl.runner.acting import Actor
 from gsl.runner.clock import Simulated
 from gsl.runner.episode import Player
+from gsl.runner.following import Following
 from gsl.runner.guard import Guard, ramp
 from gsl.runner.request import due, layout_of, read_request
 from gsl.runner.robots import PerfectRobot
@@ -226,11 +227,14 @@ def test_an_answer_in_two_sittings(walk: Path, tmp_path: Path) -> None:
 
 
 BROKEN = """
-reads, plain = 0, read
+reads, plain = -1000, read
+def begin(episode):
+    global reads
+    reads = 0
 def read():
     global reads
     reads += 1
-    if reads == 20:
+    if reads == 18:
         raise KeyboardInterrupt
     return plain()
 """
@@ -366,7 +370,8 @@ def test_a_tick_that_is_far_too_late_ends_the_episode(walk: Path) -> None:
 
 
 def test_an_episode_off_the_rate_is_not_kept(walk: Path, tmp_path: Path) -> None:
-    late = "import time\nreads, plain = 0, read\ndef read():\n    global reads\n    reads += 1\n"
+    late = "import time\nreads, plain = -1000, read\ndef begin(episode):\n    global reads\n    reads = 0\n"
+    late += "def read():\n    global reads\n    reads += 1\n"
     word = _fails(tmp_path, late + "    time.sleep(0.038 * (reads == 20))\n    return plain()\n")
     done = run(walk, word, f"--log={tmp_path / 'answer.csv'}", "--yes")
     assert done.returncode == 2 and "not kept; run it again" in done.stdout
@@ -441,7 +446,10 @@ def test_an_episode_that_is_over_is_kept_though_the_way_out_fails(walk: Path, tm
     ("more", "problem"),
     [
         ("def begin(episode):\n    1 / 0\n", "begin() failed: ZeroDivisionError: division by zero"),
-        ("def end():\n    1 / 0\n", "end() failed: ZeroDivisionError: division by zero"),
+        (
+            "def end():\n    1 / 0\n",
+            "one: could not be brought back: end() failed: ZeroDivisionError: division by zero",
+        ),
         ("SIMULATED = False\n", "--unpaced is for a rehearsal; "),
         ("plain = read\ndef read():\n    return {**plain(), 'fell': 'no'}\n", "read() gives for 'fell' 'no', which"),
     ],
@@ -457,6 +465,114 @@ def test_nobody_at_the_prompt_means_back_to_where_it_was(walk: Path, tmp_path: P
     done = run(walk, word, f"--log={tmp_path / 'answer.csv'}", "--unpaced", typed="\n")
     assert done.returncode == 2 and "there is nobody to ask" in done.stdout
     assert (tmp_path / "mine.py.end").exists()
+
+
+BEHAVES = """
+sent, episodes, plain_read, plain_send = 0, 0, read, send
+def begin(episode):
+    global sent, episodes
+    sent, episodes = 1000, episodes + 1
+def send(targets):
+    global sent, at
+    sent += 1
+    open(__file__ + '.sent', 'a').write(f'{{sent}}\\n')
+    if {follows}:
+        at = targets
+def read():
+    if {breaks}:
+        raise KeyboardInterrupt
+    return {{**plain_read(), 'fell': {fell}}}
+"""
+
+
+def _behaves(
+    folder: Path, *, fell: str = "False", follows: str = "True", breaks: str = "False", start: str = ""
+) -> str:
+    word = _robot(folder, start=start or "[0.0] * 15")
+    path = Path(word.removeprefix("--robot="))
+    path.write_text(path.read_text() + BEHAVES.format(fell=fell, follows=follows, breaks=breaks))
+    return word
+
+
+FAR_AWAY = "[0.0] * 4 + [-0.9] + [0.0] * 10"
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "problem", "most"),
+    [
+        ({"fell": "sent == 10"}, "the robot lies down; nothing more is sent to it", 10),
+        ({"fell": "sent == 1035"}, "one: the robot lies down; nothing more is sent to it", 1035),
+        ({"follows": "False", "start": FAR_AWAY}, "LShoulderPitch: stands still, though it was sent 0.2", 50),
+        (
+            {"follows": "sent < 1032", "breaks": "sent == 1040"},
+            "one: the way back was broken off; the robot is left",
+            0,
+        ),
+        ({"fell": "episodes == 1 and sent > 1019"}, "the robot lies down before two has begun; set it up, and", 1020),
+    ],
+)
+def test_a_ramp_and_a_hold_look_at_the_robot(
+    walk: Path, tmp_path: Path, behaviour: dict[str, str], problem: str, most: int
+) -> None:
+    done = run(walk, _behaves(tmp_path, **behaviour), f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    assert done.returncode == 2 and done.stderr == ""
+    assert done.stdout.splitlines()[-1].startswith(f"runner.py: {problem}")
+    sent = (tmp_path / "mine.py.sent").read_text().split()
+    assert int(sent[-1]) == most or not most or (most == 50 and int(sent[-1]) < 1000)
+
+
+def test_a_robot_that_stands_still_is_stopped_and_left_where_it_does_not_follow(tmp_path: Path) -> None:
+    folder = requested(tmp_path, WalkEngine(), Walk(duration=3.0), {"one": WalkEngine().initial}, ramp=1.0)
+    done = run(folder, _behaves(tmp_path, follows="sent < 1000"), "--yes", "--unpaced")
+    assert "stands still, though it was sent 0.2" in done.stdout and "; held, then ramped out" in done.stdout
+    assert journal.ends(folder / "answer.csv") == {0: True}
+
+
+def test_the_first_fault_is_told_before_where_the_robot_was_left(walk: Path, tmp_path: Path) -> None:
+    word = _behaves(tmp_path, fell="1 / 0 if sent == 1010 else False", breaks="sent == 1020")
+    path = Path(word.removeprefix("--robot="))
+    path.write_text(path.read_text().replace("1 / 0 if", "once(sent) if") + FAILS_ONCE)
+    done = run(walk, word, f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    assert done.stdout.splitlines()[-1] == (
+        "runner.py: read() failed: ZeroDivisionError: division by zero; "
+        "one: the way back was broken off; the robot is left where it is"
+    )
+
+
+@pytest.mark.parametrize(
+    ("behind", "off", "problem"),
+    [(10, 0.1, ""), (1, -0.5, "b: is 0.5 rad off its targets"), (25, 0.0, "b: stands still, though it was sent 0.25")],
+)
+def test_a_joint_may_be_late_but_not_far_off(behind: int, off: float, problem: str) -> None:
+    following, told = Following(("a", "b"), 0.2), ""
+    way = np.outer(np.arange(100) * 0.05, [0.0, 1.0])  # rad, 2.5 rad/s
+    following.start(way[0], 0.0)
+    for tick in range(100):
+        told = told or following.problem(way[max(0, tick - behind)] + [0.0, off], PERIOD * tick)
+        following.sent(way[tick], PERIOD * tick)
+    assert told.startswith(problem) and bool(told) == bool(problem)
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGINT"])
+def test_a_signal_to_end_brings_the_robot_back(walk: Path, tmp_path: Path, name: str) -> None:
+    ends = FAILS_ONCE.replace("1 / 0", f"os.kill(os.getpid(), signal.{name})")
+    ends += "import os, signal\ndef end():\n    open(__file__ + '.end', 'w').close()\n"
+    word = _behaves(tmp_path, breaks="sent == 1010 and once(sent)")
+    path = Path(word.removeprefix("--robot="))
+    path.write_text(path.read_text() + ends)
+    done = run(walk, word, f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    assert done.returncode == 130 and done.stdout.endswith("runner.py: interrupted; what was complete is kept\n")
+    assert (tmp_path / "mine.py.end").exists() and not (tmp_path / "answer.csv").exists()
+
+
+FAILS_ONCE = """
+failed = []
+def once(sent):
+    if not failed:
+        failed.append(1)
+        1 / 0
+    return False
+"""
 
 
 @pytest.mark.parametrize("name", ["answer.csv", "returns.csv"])

@@ -9,6 +9,7 @@ import numpy as np
 
 from gsl.runner.acting import Actor
 from gsl.runner.clock import Clock, Time
+from gsl.runner.following import Following
 from gsl.runner.guard import Guard, ramp
 from gsl.runner.request import layout_of
 from gsl.runner.senses import RobotError, Seen, Senses, names_of
@@ -16,6 +17,10 @@ from gsl.runner.senses import RobotError, Seen, Senses, names_of
 HOLD = 1.0  # for which the last safe target is held before the ramp out of a stop [s]
 LATEST = 3.0  # that a tick may come before the episode is stopped, in periods
 CALM = 0.5  # of a joint's speed limit, the most in a ramp
+
+
+class Lies(RobotError):
+    """The robot lies down, and nothing more was sent to it."""
 
 
 class Played(NamedTuple):
@@ -44,6 +49,7 @@ class Player:
         self.request, self.robot, self.period = request, robot, request["control_period"]
         self.clock = Clock(self.period, source)
         self.guard = Guard(request["joints"], request["limits"], self.period)
+        self._following = Following(request["joints"], request["ramp"]["within"])
         self._layout = layout_of(request)
         self._senses = Senses(self._layout)
 
@@ -51,9 +57,13 @@ class Player:
         """Bring the robot from where it is to where the episode starts.
 
         Raises:
-            RobotError: It is found where nothing should move it, the start is unsafe, or it does not get there.
+            RobotError: It lies down, is found where nothing should move it, the start is unsafe, or it does not get
+                there.
         """
-        position = self._position()
+        seen = self._read(self.clock.now())
+        if seen.fell:
+            raise Lies(f"the robot lies down before {episode['name']} has begun; set it up, and start again")
+        position = self._at(seen)
         if problem := self.guard.beyond(position):
             raise RobotError(f"{problem}; bring it by hand into its range")
         posture = np.array(episode["posture"], dtype=float)
@@ -64,12 +74,12 @@ class Player:
         self.clock.begin()
         self._ramp(posture)
         self.clock.wait()
-        if problem := self.guard.away(self._position(), self.request["ramp"]["within"]):
+        if problem := self.guard.away(self._at(self._read(self.clock.now())), self.request["ramp"]["within"]):
             raise RobotError(f"{problem} after the ramp to the start of {episode['name']}; it is left where it is")
         self.guard.start(posture)
 
     def play(self, episode: Mapping[str, Any]) -> Played:
-        """Act; a fall or a target that is refused ends it early, the last safe target is then held.
+        """Act; a fall, a target that is refused or a joint that does not follow ends it early.
 
         Raises:
             RobotError: The robot or the policy fails, or a tick comes far too late.
@@ -81,12 +91,13 @@ class Player:
         tick, now, broken = 0, 0.0, False
         seen = self._read(now)
         if seen.fell:
-            raise RobotError(f"the robot lies down before {episode['name']} has begun")
+            raise Lies(f"the robot lies down before {episode['name']} has begun; set it up, and start again")
+        self._following.start(self.guard.last, now)
         try:
             while not (fell := seen.fell) and tick < episode["steps"]:
                 self._check_late(episode, now)
                 action, sent = actor.act(seen.observation)
-                if stopped := self._send(sent):
+                if stopped := self._following.problem(self._at(seen), now) or self._send(sent):
                     stopped = f"{stopped} (at {now:.2f} s)"
                     break
                 rows.append(self._row(episode, tick, now, seen, action, sent))
@@ -102,15 +113,24 @@ class Player:
         return Played(self._columns(seen), rows, fell, stopped, broken, self.clock.worst)
 
     def leave(self, episode: Mapping[str, Any], *, hold: bool) -> None:
-        """Bring the robot back to the start posture: hold the last safe target, long where it had to stop, and ramp."""
+        """Bring the robot back to the start posture: hold the last safe target, long where it had to stop, and ramp.
+
+        Raises:
+            Lies: It lies down; nothing more is sent.
+            RobotError: It fails, or does not follow; it is left where it is.
+        """
         seconds = HOLD if hold else self.request["limits"]["window"]
-        self._follow([self.guard.last] * max(1, round(seconds / self.period)))
-        self.guard.start(self.guard.last)
-        self._ramp(np.array(episode["posture"], dtype=float))
+        try:
+            self._follow([self.guard.last] * max(1, round(seconds / self.period)), held=True)
+            self.guard.start(self.guard.last)
+            self._ramp(np.array(episode["posture"], dtype=float))
+        except Lies:
+            self._called("end")
+            raise
         self._called("end")
 
-    def _position(self) -> np.ndarray:
-        return self._read(self.clock.now()).observation[self._layout["position"]]
+    def _at(self, seen: Seen) -> np.ndarray:
+        return seen.observation[self._layout["position"]]
 
     def _read(self, now: float) -> Seen:
         return self._senses.seen(self._called("read"), now)
@@ -128,6 +148,7 @@ class Player:
         if problem := self.guard.refusal(target, now):
             return problem
         self.guard.take(target, now)  # first: if send() breaks off, the robot may have it
+        self._following.sent(target, now)
         self._called("send", target.copy())
         return ""
 
@@ -140,9 +161,16 @@ class Player:
         speed = np.minimum(self.request["ramp"]["speed"], CALM * np.array(self.request["limits"]["speed"]))
         self._follow(list(ramp(self.guard.last, end, self.request["ramp"]["seconds"], speed, self.period)))
 
-    def _follow(self, targets: list[np.ndarray]) -> None:
+    def _follow(self, targets: list[np.ndarray], *, held: bool = False) -> None:
+        """Send targets one by one while the robot stands and, unless one and the same is `held`, follows."""
+        self._following.start(self.guard.last, self.clock.now())
         for target in targets:
-            self.clock.wait()
+            now = self.clock.wait()
+            seen = self._read(now)
+            if seen.fell:
+                raise Lies("the robot lies down; nothing more is sent to it")
+            if not held and (problem := self._following.problem(self._at(seen), now)):
+                raise RobotError(f"{problem} in a ramp; it is left where it is")
             if problem := self._send(target):
                 raise RobotError(f"a ramp is refused: {problem}")
 

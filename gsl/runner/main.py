@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from gsl.errors import GslError
 from gsl.runner import journal
 from gsl.runner.clock import Simulated, Wall
-from gsl.runner.episode import Played, Player
+from gsl.runner.episode import Lies, Played, Player
 from gsl.runner.request import due, read_request
 from gsl.runner.robots import PerfectRobot, robot_of
 from gsl.runner.senses import RobotError
@@ -32,24 +34,25 @@ def main(folder: Path, words: Sequence[str]) -> int:
     parser.add_argument("--yes", action="store_true", help="ask nothing")
     parser.add_argument("--unpaced", action="store_true", help="do not wait for the clock: for a simulated robot")
     asked = parser.parse_args(words)
+    for name in ("SIGTERM", "SIGHUP"):  # as Ctrl-C does: hold, ramp out, keep what is complete
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.default_int_handler)
     try:
         request = read_request(folder)
         return dry_run(request) if asked.dry_run else Sitting(request, asked).run()
     except GslError as error:
         say(f"runner.py: {error}")
         return 2
-    except EOFError:
-        say("runner.py: there is nobody to ask; --yes asks nothing")
-        return 2
-    except KeyboardInterrupt:
-        say("runner.py: interrupted; what was complete is kept")
+    except KeyboardInterrupt as error:
+        say("; ".join(["runner.py: interrupted", *map(str, error.args), "what was complete is kept"]))
         return 130
 
 
 def say(text: str) -> None:
     """Tell a person something."""
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
+    with suppress(OSError):  # a terminal that is gone must not keep the robot from being brought back
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
 
 
 def dry_run(request: Mapping[str, Any]) -> int:
@@ -71,6 +74,10 @@ def dry_run(request: Mapping[str, Any]) -> int:
     told = f"{stops} of {len(request['episodes'])} episodes were refused" if stops else "no target was refused"
     say(f"{told}; nothing was written. A real robot feels its feet and sways: its targets will differ.")
     return 1 if stops else 0
+
+
+class Alone(GslError):
+    """There is nobody to ask."""
 
 
 class Sitting:
@@ -103,36 +110,43 @@ class Sitting:
 
     def _one(self, episode: Mapping[str, Any]) -> None:
         """Run an episode; what it came to is written before the robot moves on, as that may fail, too."""
-        player = self._player
+        player, played, fault, hold = self._player, None, None, True
         player.approach(episode)
-        played = self._played(episode)
-        if played is None:
-            player.leave(episode, hold=False)
-            raise KeyboardInterrupt
         try:
+            if not self._ask("it stands at the start: Enter begins, q ends"):
+                hold = False
+                raise KeyboardInterrupt
+            played = player.play(episode)
+            hold = played.fell or played.broken or bool(played.stopped)
             if not played.broken:
                 self._keep(episode, played)
-        finally:
+        except BaseException as error:  # whatever it is, the robot is brought back first
+            fault = error
+        left = self._back(episode, down=played is not None and (played.fell or bool(played.stopped)), hold=hold)
+        if played is not None and played.broken:
             try:
-                player.leave(episode, hold=played.fell or played.broken or bool(played.stopped))
-            finally:
-                if played.broken:
-                    self._keep(episode, self._broken(played))
+                self._keep(episode, self._broken(played))
+            except BaseException as error:
+                fault = error
+        if fault is not None or left:
+            raise _both(fault, left)
+        assert played is not None
         if self._request["distance"] and "base.position.x" not in played.columns:
             self._measure(episode, fell=played.fell or bool(played.stopped))
 
-    def _played(self, episode: Mapping[str, Any]) -> Played | None:
-        """Play an episode, None if a person does not want it; whatever goes wrong, hold and ramp out."""
+    def _back(self, episode: Mapping[str, Any], *, down: bool, hold: bool) -> str:
+        """Hold and ramp out; return why the robot is not back, nothing if it is, or lies after what was a fall."""
         try:
-            if not self._ask("it stands at the start: Enter begins, q ends"):
-                return None
-            return self._player.play(episode)
-        except BaseException:
-            try:
-                self._player.leave(episode, hold=True)
-            except GslError as error:
-                say(f"{episode['name']}: could not be brought back: {error}")
-            raise
+            self._player.leave(episode, hold=hold)
+        except KeyboardInterrupt:
+            return f"{episode['name']}: the way back was broken off; the robot is left where it is"
+        except Lies as error:
+            if not down:
+                return f"{episode['name']}: {error}"
+            say(f"{episode['name']}: {error}; set it up")
+        except GslError as error:
+            return f"{episode['name']}: could not be brought back: {error}"
+        return ""
 
     def _keep(self, episode: Mapping[str, Any], played: Played) -> None:
         """Write down what an episode came to: its log, or that it fell where there is none that could be used."""
@@ -150,8 +164,9 @@ class Sitting:
 
     def _broken(self, played: Played) -> Played:
         """Ask why a person broke an episode off: a fall is a result and must not be lost, anything else is none."""
-        if len(played.rows) > 1 and not self._asked.yes and self._yes("was it a fall? y keeps it, n runs it again"):
-            return played.as_a_fall()
+        with suppress(Alone):
+            if len(played.rows) > 1 and not self._asked.yes and self._yes("was it a fall? y keeps it, n runs it again"):
+                return played.as_a_fall()
         raise KeyboardInterrupt
 
     def _measure(self, episode: Mapping[str, Any], *, fell: bool) -> None:
@@ -159,7 +174,7 @@ class Sitting:
         if self._asked.yes:
             return
         question = "distance walked forward [m], f if it fell, Enter to write it into returns.csv later: "
-        while not _is_distance(told := input(question).strip().lower()):
+        while not _is_distance(told := _typed(question)):
             say(f"'{told}' is no number of metres")
         if told:
             fallen = told == "f"
@@ -182,13 +197,31 @@ class Sitting:
         return list(due(self._request, {*ends, *fallen}, {name for name, down in ends.items() if down} | fallen))
 
     def _ask(self, question: str) -> bool:
-        return self._asked.yes or input(f"{question}: ").strip().lower() != "q"
+        return self._asked.yes or _typed(f"{question}: ") != "q"
 
     def _yes(self, question: str) -> bool:
-        return input(f"{question}: ").strip().lower() in ("y", "yes")
+        return _typed(f"{question}: ") in ("y", "yes")
 
     def _seconds(self, episode: Mapping[str, Any]) -> float:
         return float(episode["steps"] * self._request["control_period"])
+
+
+def _typed(question: str) -> str:
+    try:
+        return input(question).strip().lower()
+    except (EOFError, OSError) as error:
+        raise Alone("there is nobody to ask; --yes asks nothing") from error
+
+
+def _both(first: BaseException | None, left: str) -> BaseException:
+    """Return the first fault, and where the robot was left, as one."""
+    if first is None:
+        return RobotError(left)
+    if not left:
+        return first
+    if isinstance(first, KeyboardInterrupt):
+        return KeyboardInterrupt(left)
+    return RobotError(f"{first}; {left}")
 
 
 def _is_distance(told: str) -> bool:
