@@ -325,6 +325,19 @@ def test_what_is_logged_after_a_fall_is_cut_off(place: Path) -> None:
     assert len(second) == 80 and not second.ended_in_a_fall
 
 
+def test_a_sense_with_blanks_that_nobody_asked_for_is_left_out(place: Path) -> None:
+    lines = _lines(place)
+    more = [
+        ",".join([line[:-1], told]) + "\n" for line, told in zip(lines[1:], ["voltage", "21.5"] * 999, strict=False)
+    ]
+    more = [line.replace(",21.5\n", ",\n") if number % 3 else line for number, line in enumerate(more)]
+    more = [line.replace(",voltage\n", ",20\n") if number else line for number, line in enumerate(more)]
+    (place / ASKED / ANSWER).write_text("".join([lines[0], *more]))
+    done(*COLLECT, folder=place)
+    (one, *_) = read(place / "runs/one/collect_real/trajectories.parquet").episodes
+    assert "voltage" not in one.sensors and "gyro.x" in one.sensors
+
+
 def test_the_log_of_another_episode_is_noticed(place: Path) -> None:
     names = "[neighbour_01,neighbour_02,pi0_01,pi0_02,pi0_03,pi0_04]"
     said = done("answer", f"request={ASKED}", f"logs=runs/elsewhere/{ANSWER}", f"episodes={names}", folder=place)

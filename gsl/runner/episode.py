@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from gsl.runner.senses import RobotError, Seen, Senses, names_of
 
 HOLD = 1.0  # for which the last safe target is held before the ramp out of a stop [s]
 LATEST = 3.0  # that a tick may come before the episode is stopped, in periods
+ENDS = ("fell", "stopped")  # the last columns
 CALM = 0.5  # of a joint's speed limit, the most in a ramp
 
 
@@ -52,6 +54,25 @@ class Player:
         self._following = Following(request["joints"], request["ramp"]["within"])
         self._layout = layout_of(request)
         self._senses = Senses(self._layout)
+        self._more: tuple[str, ...] | None = None
+
+    def begin(self, log: Path, columns: Sequence[str] | None) -> None:
+        """Read the robot before anything moves, and settle the columns: those of a log if there is one, else its own.
+
+        Raises:
+            RobotError: The log lacks what the robot tells, or has what it cannot tell.
+        """
+        told = tuple(self._read(self.clock.now()).more)
+        self._more = told
+        if columns is None:
+            return
+        first, last = len(self._columns()) - len(told) - len(ENDS), len(columns) - len(ENDS)
+        self._more = tuple(columns[first:last])
+        new = [name for name in told if name not in self._more]
+        gone = [name for name in self._more if name not in told and name.startswith("base.")]
+        if list(columns) != self._columns() or new or gone:
+            problem = f"has no column {new[0]}, which" if new else "has other columns than"
+            raise RobotError(f"{log}: {problem} the robot tells now; choose another --log")
 
     def approach(self, episode: Mapping[str, Any]) -> None:
         """Bring the robot from where it is to where the episode starts.
@@ -63,6 +84,7 @@ class Player:
         seen = self._read(self.clock.now())
         if seen.fell:
             raise Lies(f"the robot lies down before {episode['name']} has begun; set it up, and start again")
+        self._check_told(seen)
         position = self._at(seen)
         if problem := self.guard.beyond(position):
             raise RobotError(f"{problem}; bring it by hand into its range")
@@ -110,7 +132,7 @@ class Player:
             tick = len(rows)
         nothing = np.full(len(self.guard.joints), np.nan)
         rows.append(self._row(episode, tick, now, seen, nothing, nothing, fell=fell, stopped=bool(stopped)))
-        return Played(self._columns(seen), rows, fell, stopped, broken, self.clock.worst)
+        return Played(self._columns(), rows, fell, stopped, broken, self.clock.worst)
 
     def leave(self, episode: Mapping[str, Any], *, hold: bool) -> None:
         """Bring the robot back to the start posture: hold the last safe target, long where it had to stop, and ramp.
@@ -174,10 +196,25 @@ class Player:
             if problem := self._send(target):
                 raise RobotError(f"a ramp is refused: {problem}")
 
-    def _columns(self, seen: Seen) -> list[str]:
+    def _check_told(self, seen: Seen) -> None:
+        """Refuse what the robot did not tell at first; what is missing now is left blank, but never the base."""
+        if self._more is None:
+            self._more = tuple(seen.more)
+        for name in seen.more:
+            if name not in self._more:
+                raise RobotError(f"read() gives {name} now, which it did not at first; choose another --log")
+
+    def _columns(self) -> list[str]:
         groups = ("action", "grounded_action") if self.request["action_noise"] else ("action",)
         asked = [f"{group}.{joint}" for group in groups for joint in self.guard.joints]
-        return ["episode", "step", "time", *asked, *names_of(self._layout), *seen.more, "fell", "stopped"]
+        return ["episode", "step", "time", *asked, *names_of(self._layout), *(self._more or ()), *ENDS]
+
+    def _told(self, seen: Seen) -> list[float]:
+        """Return what the robot tells beyond the request, in order."""
+        for name in self._more or ():
+            if name not in seen.more and name.startswith("base."):
+                raise RobotError(f"read() gives no {name} any more; without it nobody knows how far it came")
+        return [seen.more.get(name, np.nan) for name in self._more or ()]
 
     def _row(
         self, episode: Mapping[str, Any], tick: int, now: float, seen: Seen, action: np.ndarray, sent: np.ndarray,
@@ -185,4 +222,4 @@ class Player:
     ) -> list[Any]:  # fmt: skip
         asked = [*action.tolist(), *(sent.tolist() if self.request["action_noise"] else ())]
         number = self.request["episodes"].index(episode)
-        return [number, tick, now, *asked, *seen.observation.tolist(), *seen.more.values(), fell, stopped]
+        return [number, tick, now, *asked, *seen.observation.tolist(), *self._told(seen), fell, stopped]

@@ -15,6 +15,7 @@ from gsl.errors import GslError
 from gsl.runner import journal
 from gsl.runner.clock import Simulated, Wall
 from gsl.runner.episode import Lies, Played, Player
+from gsl.runner.preflight import alone, check_writable, mended
 from gsl.runner.request import due, read_request
 from gsl.runner.robots import PerfectRobot, robot_of
 from gsl.runner.senses import RobotError
@@ -39,9 +40,15 @@ def main(folder: Path, words: Sequence[str]) -> int:
             signal.signal(getattr(signal, name), signal.default_int_handler)
     try:
         request = read_request(folder)
-        return dry_run(request) if asked.dry_run else Sitting(request, asked).run()
+        if asked.dry_run:
+            return dry_run(request)
+        with alone(folder):
+            return Sitting(request, asked).run()
     except GslError as error:
         say(f"runner.py: {error}")
+        return 2
+    except OSError as error:
+        say(f"runner.py: {error.filename or 'a file'} cannot be read or written: {error.strerror or error}")
         return 2
     except KeyboardInterrupt as error:
         say("; ".join(["runner.py: interrupted", *map(str, error.args), "what was complete is kept"]))
@@ -86,6 +93,7 @@ class Sitting:
     def __init__(self, request: Mapping[str, Any], asked: argparse.Namespace) -> None:
         self._request, self._asked = request, asked
         self._returns = asked.log.with_name(journal.RETURNS)
+        check_writable(asked.log)
         journal.check_marked(asked.log, request["hash"])
         journal.check_marked(self._returns, request["hash"], by_hand=True)
         names = [episode["name"] for episode in request["episodes"]]
@@ -100,13 +108,39 @@ class Sitting:
     def run(self) -> int:
         """Run the episodes that are missing, or those that were named."""
         say(self._request["about"])
+        if told := mended(self._asked.log, self._request):
+            say(told)
+        log = self._asked.log
+        self._player.begin(log, journal.table(log)[0] if log.exists() else None)
+        if not self._asked.episode:
+            for episode in self._unmeasured():
+                say(f"{episode['name']} is logged, but nobody has said how far it came")
+                self._measure(episode, fell=False)
         for episode in self._sitting():
             if not self._ask(f"{episode['name']} ({self._seconds(episode):g} s): Enter ramps in, q ends"):
                 break
             self._one(episode)
-        missing = self._due()
-        say(f"{len(missing)} episodes are missing" if missing else f"all is answered: {self._asked.log}")
+        self._tell_missing()
         return 0
+
+    def _tell_missing(self) -> None:
+        missing, unmeasured = self._due(), ", ".join(one["name"] for one in self._unmeasured())
+        if missing:
+            say(f"{len(missing)} episodes are missing")
+        if unmeasured:
+            say(f"distances are missing: {unmeasured}; start again without --yes, or write them into {self._returns}")
+        if not missing and not unmeasured:
+            say(f"all is answered: {self._asked.log}")
+
+    def _unmeasured(self) -> list[Mapping[str, Any]]:
+        """Return the logged episodes, without a fall, of which nobody knows how far they came."""
+        log, episodes = self._asked.log, self._request["episodes"]
+        if not self._request["distance"] or not log.exists() or "base.position.x" in journal.table(log)[0]:
+            return []
+        told = journal.returned(self._returns)
+        known = {name for name, row in told.items() if row.get("distance") or row.get("value") or _fell(row)}
+        standing = [episodes[number] for number, down in sorted(journal.ends(log).items()) if not down]
+        return [one for one in standing if one["name"] not in known]
 
     def _one(self, episode: Mapping[str, Any]) -> None:
         """Run an episode; what it came to is written before the robot moves on, as that may fail, too."""
@@ -155,8 +189,10 @@ class Sitting:
         if useless and not (played.fell or played.stopped):
             raise RobotError(f"{episode['name']}: {late}; not kept; run it again where the rate is kept")
         if useless or len(played.rows) == 1:  # nothing was sent, or not at the rate
+            journal.drop(self._asked.log, self._request["episodes"].index(episode))
             journal.add_return(self._returns, self._request["hash"], episode["name"], "", fell=True)
         else:
+            journal.forget(self._returns, episode["name"])
             journal.keep(self._asked.log, self._request["hash"], played.columns, played.rows)
         ended = f"; refused: {played.stopped}; held, then ramped out" if played.stopped else ""
         told = f", {late}" if played.late > LATE else ""
@@ -193,7 +229,7 @@ class Sitting:
     def _due(self) -> list[Mapping[str, Any]]:
         episodes = self._request["episodes"]
         ends = {episodes[number]["name"]: down for number, down in journal.ends(self._asked.log).items()}
-        fallen = {name for name, row in journal.returned(self._returns).items() if journal.is_yes(row.get("fell"))}
+        fallen = {name for name, row in journal.returned(self._returns).items() if _fell(row)}
         return list(due(self._request, {*ends, *fallen}, {name for name, down in ends.items() if down} | fallen))
 
     def _ask(self, question: str) -> bool:
@@ -221,7 +257,11 @@ def _both(first: BaseException | None, left: str) -> BaseException:
         return first
     if isinstance(first, KeyboardInterrupt):
         return KeyboardInterrupt(left)
-    return RobotError(f"{first}; {left}")
+    return RobotError(f"{first}; {left}") if isinstance(first, GslError | OSError) else first
+
+
+def _fell(row: Mapping[str, str]) -> bool:
+    return journal.is_yes(row.get("fell"))
 
 
 def _is_distance(told: str) -> bool:
