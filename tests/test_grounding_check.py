@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gsl.core.history import History
-from gsl.core.trajectory import Batch
+from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import InputError
 from gsl.grounding.gat import LoadedTransformation
 from gsl.grounding.none import NoGrounding
@@ -78,6 +78,22 @@ def test_where_nobody_knows_the_base_only_the_falls_of_pi0_are_checked() -> None
     report = check(SCENARIO, POLICY.initial, _without("base"), 1)
     assert (report.deviations, report.reach, report.problems, report.rows()) == ({}, None, (), [])
     assert report.metrics()["pi0"]["falls"] == 0
+
+
+def test_a_neighbour_that_was_cut_short_is_told_as_the_reason() -> None:
+    pi0, other = heldout().episodes
+    down = np.zeros(11, dtype=bool)
+    down[-1] = True
+    short = replace(_first(other, 10), fell=down)
+    report = check(SCENARIO, POLICY.initial, replace(heldout(), episodes=(pi0, short)), 1)
+    assert "held out, but fallen or stopped too early: 1; collect neighbours" in report.problems[0]
+
+
+def _first(episode: Trajectory, steps: int) -> Trajectory:
+    rows = {name: getattr(episode, name)[: steps + 1] for name in ("time", "position", "velocity")}
+    sensors = {name: values[: steps + 1] for name, values in episode.sensors.items()}
+    reward = None if episode.reward is None else episode.reward[:steps]
+    return replace(episode, action=episode.action[:steps], **rows, sensors=sensors, reward=reward)
 
 
 def _without(group: str) -> Batch:

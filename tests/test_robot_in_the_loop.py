@@ -288,6 +288,7 @@ def test_an_episode_that_breaks_off_without_a_fall_is_refused(place: Path) -> No
     ("words", "problem"),
     [
         (("request=nowhere", "logs=x.csv"), "nowhere: is no request: it holds no request.json"),
+        (("logs=x.csv",), "request: has no value yet; say request=..."),
         ((f"request={ASKED}",), "there is nothing to take in: say logs=, returns= or both"),
         ((f"request={ASKED}", "logs=none.csv"), "none.csv: there is no such path"),
         ((f"request={ASKED}", f"logs=runs/elsewhere/{ANSWER}", "episodes=[pi0_01]"), "holds 6 episodes, but 1 are nam"),
@@ -323,6 +324,51 @@ def test_what_is_logged_after_a_fall_is_cut_off(place: Path) -> None:
     first, second, *_ = read(place / "runs/one/collect_real/trajectories.parquet").episodes
     assert len(first) == 30 and first.ended_in_a_fall
     assert len(second) == 80 and not second.ended_in_a_fall
+
+
+def test_a_sense_with_blanks_that_nobody_asked_for_is_left_out(place: Path) -> None:
+    lines = _lines(place)
+    more = [
+        ",".join([line[:-1], told]) + "\n" for line, told in zip(lines[1:], ["voltage", "21.5"] * 999, strict=False)
+    ]
+    more = [line.replace(",21.5\n", ",\n") if number % 3 else line for number, line in enumerate(more)]
+    more = [line.replace(",voltage\n", ",20\n") if number else line for number, line in enumerate(more)]
+    (place / ASKED / ANSWER).write_text("".join([lines[0], *more]))
+    done(*COLLECT, folder=place)
+    (one, *_) = read(place / "runs/one/collect_real/trajectories.parquet").episodes
+    assert "voltage" not in one.sensors and "gyro.x" in one.sensors
+
+
+def test_an_answer_to_another_request_is_not_taken_in_and_a_part_is_known_by_its_numbers(place: Path) -> None:
+    lines = _lines(place)
+    (place / "foreign.csv").write_text("".join(["# gsl answer to request abc\n", *lines[1:]]))
+    assert "foreign.csv: answers another request (abc" in refused(
+        "answer", f"request={ASKED}", "logs=foreign.csv", folder=place
+    )
+    part = [line for line in lines[2:] if line.startswith(("1,", "3,"))]
+    (place / "part.csv").write_text("".join([*lines[:2], *part]))
+    done("answer", f"request={ASKED}", "logs=part.csv", folder=place)
+    assert "4 of 6 episodes are missing, 6 s in all (pi0_01, pi0_03, " in done(*COLLECT, folder=place).err
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [(None, "request.json: is missing beside an answer to it; put"), ("{", "request.json: is dama")],
+)
+def test_a_request_that_is_lost_beside_its_answer_is_told(place: Path, text: str | None, problem: str) -> None:
+    (place / ASKED / ANSWER).write_bytes((place / "runs/elsewhere" / ANSWER).read_bytes())
+    (place / ASKED / "request.json").unlink()
+    if text:
+        (place / ASKED / "request.json").write_text(text)
+    assert problem in refused(*COLLECT, folder=place)
+
+
+@pytest.mark.parametrize("name", ["runner.py", "modules"])
+def test_a_runner_that_was_deleted_is_written_anew(place: Path, name: str) -> None:
+    path = place / ASKED / name
+    shutil.rmtree(path) if path.is_dir() else path.unlink()
+    assert "parts of its runner were missing; they are written anew" in done(*COLLECT, folder=place).err
+    assert path.exists()
 
 
 def test_the_log_of_another_episode_is_noticed(place: Path) -> None:

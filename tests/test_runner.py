@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +21,11 @@ from gsl.grounding.ane import ActionNoise
 from gsl.policies.excitation import Excitation
 from gsl.policies.policy import Policy, neighbour
 from gsl.policies.walk_engine import WalkEngine
-from gsl.runner import journal
+from gsl.runner import journal, preflight
 from gsl.runner.acting import Actor
 from gsl.runner.clock import Simulated
 from gsl.runner.episode import Player
+from gsl.runner.following import Following
 from gsl.runner.guard import Guard, ramp
 from gsl.runner.request import due, layout_of, read_request
 from gsl.runner.robots import PerfectRobot
@@ -226,11 +228,14 @@ def test_an_answer_in_two_sittings(walk: Path, tmp_path: Path) -> None:
 
 
 BROKEN = """
-reads, plain = 0, read
+reads, plain = -1000, read
+def begin(episode):
+    global reads
+    reads = 0
 def read():
     global reads
     reads += 1
-    if reads == 20:
+    if reads == 18:
         raise KeyboardInterrupt
     return plain()
 """
@@ -366,7 +371,8 @@ def test_a_tick_that_is_far_too_late_ends_the_episode(walk: Path) -> None:
 
 
 def test_an_episode_off_the_rate_is_not_kept(walk: Path, tmp_path: Path) -> None:
-    late = "import time\nreads, plain = 0, read\ndef read():\n    global reads\n    reads += 1\n"
+    late = "import time\nreads, plain = -1000, read\ndef begin(episode):\n    global reads\n    reads = 0\n"
+    late += "def read():\n    global reads\n    reads += 1\n"
     word = _fails(tmp_path, late + "    time.sleep(0.038 * (reads == 20))\n    return plain()\n")
     done = run(walk, word, f"--log={tmp_path / 'answer.csv'}", "--yes")
     assert done.returncode == 2 and "not kept; run it again" in done.stdout
@@ -441,7 +447,10 @@ def test_an_episode_that_is_over_is_kept_though_the_way_out_fails(walk: Path, tm
     ("more", "problem"),
     [
         ("def begin(episode):\n    1 / 0\n", "begin() failed: ZeroDivisionError: division by zero"),
-        ("def end():\n    1 / 0\n", "end() failed: ZeroDivisionError: division by zero"),
+        (
+            "def end():\n    1 / 0\n",
+            "one: could not be brought back: end() failed: ZeroDivisionError: division by zero",
+        ),
         ("SIMULATED = False\n", "--unpaced is for a rehearsal; "),
         ("plain = read\ndef read():\n    return {**plain(), 'fell': 'no'}\n", "read() gives for 'fell' 'no', which"),
     ],
@@ -457,6 +466,247 @@ def test_nobody_at_the_prompt_means_back_to_where_it_was(walk: Path, tmp_path: P
     done = run(walk, word, f"--log={tmp_path / 'answer.csv'}", "--unpaced", typed="\n")
     assert done.returncode == 2 and "there is nobody to ask" in done.stdout
     assert (tmp_path / "mine.py.end").exists()
+
+
+BEHAVES = """
+sent, episodes, plain_read, plain_send = 0, 0, read, send
+def begin(episode):
+    global sent, episodes
+    sent, episodes = 1000, episodes + 1
+def send(targets):
+    global sent, at
+    sent += 1
+    open(__file__ + '.sent', 'a').write(f'{{sent}}\\n')
+    if {follows}:
+        at = targets
+def read():
+    if {breaks}:
+        raise KeyboardInterrupt
+    return {{**plain_read(), 'fell': {fell}}}
+"""
+
+
+def _behaves(
+    folder: Path, *, fell: str = "False", follows: str = "True", breaks: str = "False", start: str = ""
+) -> str:
+    word = _robot(folder, start=start or "[0.0] * 15")
+    path = Path(word.removeprefix("--robot="))
+    path.write_text(path.read_text() + BEHAVES.format(fell=fell, follows=follows, breaks=breaks))
+    return word
+
+
+FAR_AWAY = "[0.0] * 4 + [-0.9] + [0.0] * 10"
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "problem", "most"),
+    [
+        ({"fell": "sent == 10"}, "the robot lies down; nothing more is sent to it", 10),
+        ({"fell": "sent == 1035"}, "one: the robot lies down; nothing more is sent to it", 1035),
+        ({"follows": "False", "start": FAR_AWAY}, "LShoulderPitch: stands still, though it was sent 0.2", 50),
+        (
+            {"follows": "sent < 1032", "breaks": "sent == 1040"},
+            "one: the way back was broken off; the robot is left",
+            0,
+        ),
+        ({"fell": "episodes == 1 and sent > 1019"}, "the robot lies down before two has begun; set it up, and", 1020),
+    ],
+)
+def test_a_ramp_and_a_hold_look_at_the_robot(
+    walk: Path, tmp_path: Path, behaviour: dict[str, str], problem: str, most: int
+) -> None:
+    done = run(walk, _behaves(tmp_path, **behaviour), f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    assert done.returncode == 2 and done.stderr == ""
+    assert done.stdout.splitlines()[-1].startswith(f"runner.py: {problem}")
+    sent = (tmp_path / "mine.py.sent").read_text().split()
+    assert int(sent[-1]) == most or not most or (most == 50 and int(sent[-1]) < 1000)
+
+
+def test_a_robot_that_stands_still_is_stopped_and_left_where_it_does_not_follow(tmp_path: Path) -> None:
+    folder = requested(tmp_path, WalkEngine(), Walk(duration=3.0), {"one": WalkEngine().initial}, ramp=1.0)
+    done = run(folder, _behaves(tmp_path, follows="sent < 1000"), "--yes", "--unpaced")
+    assert "stands still, though it was sent 0.2" in done.stdout and "; held, then ramped out" in done.stdout
+    assert journal.ends(folder / "answer.csv") == {0: True}
+
+
+def test_the_first_fault_is_told_before_where_the_robot_was_left(walk: Path, tmp_path: Path) -> None:
+    word = _behaves(tmp_path, fell="1 / 0 if sent == 1010 else False", breaks="sent == 1020")
+    path = Path(word.removeprefix("--robot="))
+    path.write_text(path.read_text().replace("1 / 0 if", "once(sent) if") + FAILS_ONCE)
+    done = run(walk, word, f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    assert done.stdout.splitlines()[-1] == (
+        "runner.py: read() failed: ZeroDivisionError: division by zero; "
+        "one: the way back was broken off; the robot is left where it is"
+    )
+
+
+@pytest.mark.parametrize(
+    ("behind", "off", "problem"),
+    [(10, 0.1, ""), (1, -0.5, "b: is 0.5 rad off its targets"), (25, 0.0, "b: stands still, though it was sent 0.25")],
+)
+def test_a_joint_may_be_late_but_not_far_off(behind: int, off: float, problem: str) -> None:
+    following, told = Following(("a", "b"), 0.2), ""
+    way = np.outer(np.arange(100) * 0.05, [0.0, 1.0])  # rad, 2.5 rad/s
+    following.start(way[0], 0.0)
+    for tick in range(100):
+        told = told or following.problem(way[max(0, tick - behind)] + [0.0, off], PERIOD * tick)
+        following.sent(way[tick], PERIOD * tick)
+    assert told.startswith(problem) and bool(told) == bool(problem)
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGINT"])
+def test_a_signal_to_end_brings_the_robot_back(walk: Path, tmp_path: Path, name: str) -> None:
+    ends = FAILS_ONCE.replace("1 / 0", f"os.kill(os.getpid(), signal.{name})")
+    ends += "import os, signal\ndef end():\n    open(__file__ + '.end', 'w').close()\n"
+    word = _behaves(tmp_path, breaks="sent == 1010 and once(sent)")
+    path = Path(word.removeprefix("--robot="))
+    path.write_text(path.read_text() + ends)
+    done = run(walk, word, f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    assert done.returncode == 130 and done.stdout.endswith("runner.py: interrupted; what was complete is kept\n")
+    assert (tmp_path / "mine.py.end").exists() and not (tmp_path / "answer.csv").exists()
+
+
+FAILS_ONCE = """
+failed = []
+def once(sent):
+    if not failed:
+        failed.append(1)
+        1 / 0
+    return False
+"""
+
+
+@pytest.fixture(scope="module")
+def lines(walk: Path, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """The lines of a whole answer."""
+    folder = tmp_path_factory.mktemp("whole")
+    assert run(walk, _robot(folder), f"--log={folder / 'answer.csv'}", "--yes", "--unpaced").returncode == 0
+    return (folder / "answer.csv").read_text().splitlines(keepends=True)
+
+
+def _never(folder: Path) -> str:
+    return _fails(folder, "def send(targets):\n    open(__file__ + '.sent', 'w').close()\n")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "problem"),
+    [
+        (lambda lines: lines[:1], "holds no more than which request it answers; remove it"),
+        (lambda lines: [lines[0], lines[1].replace("time,", "when,"), *lines[2:]], "has no column time; move it away"),
+        (lambda lines: [lines[0], lines[1].replace("gyro.x", "gyro"), *lines[2:]], "has other columns than the robot"),
+        (lambda lines: [*lines[:5], lines[5].replace("0,", "x,", 1), *lines[6:]], "line 6: there is no episode 'x'"),
+        (lambda lines: [*lines[:5], lines[5].replace("0,", "7,", 1), *lines[6:]], "line 6: there is no episode '7'"),
+        (
+            lambda lines: [*lines[:5], lines[5].replace("0,3,", "0,fast,"), *lines[6:]],
+            "line 6: step is 'fast', not a n",
+        ),
+        (lambda lines: [*lines[:5], lines[5].replace("false", "no"), *lines[6:]], "line 6: fell is 'no', not true or"),
+        (lambda lines: [*lines[:5], "0,1\n", *lines[6:]], "line 6: has another number of cells than there are col"),
+        (lambda lines: [*lines[:9], *lines[33:]], "line 10: one has no last row; remove the rows of that episode"),
+        (lambda lines: [*lines[:33], *lines[2:33]], "line 34: one is there twice; remove the rows of that episode"),
+    ],
+)
+def test_a_damaged_answer_is_told_before_anything_moves(
+    walk: Path, tmp_path: Path, lines: list[str], spoil: Callable[[list[str]], list[str]], problem: str
+) -> None:
+    log = tmp_path / "answer.csv"
+    log.write_text("".join(spoil(lines)))
+    done = run(walk, _never(tmp_path), f"--log={log}", "--yes", "--unpaced")
+    assert done.returncode == 2 and done.stderr == ""
+    assert done.stdout.splitlines()[-1].startswith(f"runner.py: {log}: {problem}")
+    assert not (tmp_path / "mine.py.sent").exists()
+
+
+@pytest.mark.parametrize("cut", [2, 30, 2000, 5000])
+def test_a_last_episode_that_was_cut_off_is_run_again(walk: Path, tmp_path: Path, lines: list[str], cut: int) -> None:
+    log = tmp_path / "answer.csv"
+    log.write_text("".join(lines)[: -1 - cut])
+    done = run(walk, _robot(tmp_path), f"--log={log}", "--yes", "--unpaced")
+    assert done.returncode == 0 and "its last episode was cut off; it is dropped, to be run again" in done.stdout
+    assert "two: 30 steps" in done.stdout and "one: 30 steps" not in done.stdout
+    assert journal.ends(log) == {0: False, 1: False}
+
+
+def test_an_answer_without_its_last_newline_is_whole(walk: Path, tmp_path: Path, lines: list[str]) -> None:
+    log = tmp_path / "answer.csv"
+    log.write_text("".join(lines).rstrip("\n"))
+    assert "cut off" not in run(walk, _robot(tmp_path), f"--log={log}", "--yes", "--unpaced").stdout
+    assert log.read_text() == "".join(lines)
+
+
+def test_a_log_that_cannot_be_written_is_told_before_anything_moves(walk: Path, tmp_path: Path) -> None:
+    for log, problem in ((tmp_path / "none/a.csv", "none: there is no such folder; make it"), (tmp_path, "is no file")):
+        done = run(walk, _never(tmp_path), f"--log={log}", "--yes", "--unpaced")
+        assert done.returncode == 2 and problem in done.stdout and done.stderr == ""
+    assert not (tmp_path / "mine.py.sent").exists()
+
+
+def test_a_log_that_cannot_be_written_later_is_told_when_the_robot_is_back(walk: Path, tmp_path: Path) -> None:
+    place = tmp_path / "place"
+    place.mkdir()
+    gone = f"import shutil\ndef begin(episode):\n    shutil.rmtree({str(place)!r})\n"
+    word = _fails(tmp_path, gone + "def end():\n    open(__file__ + '.end', 'w').close()\n")
+    done = run(walk, word, f"--log={place / 'answer.csv'}", "--yes", "--unpaced")
+    assert done.returncode == 2 and done.stderr == "" and (tmp_path / "mine.py.end").exists()
+    assert done.stdout.splitlines()[-1].endswith("answer.csv.tmp cannot be read or written: No such file or directory")
+
+
+def test_two_runners_are_one_too_many_and_a_dead_one_is_none(walk: Path, tmp_path: Path) -> None:
+    words = (_robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    with preflight.alone(walk):
+        done = run(walk, *words)
+        assert done.returncode == 2 and "another runner (process " in done.stdout and done.stderr == ""
+    assert (walk / preflight.LOCK).exists() and run(walk, *words).returncode == 0
+
+
+def test_a_sense_that_is_missing_at_times_is_blank_and_a_new_one_is_refused(walk: Path, tmp_path: Path) -> None:
+    log, reads = tmp_path / "answer.csv", "reads, plain = 0, read\ndef read():\n    global reads\n    reads += 1\n"
+    some = reads + "    return {**plain(), **({'voltage': 21.5} if reads % 3 == 1 else {})}\n"
+    assert run(walk, _fails(tmp_path, some), f"--log={log}", "--yes", "--unpaced").returncode == 0
+    told = {row["voltage"] for row in journal.table(log)[1]}
+    assert told == {"", "21.5"}
+    for more, problem in (
+        ("'temperature': [30] * 15", "has no column temperature.LHipYawPitch, which the robot tells now"),
+        ("'gyro': [1, 2, 3], 'base.position': [0, 0, 0]", "has no column base.position.x, which the robot tells now"),
+    ):
+        done = run(walk, _robot(tmp_path, more), f"--log={log}", "--yes", "--unpaced", "--episode=one")
+        assert done.returncode == 2 and problem in done.stdout
+
+
+def test_a_base_that_is_lost_is_no_blank(walk: Path, tmp_path: Path) -> None:
+    late = "def begin(episode):\n    global blind\n    blind = True\nblind, plain = False, read\ndef read():\n"
+    late += "    return {**plain(), **({} if blind else {'base.position': [0, 0, 0]})}\n"
+    done = run(walk, _fails(tmp_path, late), f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    assert done.returncode == 2 and "read() gives no base.position.x any more; without it" in done.stdout
+
+
+def test_missing_distances_are_named_and_asked_for_at_the_next_start(walk: Path, tmp_path: Path) -> None:
+    words = (_robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--unpaced")
+    first = run(walk, *words, "--yes").stdout
+    assert "distances are missing: one, two; start again without --yes, or write" in first and "all is" not in first
+    second = run(walk, *words, typed="0.3\n\n").stdout
+    assert "one is logged, but nobody has said how far it came" in second and "distances are missing: two;" in second
+    assert "all is answered" in run(walk, *words, typed="f\n").stdout
+    rows = journal.returned(tmp_path / "returns.csv")
+    assert (rows["one"]["distance"], rows["two"]["fell"]) == ("0.3", "yes")
+
+
+def test_an_episode_run_again_forgets_what_was_measured_before(walk: Path, tmp_path: Path) -> None:
+    words = (_robot(tmp_path), f"--log={tmp_path / 'answer.csv'}", "--unpaced")
+    run(walk, *words, typed="\n\nf\n\n\n0.2\n")
+    again = run(walk, *words, "--yes", "--episode=one").stdout
+    assert "distances are missing: one;" in again
+    assert list(journal.returned(tmp_path / "returns.csv")) == ["two"]
+
+
+def test_an_episode_that_leaves_no_log_takes_the_earlier_one_away(tmp_path: Path) -> None:
+    path = tmp_path / "answer.csv"
+    for episode in (0, 1):
+        journal.keep(path, "h", ["episode", "fell", "stopped"], [[episode, False, False]])
+    journal.drop(path, 0)
+    assert journal.ends(path) == {1: False}
+    journal.drop(path, 1)
+    assert not path.exists()
 
 
 @pytest.mark.parametrize("name", ["answer.csv", "returns.csv"])

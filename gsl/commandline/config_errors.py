@@ -18,6 +18,7 @@ from gsl.errors import ConfigError, InputError
 
 _UNKNOWN = re.compile(r"Could not override '([^']+)'")
 _NO_OPTION = re.compile(r"Could not find '([^']+)/([^'/]*)'")
+_MISSING = re.compile(r"[Mm]issing mandatory value: (\S+)")
 _NO_PRIMARY = re.compile(r"Cannot find primary config '([^']+)'")
 _AMBIGUOUS = re.compile(r"Ambiguous value for argument '([^'=]+)=([^']*)'")
 _UNEXPECTED = re.compile(r"unexpected keyword argument '(\w+)'")
@@ -77,6 +78,8 @@ def resolution_error(error: Exception) -> Exception:
     key = str(getattr(error, "full_key", None) or "configuration")
     if isinstance(error, MissingMandatoryValue):
         return missing(key)
+    if found := _MISSING.search(str(error)):
+        return missing(found.group(1))
     if isinstance(error, InterpolationKeyError | InterpolationResolutionError):
         return ConfigError(key, f"{str(error).splitlines()[0]}")
     return ConfigError(key, str(error).splitlines()[0])

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gsl.runner.acting import Actor
 from gsl.runner.clock import Clock, Time
+from gsl.runner.following import Following
 from gsl.runner.guard import Guard, ramp
 from gsl.runner.request import layout_of
 from gsl.runner.senses import RobotError, Seen, Senses, names_of
 
 HOLD = 1.0  # for which the last safe target is held before the ramp out of a stop [s]
 LATEST = 3.0  # that a tick may come before the episode is stopped, in periods
+ENDS = ("fell", "stopped")  # the last columns
 CALM = 0.5  # of a joint's speed limit, the most in a ramp
+
+
+class Lies(RobotError):
+    """The robot lies down, and nothing more was sent to it."""
 
 
 class Played(NamedTuple):
@@ -44,16 +51,41 @@ class Player:
         self.request, self.robot, self.period = request, robot, request["control_period"]
         self.clock = Clock(self.period, source)
         self.guard = Guard(request["joints"], request["limits"], self.period)
+        self._following = Following(request["joints"], request["ramp"]["within"])
         self._layout = layout_of(request)
         self._senses = Senses(self._layout)
+        self._more: tuple[str, ...] | None = None
+
+    def begin(self, log: Path, columns: Sequence[str] | None) -> None:
+        """Read the robot before anything moves, and settle the columns: those of a log if there is one, else its own.
+
+        Raises:
+            RobotError: The log lacks what the robot tells, or has what it cannot tell.
+        """
+        told = tuple(self._read(self.clock.now()).more)
+        self._more = told
+        if columns is None:
+            return
+        first, last = len(self._columns()) - len(told) - len(ENDS), len(columns) - len(ENDS)
+        self._more = tuple(columns[first:last])
+        new = [name for name in told if name not in self._more]
+        gone = [name for name in self._more if name not in told and name.startswith("base.")]
+        if list(columns) != self._columns() or new or gone:
+            problem = f"has no column {new[0]}, which" if new else "has other columns than"
+            raise RobotError(f"{log}: {problem} the robot tells now; choose another --log")
 
     def approach(self, episode: Mapping[str, Any]) -> None:
         """Bring the robot from where it is to where the episode starts.
 
         Raises:
-            RobotError: It is found where nothing should move it, the start is unsafe, or it does not get there.
+            RobotError: It lies down, is found where nothing should move it, the start is unsafe, or it does not get
+                there.
         """
-        position = self._position()
+        seen = self._read(self.clock.now())
+        if seen.fell:
+            raise Lies(f"the robot lies down before {episode['name']} has begun; set it up, and start again")
+        self._check_told(seen)
+        position = self._at(seen)
         if problem := self.guard.beyond(position):
             raise RobotError(f"{problem}; bring it by hand into its range")
         posture = np.array(episode["posture"], dtype=float)
@@ -64,12 +96,12 @@ class Player:
         self.clock.begin()
         self._ramp(posture)
         self.clock.wait()
-        if problem := self.guard.away(self._position(), self.request["ramp"]["within"]):
+        if problem := self.guard.away(self._at(self._read(self.clock.now())), self.request["ramp"]["within"]):
             raise RobotError(f"{problem} after the ramp to the start of {episode['name']}; it is left where it is")
         self.guard.start(posture)
 
     def play(self, episode: Mapping[str, Any]) -> Played:
-        """Act; a fall or a target that is refused ends it early, the last safe target is then held.
+        """Act; a fall, a target that is refused or a joint that does not follow ends it early.
 
         Raises:
             RobotError: The robot or the policy fails, or a tick comes far too late.
@@ -81,12 +113,13 @@ class Player:
         tick, now, broken = 0, 0.0, False
         seen = self._read(now)
         if seen.fell:
-            raise RobotError(f"the robot lies down before {episode['name']} has begun")
+            raise Lies(f"the robot lies down before {episode['name']} has begun; set it up, and start again")
+        self._following.start(self.guard.last, now)
         try:
             while not (fell := seen.fell) and tick < episode["steps"]:
                 self._check_late(episode, now)
                 action, sent = actor.act(seen.observation)
-                if stopped := self._send(sent):
+                if stopped := self._following.problem(self._at(seen), now) or self._send(sent):
                     stopped = f"{stopped} (at {now:.2f} s)"
                     break
                 rows.append(self._row(episode, tick, now, seen, action, sent))
@@ -99,18 +132,27 @@ class Player:
             tick = len(rows)
         nothing = np.full(len(self.guard.joints), np.nan)
         rows.append(self._row(episode, tick, now, seen, nothing, nothing, fell=fell, stopped=bool(stopped)))
-        return Played(self._columns(seen), rows, fell, stopped, broken, self.clock.worst)
+        return Played(self._columns(), rows, fell, stopped, broken, self.clock.worst)
 
     def leave(self, episode: Mapping[str, Any], *, hold: bool) -> None:
-        """Bring the robot back to the start posture: hold the last safe target, long where it had to stop, and ramp."""
+        """Bring the robot back to the start posture: hold the last safe target, long where it had to stop, and ramp.
+
+        Raises:
+            Lies: It lies down; nothing more is sent.
+            RobotError: It fails, or does not follow; it is left where it is.
+        """
         seconds = HOLD if hold else self.request["limits"]["window"]
-        self._follow([self.guard.last] * max(1, round(seconds / self.period)))
-        self.guard.start(self.guard.last)
-        self._ramp(np.array(episode["posture"], dtype=float))
+        try:
+            self._follow([self.guard.last] * max(1, round(seconds / self.period)), held=True)
+            self.guard.start(self.guard.last)
+            self._ramp(np.array(episode["posture"], dtype=float))
+        except Lies:
+            self._called("end")
+            raise
         self._called("end")
 
-    def _position(self) -> np.ndarray:
-        return self._read(self.clock.now()).observation[self._layout["position"]]
+    def _at(self, seen: Seen) -> np.ndarray:
+        return seen.observation[self._layout["position"]]
 
     def _read(self, now: float) -> Seen:
         return self._senses.seen(self._called("read"), now)
@@ -128,6 +170,7 @@ class Player:
         if problem := self.guard.refusal(target, now):
             return problem
         self.guard.take(target, now)  # first: if send() breaks off, the robot may have it
+        self._following.sent(target, now)
         self._called("send", target.copy())
         return ""
 
@@ -140,16 +183,38 @@ class Player:
         speed = np.minimum(self.request["ramp"]["speed"], CALM * np.array(self.request["limits"]["speed"]))
         self._follow(list(ramp(self.guard.last, end, self.request["ramp"]["seconds"], speed, self.period)))
 
-    def _follow(self, targets: list[np.ndarray]) -> None:
+    def _follow(self, targets: list[np.ndarray], *, held: bool = False) -> None:
+        """Send targets one by one while the robot stands and, unless one and the same is `held`, follows."""
+        self._following.start(self.guard.last, self.clock.now())
         for target in targets:
-            self.clock.wait()
+            now = self.clock.wait()
+            seen = self._read(now)
+            if seen.fell:
+                raise Lies("the robot lies down; nothing more is sent to it")
+            if not held and (problem := self._following.problem(self._at(seen), now)):
+                raise RobotError(f"{problem} in a ramp; it is left where it is")
             if problem := self._send(target):
                 raise RobotError(f"a ramp is refused: {problem}")
 
-    def _columns(self, seen: Seen) -> list[str]:
+    def _check_told(self, seen: Seen) -> None:
+        """Refuse what the robot did not tell at first; what is missing now is left blank, but never the base."""
+        if self._more is None:
+            self._more = tuple(seen.more)
+        for name in seen.more:
+            if name not in self._more:
+                raise RobotError(f"read() gives {name} now, which it did not at first; choose another --log")
+
+    def _columns(self) -> list[str]:
         groups = ("action", "grounded_action") if self.request["action_noise"] else ("action",)
         asked = [f"{group}.{joint}" for group in groups for joint in self.guard.joints]
-        return ["episode", "step", "time", *asked, *names_of(self._layout), *seen.more, "fell", "stopped"]
+        return ["episode", "step", "time", *asked, *names_of(self._layout), *(self._more or ()), *ENDS]
+
+    def _told(self, seen: Seen) -> list[float]:
+        """Return what the robot tells beyond the request, in order."""
+        for name in self._more or ():
+            if name not in seen.more and name.startswith("base."):
+                raise RobotError(f"read() gives no {name} any more; without it nobody knows how far it came")
+        return [seen.more.get(name, np.nan) for name in self._more or ()]
 
     def _row(
         self, episode: Mapping[str, Any], tick: int, now: float, seen: Seen, action: np.ndarray, sent: np.ndarray,
@@ -157,4 +222,4 @@ class Player:
     ) -> list[Any]:  # fmt: skip
         asked = [*action.tolist(), *(sent.tolist() if self.request["action_noise"] else ())]
         number = self.request["episodes"].index(episode)
-        return [number, tick, now, *asked, *seen.observation.tolist(), *seen.more.values(), fell, stopped]
+        return [number, tick, now, *asked, *seen.observation.tolist(), *self._told(seen), fell, stopped]

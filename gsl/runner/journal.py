@@ -59,7 +59,19 @@ def keep(path: Path, request: str, columns: Sequence[str], rows: Sequence[Sequen
     else:
         before = f"{MARK}{request}\n{','.join(columns)}\n"
     writer.writerows([_cell(value) for value in row] for row in rows)
-    _replace(path, before + text.getvalue())
+    replace(path, before + text.getvalue())
+
+
+def drop(path: Path, episode: int) -> None:
+    """Take out the rows of an episode, by number, if there are any."""
+    if not path.exists():
+        return
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    left = [*lines[:2], *(line for line in lines[2:] if not line.startswith(f"{episode},"))]
+    if len(left) == 2:
+        path.unlink()  # an answer without an episode is none
+    elif len(left) < len(lines):
+        replace(path, "".join(left))
 
 
 def ends(path: Path) -> dict[int, bool]:
@@ -107,7 +119,20 @@ def add_return(path: Path, request: str, episode: str, distance: str, *, fell: b
     writer = csv.DictWriter(text, columns, restval="", extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows.values())
-    _replace(path, f"{MARK}{request}\n" * mark + text.getvalue())
+    replace(path, f"{MARK}{request}\n" * mark + text.getvalue())
+
+
+def forget(path: Path, episode: str) -> None:
+    """Take out what a person measured in an earlier run of an episode; all else stays."""
+    rows = returned(path)
+    if episode not in rows:
+        return
+    first, columns = marked(path), table(path)[0]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, restval="", extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(row for name, row in rows.items() if name != episode)
+    replace(path, f"{MARK}{first}\n" * bool(first) + text.getvalue())
 
 
 def _cell(value: object) -> object:
@@ -116,7 +141,8 @@ def _cell(value: object) -> object:
     return "" if value is None or value != value else value
 
 
-def _replace(path: Path, text: str) -> None:
+def replace(path: Path, text: str) -> None:
+    """Put a text in place of a file as a whole."""
     temporary = path.with_name(f".{path.name}.tmp")
     with temporary.open("w", encoding="utf-8") as file:
         file.write(text)

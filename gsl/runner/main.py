@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from gsl.errors import GslError
 from gsl.runner import journal
 from gsl.runner.clock import Simulated, Wall
-from gsl.runner.episode import Played, Player
+from gsl.runner.episode import Lies, Played, Player
+from gsl.runner.preflight import alone, check_writable, mended
 from gsl.runner.request import due, read_request
 from gsl.runner.robots import PerfectRobot, robot_of
 from gsl.runner.senses import RobotError
@@ -32,24 +35,31 @@ def main(folder: Path, words: Sequence[str]) -> int:
     parser.add_argument("--yes", action="store_true", help="ask nothing")
     parser.add_argument("--unpaced", action="store_true", help="do not wait for the clock: for a simulated robot")
     asked = parser.parse_args(words)
+    for name in ("SIGTERM", "SIGHUP"):  # as Ctrl-C does: hold, ramp out, keep what is complete
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.default_int_handler)
     try:
         request = read_request(folder)
-        return dry_run(request) if asked.dry_run else Sitting(request, asked).run()
+        if asked.dry_run:
+            return dry_run(request)
+        with alone(folder):
+            return Sitting(request, asked).run()
     except GslError as error:
         say(f"runner.py: {error}")
         return 2
-    except EOFError:
-        say("runner.py: there is nobody to ask; --yes asks nothing")
+    except OSError as error:
+        say(f"runner.py: {error.filename or 'a file'} cannot be read or written: {error.strerror or error}")
         return 2
-    except KeyboardInterrupt:
-        say("runner.py: interrupted; what was complete is kept")
+    except KeyboardInterrupt as error:
+        say("; ".join(["runner.py: interrupted", *map(str, error.args), "what was complete is kept"]))
         return 130
 
 
 def say(text: str) -> None:
     """Tell a person something."""
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
+    with suppress(OSError):  # a terminal that is gone must not keep the robot from being brought back
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
 
 
 def dry_run(request: Mapping[str, Any]) -> int:
@@ -73,12 +83,17 @@ def dry_run(request: Mapping[str, Any]) -> int:
     return 1 if stops else 0
 
 
+class Alone(GslError):
+    """There is nobody to ask."""
+
+
 class Sitting:
     """What is run of a request in one go."""
 
     def __init__(self, request: Mapping[str, Any], asked: argparse.Namespace) -> None:
         self._request, self._asked = request, asked
         self._returns = asked.log.with_name(journal.RETURNS)
+        check_writable(asked.log)
         journal.check_marked(asked.log, request["hash"])
         journal.check_marked(self._returns, request["hash"], by_hand=True)
         names = [episode["name"] for episode in request["episodes"]]
@@ -93,46 +108,79 @@ class Sitting:
     def run(self) -> int:
         """Run the episodes that are missing, or those that were named."""
         say(self._request["about"])
+        if told := mended(self._asked.log, self._request):
+            say(told)
+        log = self._asked.log
+        self._player.begin(log, journal.table(log)[0] if log.exists() else None)
+        if not self._asked.episode:
+            for episode in self._unmeasured():
+                say(f"{episode['name']} is logged, but nobody has said how far it came")
+                self._measure(episode, fell=False)
         for episode in self._sitting():
             if not self._ask(f"{episode['name']} ({self._seconds(episode):g} s): Enter ramps in, q ends"):
                 break
             self._one(episode)
-        missing = self._due()
-        say(f"{len(missing)} episodes are missing" if missing else f"all is answered: {self._asked.log}")
+        self._tell_missing()
         return 0
+
+    def _tell_missing(self) -> None:
+        missing, unmeasured = self._due(), ", ".join(one["name"] for one in self._unmeasured())
+        if missing:
+            say(f"{len(missing)} episodes are missing")
+        if unmeasured:
+            say(f"distances are missing: {unmeasured}; start again without --yes, or write them into {self._returns}")
+        if not missing and not unmeasured:
+            say(f"all is answered: {self._asked.log}")
+
+    def _unmeasured(self) -> list[Mapping[str, Any]]:
+        """Return the logged episodes, without a fall, of which nobody knows how far they came."""
+        log, episodes = self._asked.log, self._request["episodes"]
+        if not self._request["distance"] or not log.exists() or "base.position.x" in journal.table(log)[0]:
+            return []
+        told = journal.returned(self._returns)
+        known = {name for name, row in told.items() if row.get("distance") or row.get("value") or _fell(row)}
+        standing = [episodes[number] for number, down in sorted(journal.ends(log).items()) if not down]
+        return [one for one in standing if one["name"] not in known]
 
     def _one(self, episode: Mapping[str, Any]) -> None:
         """Run an episode; what it came to is written before the robot moves on, as that may fail, too."""
-        player = self._player
+        player, played, fault, hold = self._player, None, None, True
         player.approach(episode)
-        played = self._played(episode)
-        if played is None:
-            player.leave(episode, hold=False)
-            raise KeyboardInterrupt
         try:
+            if not self._ask("it stands at the start: Enter begins, q ends"):
+                hold = False
+                raise KeyboardInterrupt
+            played = player.play(episode)
+            hold = played.fell or played.broken or bool(played.stopped)
             if not played.broken:
                 self._keep(episode, played)
-        finally:
+        except BaseException as error:  # whatever it is, the robot is brought back first
+            fault = error
+        left = self._back(episode, down=played is not None and (played.fell or bool(played.stopped)), hold=hold)
+        if played is not None and played.broken:
             try:
-                player.leave(episode, hold=played.fell or played.broken or bool(played.stopped))
-            finally:
-                if played.broken:
-                    self._keep(episode, self._broken(played))
+                self._keep(episode, self._broken(played))
+            except BaseException as error:
+                fault = error
+        if fault is not None or left:
+            raise _both(fault, left)
+        assert played is not None
         if self._request["distance"] and "base.position.x" not in played.columns:
             self._measure(episode, fell=played.fell or bool(played.stopped))
 
-    def _played(self, episode: Mapping[str, Any]) -> Played | None:
-        """Play an episode, None if a person does not want it; whatever goes wrong, hold and ramp out."""
+    def _back(self, episode: Mapping[str, Any], *, down: bool, hold: bool) -> str:
+        """Hold and ramp out; return why the robot is not back, nothing if it is, or lies after what was a fall."""
         try:
-            if not self._ask("it stands at the start: Enter begins, q ends"):
-                return None
-            return self._player.play(episode)
-        except BaseException:
-            try:
-                self._player.leave(episode, hold=True)
-            except GslError as error:
-                say(f"{episode['name']}: could not be brought back: {error}")
-            raise
+            self._player.leave(episode, hold=hold)
+        except KeyboardInterrupt:
+            return f"{episode['name']}: the way back was broken off; the robot is left where it is"
+        except Lies as error:
+            if not down:
+                return f"{episode['name']}: {error}"
+            say(f"{episode['name']}: {error}; set it up")
+        except GslError as error:
+            return f"{episode['name']}: could not be brought back: {error}"
+        return ""
 
     def _keep(self, episode: Mapping[str, Any], played: Played) -> None:
         """Write down what an episode came to: its log, or that it fell where there is none that could be used."""
@@ -141,8 +189,10 @@ class Sitting:
         if useless and not (played.fell or played.stopped):
             raise RobotError(f"{episode['name']}: {late}; not kept; run it again where the rate is kept")
         if useless or len(played.rows) == 1:  # nothing was sent, or not at the rate
+            journal.drop(self._asked.log, self._request["episodes"].index(episode))
             journal.add_return(self._returns, self._request["hash"], episode["name"], "", fell=True)
         else:
+            journal.forget(self._returns, episode["name"])
             journal.keep(self._asked.log, self._request["hash"], played.columns, played.rows)
         ended = f"; refused: {played.stopped}; held, then ramped out" if played.stopped else ""
         told = f", {late}" if played.late > LATE else ""
@@ -150,8 +200,9 @@ class Sitting:
 
     def _broken(self, played: Played) -> Played:
         """Ask why a person broke an episode off: a fall is a result and must not be lost, anything else is none."""
-        if len(played.rows) > 1 and not self._asked.yes and self._yes("was it a fall? y keeps it, n runs it again"):
-            return played.as_a_fall()
+        with suppress(Alone):
+            if len(played.rows) > 1 and not self._asked.yes and self._yes("was it a fall? y keeps it, n runs it again"):
+                return played.as_a_fall()
         raise KeyboardInterrupt
 
     def _measure(self, episode: Mapping[str, Any], *, fell: bool) -> None:
@@ -159,7 +210,7 @@ class Sitting:
         if self._asked.yes:
             return
         question = "distance walked forward [m], f if it fell, Enter to write it into returns.csv later: "
-        while not _is_distance(told := input(question).strip().lower()):
+        while not _is_distance(told := _typed(question)):
             say(f"'{told}' is no number of metres")
         if told:
             fallen = told == "f"
@@ -178,17 +229,39 @@ class Sitting:
     def _due(self) -> list[Mapping[str, Any]]:
         episodes = self._request["episodes"]
         ends = {episodes[number]["name"]: down for number, down in journal.ends(self._asked.log).items()}
-        fallen = {name for name, row in journal.returned(self._returns).items() if journal.is_yes(row.get("fell"))}
+        fallen = {name for name, row in journal.returned(self._returns).items() if _fell(row)}
         return list(due(self._request, {*ends, *fallen}, {name for name, down in ends.items() if down} | fallen))
 
     def _ask(self, question: str) -> bool:
-        return self._asked.yes or input(f"{question}: ").strip().lower() != "q"
+        return self._asked.yes or _typed(f"{question}: ") != "q"
 
     def _yes(self, question: str) -> bool:
-        return input(f"{question}: ").strip().lower() in ("y", "yes")
+        return _typed(f"{question}: ") in ("y", "yes")
 
     def _seconds(self, episode: Mapping[str, Any]) -> float:
         return float(episode["steps"] * self._request["control_period"])
+
+
+def _typed(question: str) -> str:
+    try:
+        return input(question).strip().lower()
+    except (EOFError, OSError) as error:
+        raise Alone("there is nobody to ask; --yes asks nothing") from error
+
+
+def _both(first: BaseException | None, left: str) -> BaseException:
+    """Return the first fault, and where the robot was left, as one."""
+    if first is None:
+        return RobotError(left)
+    if not left:
+        return first
+    if isinstance(first, KeyboardInterrupt):
+        return KeyboardInterrupt(left)
+    return RobotError(f"{first}; {left}") if isinstance(first, GslError | OSError) else first
+
+
+def _fell(row: Mapping[str, str]) -> bool:
+    return journal.is_yes(row.get("fell"))
 
 
 def _is_distance(told: str) -> bool:

@@ -15,10 +15,19 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ArtifactError, InputError, TrajectoryError
 from gsl.runner.acting import Actor
-from gsl.runner.journal import RETURNS
+from gsl.runner.journal import RETURNS, marked
 from gsl.runner.request import NAME, layout_of, read_request
 from gsl.storage import trajectories
-from gsl.storage.answers import STOPPED, check_lengths, check_rate, csv_episodes, named, read_log, read_returns
+from gsl.storage.answers import (
+    STOPPED,
+    check_lengths,
+    check_marked,
+    check_rate,
+    csv_episodes,
+    named,
+    read_log,
+    read_returns,
+)
 from gsl.storage.references import resolve
 
 FILE = "answer.parquet"
@@ -73,9 +82,9 @@ class Answer:
 
     def _logged(self, source: Path, out: Path, request: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
         """Write the logged episodes by the names that the request has for them; yield how far off each one is."""
-        found = _csv(source, request) if source.suffix == ".csv" else _parquet(source, request)
+        known, found = _csv(source, request) if source.suffix == ".csv" else _parquet(source, request)
         asked = {episode["name"]: episode for episode in request["episodes"]}
-        names = self.episodes or tuple(asked)
+        names = self.episodes or known or tuple(asked)
         for name, episode in named(source, names, found, request).items():
             check_rate(source, name, episode, request)
         about = {"robot": request["robot"], "role": "real", "source": source.name, "request": request["hash"]}
@@ -86,10 +95,13 @@ class Answer:
             yield name, _off(source, request, asked[name], episode)
 
 
-def _csv(source: Path, request: Mapping[str, Any]) -> list[Trajectory]:
-    """Return the episodes of a file; of the runner's own ones, a stop for safety is a fall."""
-    found = [episode for _, episode in csv_episodes(source, request)]
-    return [replace(one, fell=_down(one), sensors=_without(one.sensors, STOPPED)) for one in found]
+def _csv(source: Path, request: Mapping[str, Any]) -> tuple[tuple[str, ...], list[Trajectory]]:
+    """Return the names, if it is the runner's own, and the episodes of a file; a stop for safety is a fall."""
+    if told := marked(source):
+        check_marked(source, told, request)
+    by_name = list(csv_episodes(source, request))
+    names, found = tuple(name for name, _ in by_name) if told else (), [episode for _, episode in by_name]
+    return names, [replace(one, fell=_down(one), sensors=_without(one.sensors, STOPPED)) for one in found]
 
 
 def _down(episode: Trajectory) -> np.ndarray:
@@ -101,16 +113,20 @@ def _without(sensors: Mapping[str, np.ndarray], name: str) -> dict[str, np.ndarr
     return {key: values for key, values in sensors.items() if key != name}
 
 
-def _parquet(source: Path, request: Mapping[str, Any]) -> list[Trajectory]:
-    """Return the episodes of a file with the joints in the request's order."""
+def _parquet(source: Path, request: Mapping[str, Any]) -> tuple[tuple[str, ...], list[Trajectory]]:
+    """Return the names, if it says what it answers, and the episodes of a file, joints in the request's order."""
     batch = trajectories.read(source, joints=tuple(request["joints"]))
+    names: tuple[str, ...] = ()
+    if told := str(batch.metadata.get("request", "")):
+        check_marked(source, told, request)
+        names = tuple(str(one.get("name", "")) for one in batch.metadata.get("episodes", []))
     if missing := [joint for joint in request["joints"] if joint not in batch.joints]:
         raise TrajectoryError(source, f"the joint {missing[0]} was asked for, but is not in it")
     if abs(batch.control_period - request["control_period"]) > 1e-9:
         rates = f"a row every {batch.control_period:g} s, but {request['control_period']:g} s were asked for"
         raise TrajectoryError(source, f"has {rates}; resample it")
     order = [batch.joints.index(joint) for joint in request["joints"]]
-    return [
+    return names, [
         replace(
             one,
             action=one.action[:, order],

@@ -43,6 +43,7 @@ class GroundingReport:
         allowed: Falls of π0 in the grounded simulator that are no problem, since it falls in real as well.
         alpha: How far the grounding goes, where that is known.
         reach: What of the forward model's predictions the simulator can do, where that was asked.
+        cut: How many held-out episodes off π0 ended in a fall or were stopped.
     """
 
     deviations: Mapping[str, Mapping[str, Mapping[int, Deviations]]]
@@ -53,6 +54,7 @@ class GroundingReport:
     allowed: int = 0
     alpha: float | None = None
     reach: Reachability | None = None
+    cut: int = 0
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -65,7 +67,9 @@ class GroundingReport:
     def _farther(self) -> list[str]:
         group = OFF if OFF in self.deviations else PI0
         errors = {name: degrees(self.deviations[group][name][TICKS].joints) for name in (GROUNDED, BARE)}
-        found = [] if group == OFF else ["off π0 nothing was held out to measure it on (collect neighbours)"]
+        cut = f"held out, but fallen or stopped too early: {self.cut}; " if self.cut else ""
+        nothing = f"off π0 nothing was held out to measure it on ({cut}collect neighbours)"
+        found = [] if group == OFF else [nothing]
         if errors[GROUNDED] > errors[BARE]:
             against = f"{errors[GROUNDED]:.2f}°, without grounding {errors[BARE]:.2f}°"
             found.append(f"after {TICKS} ticks the joints {_named(group)} are farther from the real ones: {against}")
@@ -175,6 +179,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         allowed_falls(heldout),
         getattr(scenario.grounding, "alpha", None),
         reach,
+        sum(one.ended_in_a_fall for one in of_policy(heldout, pi0=False)),
     )
 
 

@@ -21,7 +21,7 @@ from gsl.stages.population import Job, trajectories
 from gsl.stages.rollout import Scenario
 from gsl.storage import manifest
 from gsl.storage.answers import Answered, answer_files, read_answers
-from gsl.storage.requests import sealed, write_request
+from gsl.storage.requests import restore, sealed, write_request
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.fits import fitting_step
@@ -77,6 +77,8 @@ def asked(
     if not _written(folder, request):
         warnings = foreseen(scenario, orders, request, workers=workers, console=console)
         write_request(folder, request, warnings)
+    elif restore(folder, request):
+        console.status(f"{folder.as_posix()}: parts of its runner were missing; they are written anew")
     answers = read_answers(folder, request)
     verdicts = {
         episode["name"]: judged(scenario, answers[episode["name"]], episode["steps"])

@@ -117,8 +117,8 @@ class Surrogate:
                 self._begin(episode, progress)
             case "send":
                 self._send(np.array(call["targets"]))
-            case "end":
-                self._acting = False
+            case "end":  # if it lies, somebody sets it up
+                self._acting = self._fell = False
             case "read":
                 return self._read()
         return None

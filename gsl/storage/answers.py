@@ -17,6 +17,7 @@ from gsl.core.validation import did_you_mean
 from gsl.errors import ArtifactError, TrajectoryError
 from gsl.runner.journal import MARK, YES, marked, table
 from gsl.runner.request import layout_of
+from gsl.runner.senses import BODY, JOINTS
 from gsl.storage import trajectories
 from gsl.storage.trajectory_columns import batch_of
 from gsl.storage.trajectory_contract import SCHEMA_VERSION, UNITS, check_names, check_rows
@@ -116,7 +117,7 @@ def check_marked(path: Path, told: str, request: Mapping[str, Any]) -> None:
 
 def csv_episodes(path: Path, request: Mapping[str, Any]) -> Iterator[tuple[str, Trajectory]]:
     """Yield the episodes of a CSV file with the columns of the contract, by name; `episode` counts those asked for."""
-    columns = _csv_columns(path, request)
+    columns = _without_gaps(_csv_columns(path, request), request)
     names = [episode["name"] for episode in request["episodes"]]
     units = {**UNITS, STOPPED: "1"}
     metadata = {"schema_version": SCHEMA_VERSION, "units": units, "role": "real", "joints": request["joints"]}
@@ -261,6 +262,20 @@ def _csv_columns(path: Path, request: Mapping[str, Any]) -> dict[str, np.ndarray
     if not table.num_rows:
         raise TrajectoryError(path, "has no rows; nothing was logged")
     return {name: _values(path, name, table.column(name)) for name in table.column_names}
+
+
+def _without_gaps(columns: dict[str, np.ndarray], request: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Leave out what nobody asked for and the robot did not tell at every step, unless it is of the base."""
+    asked = {name for part in _parts(request) for name in part}
+    more = {f"{name}.{joint}" for name in JOINTS for joint in request["joints"]}
+    more |= {
+        name
+        for part, size in BODY.items()
+        if not part.startswith("base.")
+        for name in Layout((), {part: size}, 1.0).columns[part]
+    }
+    gaps = {name for name in more - asked if name in columns and columns[name].dtype.kind == "f"}
+    return {name: one for name, one in columns.items() if name not in gaps or not np.isnan(one).any()}
 
 
 def _values(path: Path, name: str, column: Any) -> np.ndarray:

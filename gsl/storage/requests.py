@@ -79,6 +79,11 @@ def write_request(folder: Path, request: Mapping[str, Any], warnings: Sequence[s
         GslError: The folder cannot be written.
     """
     if found := answer_files(folder):
+        if not (folder / NAME).exists():
+            raise ArtifactError(
+                folder / NAME, "is missing beside an answer to it; put it back, or move the answer away"
+            )
+        read_request(folder)
         raise ArtifactError(found[0], "answers another request, which has changed since; move it away")
     files = files_of(request)
     with explained(folder.parent):
@@ -91,6 +96,18 @@ def write_request(folder: Path, request: Mapping[str, Any], warnings: Sequence[s
             _put(temporary, folder)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
+
+
+def restore(folder: Path, request: Mapping[str, Any]) -> bool:
+    """Write the runner and its modules anew where one of them is missing; tell whether that was so."""
+    files = files_of(request)
+    if all((folder / name).is_file() for name in files):
+        return False
+    with explained(folder):
+        for name, content in files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(content)
+    return True
 
 
 def _check_ours(folder: Path, new: Path) -> None:
