@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import refused
+from commands import done, refused
 from toy_plant import LAYOUT, QUICK, SLOW, ToyEnv, a_batch
 
 from gsl.core.transitions import transitions
@@ -221,16 +221,25 @@ def test_noise_on_real_actions_is_part_of_what_was_done(tmp_path: Path) -> None:
     assert metrics["heldout"]["off_pi0"]["r2"] > 0.9999
 
 
-@pytest.mark.parametrize(
-    ("change", "line"),
-    [
-        ("inverse_method=regression", "corrects the simulator's model, which inverse_method=solve has"),
-        ("grounding.predicts=mixture", "is linear and has no mixture; say grounding.predicts=gaussian"),
-        ("forward_model.history=auto", "need one history (a number), one horizon, and plain angles"),
-        ("inverse_model.horizon=2", "need one history (a number), one horizon, and plain angles"),
-    ],
-)
-def test_a_residual_that_cannot_be_is_refused_before_the_robot_is_asked(change: str, line: str, tmp_path: Path) -> None:
-    said = refused("iterate", "grounding=gat_residual", "preset=toy", change, folder=tmp_path)
-    assert said.startswith("grounding.residual") and line in said
-    assert not (tmp_path / "runs").exists()
+def test_a_residual_is_trained_whatever_the_recipe_says_of_models(tmp_path: Path) -> None:
+    few = ("budget.real_episodes=3", "budget.sim_episodes=3", "optimizer.generations=1", "optimizer.candidates=4")
+    done(
+        "iterate",
+        "recipe=paper",
+        "preset=toy",
+        "grounding=gat_residual",
+        *few,
+        "workers=1",
+        "accept=true",
+        folder=tmp_path,
+    )
+    model = read_forward_model(str(tmp_path / "runs/quick-start/iteration_01/train_forward/forward_model.safetensors"))
+    assert model.base is not None and model.encoding == "plain"
+
+
+def test_a_residual_that_cannot_be_is_refused_before_the_robot_is_asked(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="is linear and has no mixture; say predicts=gaussian"):
+        ActionTransformation("f", "i", predicts="mixture", residual=True)
+    cart = ("experiment=gymnasium", "sim.env_id=CartPole-v1", "real.env_id=CartPole-v1", "grounding=gat_residual")
+    said = refused("iterate", *cart, folder=tmp_path)
+    assert said == "grounding.residual: is for robots; f of an environment's states corrects nothing"

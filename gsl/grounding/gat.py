@@ -61,6 +61,11 @@ class ActionTransformation:
         ),
     ] = None
 
+    def __post_init__(self) -> None:
+        """Refuse a residual that would have to be a mixture: it is linear."""
+        if self.residual and self.predicts == "mixture":
+            raise ConfigError("residual", "is linear and has no mixture; say predicts=gaussian", given="true")
+
     def load(self, forward: Callable[[str], Any], inverse: Callable[[str], Any]) -> AnyLoaded:
         """Return the grounding with its models, alpha 1 for `auto`.
 

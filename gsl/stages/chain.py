@@ -24,7 +24,7 @@ from gsl.stages.evaluate import Evaluate
 from gsl.stages.link import built
 from gsl.stages.optimize import Optimize
 from gsl.stages.train_forward import TrainForward
-from gsl.stages.train_inverse import TrainInverse
+from gsl.stages.train_inverse import Method, TrainInverse
 from gsl.stages.values import Values
 from gsl.storage.artifact import Artifact
 from gsl.tasks.task import REAL, SIM, Task
@@ -71,25 +71,14 @@ class Chain:
     workers: int
 
     def check(self, grounding: Grounding | ActionTransformation) -> None:
-        """Refuse a residual that its models cannot be, before anything is asked of the real robot.
+        """Refuse what could not be trained, before anything is asked of the real robot.
 
         Raises:
-            ConfigError: It could not be trained.
+            ConfigError: A residual of an environment's states.
         """
         inner = innermost(grounding)
-        if not isinstance(inner, ActionTransformation) or not inner.residual:
-            return
-        f, f_inverse, where = self.forward_model, self.inverse_model, "grounding.residual"
-        if self.sim.layout.states:
-            raise ConfigError(where, "is for robots; f of an environment's states has no simulator to correct")
-        if self.inverse_method != "solve":
-            raise ConfigError(where, "corrects the simulator's model, which inverse_method=solve has", given="true")
-        if inner.predicts == "mixture":
-            raise ConfigError(where, "is linear and has no mixture; say grounding.predicts=gaussian", given="true")
-        alike = (f.history, f.horizon, f.encoding) == (f_inverse.history, f_inverse.horizon, "plain")
-        if not alike or f.history == "auto":
-            problem = "forward_model and inverse_model need one history (a number), one horizon, and plain angles"
-            raise ConfigError(where, problem, given="true")
+        if isinstance(inner, ActionTransformation) and inner.residual and self.sim.layout.states:
+            raise ConfigError("grounding.residual", "is for robots; f of an environment's states corrects nothing")
 
     def diagnosed(self, home: Path, grounding: Grounding, seed: int, console: Any) -> Grounding:
         """Return a grounding that has its diagnosis, made below `home` if it wants one of its own."""
@@ -133,9 +122,13 @@ class Chain:
                 seed=seed,
             )
             built(stage, home / f"collect_{role}", console)
-        inverse = TrainInverse(str(home / "collect_sim"), self.inverse_model, method=self.inverse_method, seed=seed)
+        method: Method = "solve" if grounding.residual else self.inverse_method
+        inverse = TrainInverse(str(home / "collect_sim"), self.inverse_model, method=method, seed=seed)
         f_inverse = built(inverse, home / inverse.kind, console)
-        needed, base = as_needed(self.forward_model, grounding), str(f_inverse.folder) if grounding.residual else None
+        needed, base = as_needed(self.forward_model, grounding), None
+        if grounding.residual:
+            history, horizon = f_inverse.metrics["history"], self.inverse_model.horizon
+            needed, base = replace(needed, history=history, horizon=horizon), str(f_inverse.folder)
         forward = TrainForward(str(home / "collect_real"), needed, base, seed=seed)
         f = built(forward, home / forward.kind, console)
         return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))
@@ -189,5 +182,5 @@ def as_needed(model: ModelConfig, grounding: ActionTransformation) -> ModelConfi
     """Return the settings of a forward model that can do what a grounding asks of it."""
     wanted = model if grounding.predicts == "point" else replace(model, likelihood=grounding.predicts)
     if grounding.residual:
-        wanted = replace(wanted, family="linear", ridge=max(wanted.ridge, SHRINKING))
+        wanted = replace(wanted, family="linear", encoding="plain", ridge=max(wanted.ridge, SHRINKING))
     return wanted if grounding.gate is None or wanted.members > 1 else replace(wanted, members=MEMBERS)

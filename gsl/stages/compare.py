@@ -50,11 +50,6 @@ class Compare:
     ] = None
     rank: Annotated[bool, setting("set a fixed set of policies in simulation against real")] = False
 
-    def __post_init__(self) -> None:
-        """Refuse methods that could not be trained."""
-        for method in self.methods.values():
-            self.iterate.chain.check(method)
-
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
         return {}
@@ -69,6 +64,8 @@ class Compare:
 
     def carried_out(self, home: Path, console: Any) -> list[Trial]:
         """Return all trials, built below `home`, told as they end."""
+        for grounding in self.methods.values():
+            self.iterate.chain.check(grounding)
         simulators, found = self.simulators or {"": self.iterate.sim}, []
         cells = product(range(1, self.trials + 1), self.methods, simulators, self.worlds)
         for number, method, simulator, world in cells:

@@ -76,7 +76,6 @@ class Iterate:
             raise ConfigError("sim", "is a real robot, which cannot play the simulator's part")
         object.__setattr__(self, "policy", sized(self.policy, self.sim))
         check_alike(self.sim.layout, self.real.layout)
-        self.chain.check(self.grounding)
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
@@ -84,6 +83,7 @@ class Iterate:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run the iterations, write the policy they end with, the table and the plots."""
+        self.chain.check(self.grounding)
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
         with console.live_table(in_unit("grounded simulation learning", self.task.unit), COLUMNS) as table:
             start = self._start(home, console)
