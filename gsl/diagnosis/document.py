@@ -158,6 +158,14 @@ def _calibration(joints: Sequence[str], nuisances: np.ndarray, torque_unit: floa
 
 def _caveats(found: Findings) -> list[str]:
     exp, said = found.experiment, []
+    if unsure := droops(found):
+        zeros = ", ".join(f"{one.joint} {1e3 * one.zero:+.0f} mrad" for one in unsure)
+        said.append(
+            "Inseparable in this log, in which gravity hardly changes: a shifted zero and another droop under gravity, "
+            f"by a load or a gain that is off. The fit calls it a zero: {zeros}."
+        )
+    if held := ", ".join(one.joint for one in unsure if not one.told):
+        said.append(f"No poses of one joint change gravity enough there to tell; turn the base round: {held}.")
     if found.shift:
         said.append(
             f"The clocks are apart: {1e3 * found.shift:.1f} ms were taken out first, so that no latency can show."
@@ -198,14 +206,6 @@ def _caveats(found: Findings) -> list[str]:
     stuck = [name for k, name in enumerate(exp.joints) if _stuck(found, k)]
     if stuck:
         said.append(f"These joints are commanded to move and do not: {', '.join(stuck)}. Look at them first.")
-    if unsure := droops(found):
-        zeros = ", ".join(f"{one.joint} {1e3 * one.zero:+.0f} mrad" for one in unsure)
-        said.append(
-            "Inseparable in this log, in which gravity hardly changes: a shifted zero and another droop under gravity, "
-            f"by a load or a gain that is off. The fit calls it a zero: {zeros}."
-        )
-    if held := ", ".join(one.joint for one in unsure if not one.told):
-        said.append(f"No poses of one joint change gravity enough there to tell; turn the base round: {held}.")
     far = _far_off(found)
     if far:
         said.append(
