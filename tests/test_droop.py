@@ -9,12 +9,14 @@ import pytest
 from test_diagnosis import PERIOD, arm
 from test_next_experiment import played, swings
 
+from gsl.core.dynamics import gravity_torque
 from gsl.core.plant import nominal
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.document import document
-from gsl.diagnosis.droop import droops, gravity_torque, ladder
+from gsl.diagnosis.droop import droops
 from gsl.diagnosis.next_experiment import next_experiment
+from gsl.diagnosis.pose_ladder import ladder
 from gsl.policies.limits import breach, limits
 from gsl.worlds.held import Held
 
@@ -31,7 +33,7 @@ def bent() -> Findings:
 def test_gravitys_torque_is_what_makes_a_servo_droop() -> None:
     plant, pose = nominal(arm()), np.array([0.9, 0.6])
     told = Held.of(plant, 0.002, PERIOD).play([np.repeat(pose[None], 100, axis=0)], [pose], 1)[0][-1]
-    torque = gravity_torque(plant, plant.robot, told)
+    torque = gravity_torque(plant.robot, dict(zip(plant.robot.motors, told.tolist(), strict=True)), plant.gravity)
     np.testing.assert_allclose(pose - told, torque / plant.servo.kp, rtol=1e-3)
     assert abs(torque[0]) > 0.1
 
@@ -50,7 +52,7 @@ def test_the_ladder_that_tells_them_apart_keeps_the_limits(bent: Findings) -> No
     assert wanted is not None and wanted.separates == (("zero_offset", "gravity_droop"),)
     assert [name for name, _ in wanted.episodes] == ["pose_ladder_a", "pose_ladder_b", "pose_ladder_a"]
     (unsure,) = droops(bent)
-    for _, targets in ladder((unsure,), arm(), PERIOD).variants:
+    for _, targets in ladder([(unsure.mover, unsure.ends)], arm(), PERIOD).variants:
         assert breach(limits(arm()), targets, PERIOD) is None
         assert targets[:, 0].min() == pytest.approx(unsure.ends[0]) and targets[:, 0].max() == pytest.approx(
             unsure.ends[1]
@@ -60,7 +62,7 @@ def test_the_ladder_that_tells_them_apart_keeps_the_limits(bent: Findings) -> No
 
 def test_after_the_ladder_nothing_is_left_to_tell(bent: Findings) -> None:
     (unsure,) = droops(bent)
-    climbed = played(OFF, dict(ladder((unsure,), arm(), PERIOD).variants), without=LEFT_OUT)
+    climbed = played(OFF, dict(ladder([(unsure.mover, unsure.ends)], arm(), PERIOD).variants), without=LEFT_OUT)
     assert droops(climbed) == ()
 
 

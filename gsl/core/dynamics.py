@@ -48,6 +48,20 @@ def mass_matrix(robot: Robot, angles: Mapping[str, float]) -> np.ndarray:
     return total
 
 
+def gravity_torque(robot: Robot, angles: Mapping[str, float], gravity: np.ndarray) -> np.ndarray:
+    """Return the motor torques that hold a robot against gravity, its base held [N·m], shape (n_motors,).
+
+    Args:
+        robot: Without fixed joints.
+        angles: Of its joints by name [rad].
+        gravity: In base axes [m/s²], shape (3,).
+    """
+    frames, torque = forward_kinematics(robot, angles), np.zeros(len(robot.motors))
+    for link in robot.links.values():
+        torque -= link.mass * jacobian(robot, frames, link.name, link.com)[1][:, 6:].T @ gravity
+    return torque
+
+
 def jacobian(robot: Robot, frames: Frames, link: str, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the angular and linear velocity of a point of a link per generalised velocity, each (3, 6 + n_motors)."""
     place = frames.origin[link] + frames.turn[link] @ point

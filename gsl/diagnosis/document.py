@@ -14,7 +14,7 @@ from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Hypothesis, share
 from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.diagnose import NOISE_COST, Findings
-from gsl.diagnosis.droop import droops
+from gsl.diagnosis.droop import Droop, droops
 from gsl.diagnosis.localise import cells, horizon, regimes, sides
 from gsl.diagnosis.records import FEW
 from gsl.diagnosis.shrinkage import shrinkage
@@ -40,6 +40,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
     told = sim.told({}, nuisance.none(len(exp.channels)), exp.pieces)
     z = exp.comparison.residual(told, exp.pieces)
     times, growth = horizon(exp, told)
+    unsure = droops(found)
     causes = [] if found.verdict.word in ("no_gap", "unknown") else [_cause(found, one) for one in found.verdict.causes]
     after = everything.simulator.told(answer.effects, answer.fit.nuisances, exp.pieces)
     places = [asdict(cell) for cell in cells(exp, z, regimes(exp, sim))]
@@ -49,7 +50,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "causes": causes,
         "suspects": [_cause(found, one) for one in found.verdict.causes] if found.verdict.word == "unknown" else [],
         "inseparable": [list(group) for group in found.verdict.inseparable if causes],
-        "droops": [asdict(one) for one in droops(found)],
+        "droops": [asdict(one) for one in unsure],
         "where": [place for place in places if place["named"] or place["regime"] == "all"],
         "horizon": {"time": times, "rms": growth},
         "sides": sides(exp, z),
@@ -62,7 +63,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
             "sd": dict(zip(exp.channels, exp.comparison.floor.tolist(), strict=True)),
         },
         "invisible": list(found.selection.screening.invisible),
-        "caveats": _caveats(found),
+        "caveats": _caveats(found, unsure),
         "next_experiment": None,
         "policy_gap": None,
         "replays": _replays(found, told, after),
@@ -156,9 +157,9 @@ def _calibration(joints: Sequence[str], nuisances: np.ndarray, torque_unit: floa
     ]
 
 
-def _caveats(found: Findings) -> list[str]:
+def _caveats(found: Findings, unsure: Sequence[Droop]) -> list[str]:
     exp, said = found.experiment, []
-    if unsure := droops(found):
+    if unsure:
         zeros = ", ".join(f"{one.joint} {1e3 * one.zero:+.0f} mrad" for one in unsure)
         said.append(
             "Inseparable in this log, in which gravity hardly changes: a shifted zero and another droop under gravity, "

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsl.core.body import Robot, lumped
-from gsl.core.dynamics import forward_kinematics, jacobian
+from gsl.core.dynamics import gravity_torque
 from gsl.core.plant import Plant
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.experiment import Experiment
-from gsl.diagnosis.menu import Dish
 from gsl.diagnosis.noise_floor import MEAN
+from gsl.diagnosis.pose_ladder import HOLD, RUNGS
 from gsl.effects.effect import applied, built
 from gsl.policies.limits import Limits, limits
 
@@ -25,9 +25,8 @@ WRONG = 1.0  # share of a load beyond which it is no longer taken for wrong inst
 FAR = 1.5  # spreads of the zeros of one make beyond which a zero is worth a thought
 SURE = 30.0  # squared distance, in noise, from which on a log tells the two apart
 LOOKED_AT = 60  # windows
-RUNGS = 5  # poses of the ladder
 TRIED = 21  # positions of a joint between which the farthest two are chosen
-HOLD, WAY = 0.8, 0.8  # of a rung, and least time from one to the next [s]
+OWN = 1.2  # times as much another joint has to do to be moved in a joint's place
 PLAYS = 3  # of a rung: two variants and a repeat
 
 
@@ -74,7 +73,10 @@ def droops(found: Findings) -> tuple[Droop, ...]:
         for k in range(n)
         if np.abs(zero[k]) > least[k] and wrong[k] <= WRONG and not _seen(found, k, left[:, k], count)
     ]
-    return tuple(_droop(found, plant, k, float(zero[k]), float(wrong[k])) for k in unsure)
+    if not unsure:
+        return ()
+    pull = _reach(plant, limits(exp.robot))
+    return tuple(_droop(found, plant, k, float(zero[k]), float(wrong[k]), pull) for k in unsure)
 
 
 def _answered(found: Findings) -> Plant:
@@ -101,7 +103,7 @@ def _statics(found: Findings, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
         under = applied(plant, built(known))
         robot = lumped(under.robot)
         some = index[::every]
-        pull += [gravity_torque(under, robot, pose)[:n] for pose in poses[some, :n]]
+        pull += [_torque(under, robot, pose) for pose in poses[some, :n]]
         stiffness += [under.servo.kp[:n].clip(1e-9)] * len(some)
     return np.array(pull), np.array(stiffness)
 
@@ -112,69 +114,41 @@ def _seen(found: Findings, k: int, left: np.ndarray, count: float) -> bool:
     return bool(count * float(((left / noise) ** 2).sum()) > SURE and left.max() > found.tolerance)
 
 
-def _droop(found: Findings, plant: Plant, k: int, zero: float, wrong: float) -> Droop:
-    """Return a joint with the poses of a mover, within its room, between which gravity's torque on it differs most."""
-    bounds, robot = limits(found.experiment.robot), lumped(plant.robot)
-    stiffness = max(float(plant.servo.kp[k]), 1e-9)
-    best: tuple[float, int, np.ndarray, np.ndarray] = (-1.0, k, np.zeros(TRIED), np.zeros(TRIED))
-    for mover in (k, *(other for other in range(len(bounds.joints)) if other != k)):
-        tried = np.linspace(bounds.rest[mover] - bounds.down[mover], bounds.rest[mover] + bounds.up[mover], TRIED)
-        poses = np.repeat(bounds.rest[None], TRIED, axis=0)
-        poses[:, mover] = tried
-        pull = np.array([gravity_torque(plant, robot, pose)[k] for pose in poses])
-        if np.ptp(pull) > 1.2 * best[0]:  # another joint only where that is worth it
-            best = float(np.ptp(pull)), mover, tried, pull
-    most, mover, tried, pull = best
-    low, high = sorted((int(pull.argmin()), int(pull.argmax())))
-    rungs = np.abs(np.linspace(-0.5, 0.5, RUNGS)) * wrong * most / stiffness
+def _droop(found: Findings, plant: Plant, k: int, zero: float, wrong: float, pull: np.ndarray) -> Droop:
+    """Return a joint with the mover, of all in `pull`, between whose poses gravity's torque on it differs most."""
+    joints, stiffness = found.experiment.joints, max(float(plant.servo.kp[k]), 1e-9)
+    change = np.ptp(pull[..., k], axis=1)
+    change[k] *= OWN
+    mover = int(np.argmax(change))
+    torques = pull[mover, :, k]
+    low, high = sorted((int(torques.argmin()), int(torques.argmax())))
+    poses, apart = tried(limits(found.experiment.robot))[mover], wrong * float(np.ptp(torques)) / stiffness
     count = PLAYS * max(1.0, HOLD / found.experiment.period / MEAN)
     return Droop(
-        bounds.joints[k], zero, wrong, bounds.joints[mover], (float(tried[low]), float(tried[high])),
-        (float(pull[low]), float(pull[high])), wrong * most / stiffness, _seen(found, k, rungs, count),
+        joints[k], zero, wrong, joints[mover], (float(poses[low]), float(poses[high])),
+        (float(torques[low]), float(torques[high])), apart,
+        _seen(found, k, np.abs(np.linspace(-0.5, 0.5, RUNGS)) * apart, count),
     )  # fmt: skip
 
 
-def gravity_torque(plant: Plant, robot: Robot, pose: np.ndarray) -> np.ndarray:
-    """Return the torque that holds a robot against gravity, base in the air [N·m], shape (n_motors,).
-
-    Args:
-        plant: With masses and gravity.
-        robot: The plant's, without fixed joints.
-        pose: Positions of the controlled joints [rad], shape (n_joints,).
-    """
-    frames = forward_kinematics(robot, dict(zip(robot.motors, pose[robot.drive].tolist(), strict=True)))
-    torque = np.zeros(len(robot.motors))
-    for link in robot.links.values():
-        torque -= link.mass * jacobian(robot, frames, link.name, link.com)[1][:, 6:].T @ plant.gravity
-    return torque
+def _reach(plant: Plant, bounds: Limits) -> np.ndarray:
+    """Return gravity's torque on every joint while one after the other moves, shape (n_movers, TRIED, n_joints)."""
+    robot, n = lumped(plant.robot), len(bounds.joints)
+    pull = np.zeros((n, TRIED, n))
+    for mover, positions in enumerate(tried(bounds)):
+        for number, position in enumerate(positions):
+            pose = bounds.rest.copy()
+            pose[mover] = position
+            pull[mover, number] = _torque(plant, robot, pose)
+    return pull
 
 
-def ladder(found: tuple[Droop, ...], robot: Robot, period: float) -> Dish:
-    """Return held rungs between the ends of one joint after the other, the other way round in the second variant.
-
-    Args:
-        found: The joints.
-        robot: Theirs.
-        period: Control period [s].
-    """
-    bounds = limits(robot)
-    up = np.concatenate([_climb(bounds, one, period, reverse=False) for one in found])
-    down = np.concatenate([_climb(bounds, one, period, reverse=True) for one in reversed(found)])
-    return Dish("pose_ladder", (("pose_ladder_a", up), ("pose_ladder_b", down)))
+def tried(bounds: Limits) -> np.ndarray:
+    """Return the positions that are tried of each joint within its room [rad], shape (n_joints, TRIED)."""
+    return np.linspace(bounds.rest - bounds.down, bounds.rest + bounds.up, TRIED, axis=1)
 
 
-def _climb(bounds: Limits, one: Droop, period: float, *, reverse: bool) -> np.ndarray:
-    k = bounds.joints.index(one.mover)
-    rungs = np.linspace(*(one.ends[::-1] if reverse else one.ends), RUNGS)
-    stops = [bounds.rest[k], *rungs, bounds.rest[k]]
-    way = []
-    for begin, end in zip(stops[:-1], stops[1:], strict=True):
-        fastest = np.pi / 2.0 * abs(end - begin) / bounds.speed[k]  # of a cosine, whose middle is the steepest
-        ticks = max(1, round(max(WAY, 1.1 * fastest) / period))
-        share = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, ticks + 1) / ticks))
-        way.append(begin + (end - begin) * share)
-        way.append(np.full(round(HOLD / period), end))
-    path = np.concatenate(way)
-    targets = np.repeat(bounds.rest[None], len(path), axis=0)
-    targets[:, k] = path
-    return targets
+def _torque(plant: Plant, robot: Robot, pose: np.ndarray) -> np.ndarray:
+    """Return the torques of the logged joints, the first motors, that hold a pose [N·m], shape (n_joints,)."""
+    angles = dict(zip(robot.motors, pose[robot.drive].tolist(), strict=True))
+    return gravity_torque(robot, angles, plant.gravity)[: len(pose)]

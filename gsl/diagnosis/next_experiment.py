@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsl.diagnosis.diagnose import Findings
-from gsl.diagnosis.droop import Droop, droops, ladder
+from gsl.diagnosis.droop import Droop, droops
 from gsl.diagnosis.menu import Dish
+from gsl.diagnosis.pose_ladder import ladder
 from gsl.diagnosis.questions import NOTHING, Question, alike, hidden, rivals
 from gsl.diagnosis.rehearsal import Rehearsal
 
@@ -83,7 +84,7 @@ def _why(dish: Dish, questions: Sequence[Question], odds: np.ndarray, period: fl
 
 def _ladder(unsure: tuple[Droop, ...], found: Findings) -> NextExperiment:
     exp = found.experiment
-    dish = ladder(unsure, exp.robot, exp.period)
+    dish = ladder([(one.mover, one.ends) for one in unsure], exp.robot, exp.period)
     most = max(unsure, key=lambda one: one.apart)
     seconds = exp.period * sum(len(targets) for _, targets in dish.episodes)
     joints, (first, last) = ", ".join(one.joint for one in unsure), most.torques

@@ -17,6 +17,11 @@ from gsl.models.inverse import InverseModel
 TICKS = 10  # of a free run: 0.2 s at 50 Hz
 
 
+def shortest(history: History, horizon: int) -> int:
+    """Return how many ticks an episode must have for a free run."""
+    return history.span + TICKS + horizon
+
+
 class Segments(NamedTuple):
     """Pieces of trajectories laid end to end, each of `span + TICKS + 1` ticks.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from gsl.errors import ArtifactError
@@ -55,7 +55,7 @@ def keep(path: Path, request: str, columns: Sequence[str], rows: Sequence[Sequen
         check_marked(path, request)
         if lines[1].strip() != ",".join(columns):
             raise ArtifactError(path, "has other columns than the robot tells now; choose another --log")
-        before = "".join([*lines[:2], *(line for line in lines[2:] if not line.startswith(f"{rows[0][0]},"))])
+        before = "".join(_without(lines, rows[0][0]))
     else:
         before = f"{MARK}{request}\n{','.join(columns)}\n"
     writer.writerows([_cell(value) for value in row] for row in rows)
@@ -67,7 +67,7 @@ def drop(path: Path, episode: int) -> None:
     if not path.exists():
         return
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-    left = [*lines[:2], *(line for line in lines[2:] if not line.startswith(f"{episode},"))]
+    left = _without(lines, episode)
     if len(left) == 2:
         path.unlink()  # an answer without an episode is none
     elif len(left) < len(lines):
@@ -115,11 +115,7 @@ def add_return(path: Path, request: str, episode: str, distance: str, *, fell: b
     rows = returned(path)
     rows[episode] = {"episode": episode, "distance": distance, "fell": "yes" if fell else "no"}
     columns = list(dict.fromkeys([*(table(path)[0] if path.exists() else ()), *RETURN_COLUMNS]))
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, restval="", extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows.values())
-    replace(path, f"{MARK}{request}\n" * mark + text.getvalue())
+    _write_returns(path, request if mark else "", columns, rows.values())
 
 
 def forget(path: Path, episode: str) -> None:
@@ -128,11 +124,21 @@ def forget(path: Path, episode: str) -> None:
     if episode not in rows:
         return
     first, columns = marked(path), table(path)[0]
+    _write_returns(path, first, columns, [row for name, row in rows.items() if name != episode])
+
+
+def _without(lines: Sequence[str], episode: object) -> list[str]:
+    """Return the lines of an answer but for the rows of an episode."""
+    return [*lines[:2], *(line for line in lines[2:] if not line.startswith(f"{episode},"))]
+
+
+def _write_returns(path: Path, request: str, columns: Sequence[str], rows: Iterable[Mapping[str, str]]) -> None:
+    """Write a file of returns, marked with the request that it answers if one is given."""
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, restval="", extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
-    writer.writerows(row for name, row in rows.items() if name != episode)
-    replace(path, f"{MARK}{first}\n" * bool(first) + text.getvalue())
+    writer.writerows(rows)
+    replace(path, f"{MARK}{request}\n" * bool(request) + text.getvalue())
 
 
 def _cell(value: object) -> object:

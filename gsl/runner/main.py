@@ -83,7 +83,7 @@ def dry_run(request: Mapping[str, Any]) -> int:
     return 1 if stops else 0
 
 
-class Alone(GslError):
+class NobodyToAsk(GslError):
     """There is nobody to ask."""
 
 
@@ -200,7 +200,7 @@ class Sitting:
 
     def _broken(self, played: Played) -> Played:
         """Ask why a person broke an episode off: a fall is a result and must not be lost, anything else is none."""
-        with suppress(Alone):
+        with suppress(NobodyToAsk):
             if len(played.rows) > 1 and not self._asked.yes and self._yes("was it a fall? y keeps it, n runs it again"):
                 return played.as_a_fall()
         raise KeyboardInterrupt
@@ -246,7 +246,7 @@ def _typed(question: str) -> str:
     try:
         return input(question).strip().lower()
     except (EOFError, OSError) as error:
-        raise Alone("there is nobody to ask; --yes asks nothing") from error
+        raise NobodyToAsk("there is nobody to ask; --yes asks nothing") from error
 
 
 def _both(first: BaseException | None, left: str) -> BaseException:

@@ -24,7 +24,7 @@ from gsl.grounding.gat import LoadedTransformation
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Forward
 from gsl.models.forward import ForwardModel
-from gsl.models.free_run import TICKS
+from gsl.models.free_run import shortest
 from gsl.models.inverse import Solver
 from gsl.models.linear import fit_linear
 from gsl.stages import train_forward, train_inverse
@@ -68,7 +68,7 @@ class LearnedReplay:
     @property
     def needed(self) -> int:
         """Control periods a trajectory has to have to be learned from."""
-        return self.model.of_joints.span + TICKS + self.model.horizon
+        return shortest(self.model.of_joints, self.model.horizon)
 
     def check(self, lengths: Sequence[int], told: str) -> None:
         """Refuse to learn from too little.

@@ -21,7 +21,7 @@ from gsl.models.choice import Choice, best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Forward, ensemble
 from gsl.models.forward import ForwardModel
-from gsl.models.free_run import TICKS, predicted_error, segments, standstill_error
+from gsl.models.free_run import predicted_error, segments, shortest, standstill_error
 from gsl.models.inverse import Solver
 from gsl.models.network import Samples
 from gsl.stages.drift import write_region
@@ -115,7 +115,7 @@ class TrainForward:
     def _check(self, path: Path, data: Parts) -> None:
         try:
             for part in data:
-                long = checked(path, part.episodes, _needed(self.model))
+                long = checked(path, part.episodes, shortest(self.model.of_body, self.model.horizon))
                 _rows(self.model, long)
         except KeyError as error:
             raise TrajectoryError(
@@ -156,13 +156,9 @@ def _score(model: Forward, episodes: Sequence[Trajectory]) -> float:
     return float(measured["free_run_deg"] if model.horizon == 1 else measured["one_step_deg"])
 
 
-def _needed(config: ModelConfig) -> int:
-    """Ticks an episode has to have before it can be predicted."""
-    return config.of_body.span + TICKS + config.horizon
-
-
 def _long(config: ModelConfig, episodes: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
-    return tuple(one for one in episodes if usable(one) >= _needed(config))
+    needed = shortest(config.of_body, config.horizon)
+    return tuple(one for one in episodes if usable(one) >= needed)
 
 
 def _member(

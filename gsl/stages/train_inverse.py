@@ -15,7 +15,7 @@ from gsl.core.transitions import Transitions, transitions
 from gsl.models.choice import Choice, best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.forward import ForwardModel
-from gsl.models.free_run import TICKS, recovered_error, segments
+from gsl.models.free_run import recovered_error, segments, shortest
 from gsl.models.inverse import InverseModel, Regression, Solver
 from gsl.models.linear import fit_linear
 from gsl.models.network import Samples
@@ -63,7 +63,7 @@ class TrainInverse:
         if data.training.states:
             return inverse_of_states(folder, data, self.model, self.seed)
         for part in data:
-            checked(path, part.episodes, self.model.of_joints.span + TICKS + self.model.horizon)
+            checked(path, part.episodes, shortest(self.model.of_joints, self.model.horizon))
         model, choice = fitted(self.model, data, self.seed, self.method, self.damping)
         write_model(folder, model)
         errors = recovered_error(model, segments(data.heldout.episodes, self.model.of_joints, carried_out=True))

@@ -26,7 +26,7 @@ class ArrayTable:
             with zipfile.ZipFile(path) as archive:
                 members = [info for info in archive.infolist() if info.filename.endswith(".npy")]
                 self.shapes = {info.filename.removesuffix(".npy"): _header(archive, info, path) for info in members}
-        except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
+        except (zipfile.BadZipFile, EOFError, RuntimeError) as error:  # the last: encrypted, or packed in a way unknown
             raise TrajectoryError(path, "is no npz archive, or truncated or damaged; copy it again") from error
         self.names: Sequence[str] = [name for name, (shape, _) in self.shapes.items() if shape]
         single = [name for name, (shape, kind) in self.shapes.items() if not shape and not kind.hasobject]
