@@ -413,6 +413,11 @@ def test_figure_12_is_one_command(tmp_path: Path) -> None:
     assert 0 == points[0]["real_steps"] < points[1]["real_steps"]
     assert (folder / "figure.png").stat().st_size > 10_000
     assert "trained on real" in said.out
+    known = ("known=runs/fig12/points.json", "name=again", "preset=toy", *few, "iterate.budget.episodes=3")
+    done("reproduce", "fig12", *known, "~methods.ane", folder=tmp_path)
+    again = tmp_path / "runs/again/reproduce"
+    assert (again / "table.md").read_bytes() == (folder / "table.md").read_bytes()
+    assert not list((tmp_path / "runs/again").rglob("trial_01"))
 
 
 def test_without_the_extra_a_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import done
+from commands import done, gsl
 
 from gsl.stages.paper_tables import Figure5, LinearWalkTable, Table2, Table3, Table4
 from gsl.stages.study_effort import told
@@ -60,6 +60,31 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     assert all((one["rank"] is not None) == (what == "table2") for one in trials)
 
 
+def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) -> None:
+    few = (*FEW, "study.iterate.task.duration=1.2", "study.iterate.optimizer.generations=1", "~study.methods.ane_02")
+    done("reproduce", "fig5", *few, folder=tmp_path)
+    first = tmp_path / "runs/fig5/trials.json"
+    rows = json.loads(first.read_text())
+    assert [one["number"] for one in rows] == [1, 1]
+    rows[0]["commit"] = "a1b2c3d"
+    first.write_text(json.dumps([*rows, {"recipe": "of another study", "commit": ""}]))
+    said = done(
+        "reproduce", "fig5", *few, "study.trials=2", "study.known=runs/fig5/trials.json", "name=on", folder=tmp_path
+    )
+    assert "1 of 3 known trials are of other settings" in said.err
+    again = json.loads((tmp_path / "runs/on/reproduce/trials.json").read_text())
+    assert again[:2] == rows and [one["number"] for one in again] == [1, 1, 2, 2]
+    assert not list((tmp_path / "runs/on").rglob("trial_01"))
+    assert "a1b2c3d (1)" in (tmp_path / "runs/on/reproduce/table.md").read_text()
+
+
+def test_a_file_that_holds_no_trials_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "figures.json").write_text('[{"value": 1}]')
+    said = gsl("reproduce", "fig5", *FEW, "study.known=figures.json", folder=tmp_path)
+    assert (said.code, len(said.lines)) == (2, 1)
+    assert "figures.json: is no file of trials of `gsl reproduce`: rows need a recipe" in said.err
+
+
 @pytest.mark.parametrize(
     ("what", "figures"), [("fig6", ["figure_6.png"]), ("fig7", ["figure_7a.png", "figure_7b.png"])]
 )
@@ -74,9 +99,9 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     few = ("preset=toy", "iterate.workers=1", "iterate.optimizer.candidates=4", "iterate.task.duration=1.2")
     said = done("reproduce", "budget", *few, "budgets=[4,6]", "~methods.sgat", folder=tmp_path)
     folder = tmp_path / "runs/budget/reproduce"
-    points = json.loads((folder / "points.json").read_text())["points"]
-    assert [(one["method"], one["trajectories"]) for one in points] == [("gat", 4), ("gat", 6)]
-    assert all(one["error"] > 0.0 < one["bare"] for one in points)
+    points = json.loads((folder / "points.json").read_text())
+    assert [(one["method"], one["trajectories"]) for one in points] == [("none", 0), ("gat", 4), ("gat", 6)]
+    assert all(one["error"] > 0.0 < one["bare"] for one in points[1:])
     assert (folder / "budget.png").stat().st_size > 10_000
     assert "real trajectories" in said.out
 

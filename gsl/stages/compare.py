@@ -17,10 +17,10 @@ from gsl.stages.comparison import summaries
 from gsl.stages.comparison_table import markdown
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.iterate import Iterate
+from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.trial import Cell, Trial
 from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
-from gsl.storage.documents import write_json
 from gsl.worlds.world import World
 
 TABLE, DATA = "table.md", "trials.json"
@@ -49,31 +49,38 @@ class Compare:
         Mapping[str, World] | None, setting("the simulators, by name; none for the one of iterate")
     ] = None
     rank: Annotated[bool, setting("set a fixed set of policies in simulation against real")] = False
+    known: Known = None
 
     def parents(self) -> Mapping[str, Path]:
-        """Everything is made here."""
-        return {}
+        """Everything is made here, but for what is known."""
+        return known_parent("known", self.known)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials; write every trial's figures and the tables."""
-        found = self.carried_out(folder.parent, console)
-        write_json(folder / DATA, [trial._asdict() for trial in found])
+        found, made = self.carried_out(folder, console)
         summary = summaries(found)
-        (folder / TABLE).write_text(markdown(summary, found), encoding="utf-8")
+        (folder / TABLE).write_text(f"{markdown(summary, found)}\n{made}\n", encoding="utf-8")
         return {"trials": len(found), "summaries": [one._asdict() for one in summary]}
 
-    def carried_out(self, home: Path, console: Any) -> list[Trial]:
-        """Return all trials, built below `home`, told as they end."""
+    def carried_out(self, folder: Path, console: Any) -> tuple[list[Trial], str]:
+        """Return all trials, built beside `folder` and told as they end, and who made them; write them down."""
         for grounding in self.methods.values():
             self.iterate.chain.check(grounding)
-        simulators, found = self.simulators or {"": self.iterate.sim}, []
+        home, simulators = folder.parent, self.simulators or {"": self.iterate.sim}
+        ledger = Ledger(home / DATA, self.known, console)
         cells = product(range(1, self.trials + 1), self.methods, simulators, self.worlds)
         for number, method, simulator, world in cells:
             where = " ".join(filter(None, (simulator, world)))
-            for trial in self._trial(home, simulators[simulator], Cell(simulator, world, method, 1), number, console):
-                found.append(trial)
+            cell, sim = Cell(simulator, world, method, 1), simulators[simulator]
+            key = recipe(self.iterate, number, cell, sim, self.worlds[world], self.methods[method], self.rank)
+            if ledger.knows(key):
+                continue
+            trials = []
+            for trial in self._trial(home, sim, cell, number, console):
+                trials.append(trial)
                 console.status(f"{where}, {method}, trial {number}: {trial.told}")
-        return found
+            ledger.add(key, [trial._asdict() for trial in trials])
+        return [Trial(**row) for row in ledger.figures], ledger.close(folder / DATA)
 
     def _trial(self, home: Path, sim: World, cell: Cell, number: int, console: Any) -> Iterator[Trial]:
         """Yield a trial iteration by iteration."""

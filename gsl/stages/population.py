@@ -72,19 +72,25 @@ def episodes(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress:
 
 def in_parallel(function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Any) -> list[Any]:
     """Return `function(pickled shared, job)` of all jobs, in their order."""
+    done = dict(arriving(function, shared, jobs, workers, progress))
+    return [done[index] for index in range(len(jobs))]
+
+
+def arriving(function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Any) -> Iterator[tuple[int, Any]]:
+    """Yield (index of job, `function(pickled shared, job)`) of all jobs, as they end."""
     frozen = pickle.dumps(shared)
-    done: dict[int, Any] = {}
+    missing = list(range(len(jobs)))
     for _ in range(TRIES):
-        missing = [index for index in range(len(jobs)) if index not in done]
-        for index, result in _arriving(function, frozen, jobs, missing, workers):
-            done[index] = result
+        for index, result in _arriving(function, frozen, jobs, tuple(missing), workers):
+            missing.remove(index)
             progress.advance()
-        if len(done) == len(jobs):
-            return [done[index] for index in range(len(jobs))]
+            yield index, result
+        if not missing:
+            return
     raise GslError(f"worker processes died {TRIES} times in one batch of jobs; try workers=1 or look at free memory")
 
 
-def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: list[int], workers: int) -> Iterator[Any]:
+def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequence[int], workers: int) -> Iterator[Any]:
     """Yield (index, result) as they come, until a worker dies."""
     import joblib
     from joblib.externals.loky.process_executor import TerminatedWorkerError

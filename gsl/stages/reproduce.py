@@ -11,11 +11,11 @@ from gsl.grounding.effects import DiagnosedEffects
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.report.trial_dots import KNOWS, KNOWS_NOTHING, LEARNS, Dots, trial_dots
-from gsl.stages.compare import DATA, TABLE, Compare
+from gsl.stages.compare import TABLE, Compare
 from gsl.stages.comparison import summaries
+from gsl.stages.ledger import known_parent
 from gsl.stages.study_effort import seconds, told
 from gsl.stages.trial import Trial
-from gsl.storage.documents import write_json
 from gsl.tasks.task import Task
 
 FIGURE = "trials.png"
@@ -42,16 +42,15 @@ class Reproduce:
     table: Annotated[PaperTable, setting("how it is told")]
 
     def parents(self) -> Mapping[str, Path]:
-        """Everything is made here."""
-        return {}
+        """Everything is made here, but for what is known."""
+        return known_parent("study.known", self.study.known)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run the study, say beforehand how long that takes, and write every trial's figures and the table."""
         console.status(f"{told(seconds(self.study))} from nothing; a study that was stopped goes on where it was")
-        trials = self.study.carried_out(folder.parent, console)
-        write_json(folder / DATA, [trial._asdict() for trial in trials])
+        trials, made = self.study.carried_out(folder, console)
         task = self.study.iterate.task
-        (folder / TABLE).write_text(self.table.markdown(trials, task), encoding="utf-8")
+        (folder / TABLE).write_text(f"{self.table.markdown(trials, task)}\n{made}\n", encoding="utf-8")
         _draw(folder / FIGURE, trials, self.study.methods, *self.table.drawn(trials, task))
         return {"trials": len(trials), "summaries": [one._asdict() for one in summaries(trials)]}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -21,9 +21,10 @@ from gsl.stages.comparison_table import told
 from gsl.stages.grounding_check import BARE, GROUNDED, OFF, PI0
 from gsl.stages.grounding_gate import REPORT
 from gsl.stages.iterate import Iterate
-from gsl.storage.documents import write_json
+from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
+NONE = "none"
 OWN = 3  # one of so many trajectories is of π0, the others of its neighbours
 
 
@@ -31,7 +32,7 @@ class Point(NamedTuple):
     """One method, once, with one budget.
 
     Attributes:
-        trajectories: Real ones that the models learned from.
+        trajectories: Real ones that the models learned from; 0 without grounding.
         value: Of the returned policy, in the unit of the task.
         error, bare: Of the grounded and of the plain simulator after 0.2 s, on held-out trajectories [deg].
     """
@@ -54,10 +55,11 @@ class Budget:
     methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("learned groundings, by name")]
     budgets: Annotated[tuple[int, ...], setting("real trajectories to learn from, the fewest first", min_length=1)]
     trials: Annotated[int, setting("trials of each", ge=1)]
+    known: Known = None
 
     def parents(self) -> Mapping[str, Path]:
-        """Everything is made here."""
-        return {}
+        """Everything is made here, but for what is known."""
+        return known_parent("known", self.known)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials, write the points, the table and the figure.
@@ -68,16 +70,22 @@ class Budget:
         for name, grounding in self.methods.items():
             if not isinstance(innermost(grounding), ActionTransformation):
                 raise ConfigError(f"methods.{name}", "learns nothing from real trajectories; take gat or sgat")
-        home, points, bare = folder.parent, [], []
+        home = folder.parent
+        ledger = Ledger(home / DATA, self.known, console)
         for number in range(1, self.trials + 1):
-            bare.append(self._ungrounded(home / "none" / f"trial_{number:02d}", number, console))
-            for count in self.budgets:
-                for method in self.methods:
-                    place = home / method / f"real_{count:03d}" / f"trial_{number:02d}"
-                    points.append(self._point(place, method, count, number, console))
-        write_json(folder / DATA, {"points": [one._asdict() for one in points], "none": bare})
-        self._told(folder, points, bare)
+            key = recipe(replace(self, trials=1, known=None), number)
+            if not ledger.knows(key):
+                ledger.add(key, [one._asdict() for one in self._trial(home, number, console)])
+        points = [Point(**row) for row in ledger.figures]
+        self._told(folder, points, ledger.close(folder / DATA))
         return {"points": len(points)}
+
+    def _trial(self, home: Path, number: int, console: Any) -> Iterator[Point]:
+        name = f"trial_{number:02d}"
+        yield self._ungrounded(home / NONE / name, number, console)
+        for count in self.budgets:
+            for method in self.methods:
+                yield self._point(home / method / f"real_{count:03d}" / name, method, count, number, console)
 
     def _point(self, place: Path, method: str, count: int, number: int, console: Any) -> Point:
         own = max(1, count // OWN)
@@ -89,12 +97,13 @@ class Budget:
         measured = chain.measure(place / "evaluate", found, seed, console)
         return Point(method, count, number, measured.metrics["returned"]["value"], *_errors(found.folder / REPORT))
 
-    def _ungrounded(self, place: Path, number: int, console: Any) -> float:
+    def _ungrounded(self, place: Path, number: int, console: Any) -> Point:
         chain, seed = self.iterate.chain, self.iterate.seed + number - 1
         found = chain.search(place / "optimize", NoGrounding(), None, seed, console)
-        return float(chain.measure(place / "evaluate", found, seed, console).metrics["returned"]["value"])
+        measured = chain.measure(place / "evaluate", found, seed, console)
+        return Point(NONE, 0, number, measured.metrics["returned"]["value"], None, None)
 
-    def _told(self, folder: Path, points: Sequence[Point], bare: Sequence[float]) -> None:
+    def _told(self, folder: Path, points: Sequence[Point], made: str) -> None:
         shown, unit = self.iterate.task.shown, self.iterate.task.unit
         rows, values, errors = [], {}, {}
         for method in self.methods:
@@ -106,11 +115,11 @@ class Budget:
                 (method, str(n), f"{value.mean:.1f}", told(value), f"{error.mean:.2f}", told(error))
                 for n, value, error in zip(self.budgets, means, wrong, strict=True)
             ]
-        none = mean_interval([shown * value for value in bare])
-        rows.append(("none", "0", f"{none.mean:.1f}", told(none), "", ""))
+        none = mean_interval([shown * one.value for one in points if one.method == NONE])
+        rows.append((NONE, "0", f"{none.mean:.1f}", told(none), "", ""))
         titles = ("grounding", "real trajectories", f"in real [{unit}]", "95 % interval")
         titles_of_errors = ("joints after 0.2 s, off π0 [°]", "95 % interval")
-        (folder / TABLE).write_text(table((*titles, *titles_of_errors), rows), encoding="utf-8")
+        (folder / TABLE).write_text(f"{table((*titles, *titles_of_errors), rows)}\n{made}\n", encoding="utf-8")
         plain = mean_interval([one.bare for one in points if one.bare is not None]).mean
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
         bases = dict(zip(panels, (none.mean, plain), strict=True))

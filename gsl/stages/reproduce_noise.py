@@ -26,9 +26,9 @@ from gsl.report.markdown import table as markdown
 from gsl.report.noise_bars import Bars, noise_bars
 from gsl.stages.chain import Chain
 from gsl.stages.iterate import Iterate
+from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.optimize import BEST
-from gsl.stages.population import Workers, in_parallel
-from gsl.storage.documents import write_json
+from gsl.stages.population import Workers, arriving
 from gsl.worlds.gymnasium import GymnasiumWorld
 from gsl.worlds.world import World
 
@@ -72,22 +72,26 @@ class NoiseStudy:
         default_factory=dict
     )
     workers: Workers = -1
+    known: Known = None
 
     def parents(self) -> Mapping[str, Path]:
-        """Everything is made here."""
-        return {}
+        """Everything is made here, but for what is known."""
+        return known_parent("known", self.known)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials; write the points, the table and the figure."""
         for name, world in self.worlds.items():
             check_alike(self.sims.get(name, self.iterate.sim).layout, world.layout)
         home = folder.parent
-        jobs = [(number, home) for number in range(1, self.trials + 1)]
+        ledger = Ledger(home / DATA, self.known, console)
+        keys = {number: recipe(replace(self, trials=1, known=None), number) for number in range(1, self.trials + 1)}
+        jobs = [(number, home) for number, key in keys.items() if not ledger.knows(key)]
         with console.progress(len(jobs), "trials") as progress:
-            found = in_parallel(_trial, self, jobs, self.workers, progress)
-        points = [point for one in found for point in one]
-        write_json(folder / DATA, [one._asdict() for one in points])
-        (folder / TABLE).write_text(self._table(points), encoding="utf-8")
+            for index, found in arriving(_trial, self, jobs, self.workers, progress):
+                ledger.add(keys[jobs[index][0]], [one._asdict() for one in found])
+        made = ledger.close(folder / DATA)
+        points = sorted((Point(**row) for row in ledger.figures), key=lambda one: one.trial)
+        (folder / TABLE).write_text(f"{self._table(points)}\n{made}\n", encoding="utf-8")
         panels = {
             world: Bars(self.noises, {method: self._means(points, world, method) for method in self._shown})
             for world in self.worlds
