@@ -206,9 +206,10 @@ def _bounds(setting: Setting) -> tuple[float, float]:
 def _axis(setting: Setting, shares: tuple[Sequence[float], Sequence[float]], *, strength: bool) -> list[float]:
     lower, upper = setting.lower, setting.upper
     assert lower is not None and upper is not None
+    wide = lower > 0.0 and upper > WIDE * lower
     if not strength:
-        wide = lower > 0.0 and upper > WIDE * lower
         return [lower * (upper / lower) ** share if wide else lower + share * (upper - lower) for share in SHAPES]
     start = _start(setting)
     ends = [end for end in (lower, upper) if abs(end - start) > 1e-12]
-    return [start + share * (end - start) for end in ends for share in shares[len(ends) - 1]]
+    steps = [(end, share) for end in ends for share in shares[len(ends) - 1]]
+    return [start * (end / start) ** share if wide and start > 0.0 else start + share * (end - start) for end, share in steps]

@@ -35,7 +35,7 @@ def main(folder: Path, words: Sequence[str]) -> int:
     parser.add_argument("--yes", action="store_true", help="ask nothing")
     parser.add_argument("--unpaced", action="store_true", help="do not wait for the clock: for a simulated robot")
     asked = parser.parse_args(words)
-    for name in ("SIGTERM", "SIGHUP"):  # as Ctrl-C does: hold, ramp out, keep what is complete
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # hold, ramp out, keep what is complete; in a background job as well
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.default_int_handler)
     try:
