@@ -2,7 +2,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test iterate real xl330 so101 go2 check clean FORCE
+.PHONY: help demo test iterate real xl330 so101 menagerie go2 check clean FORCE
 
 VENV ?= .venv
 GSL ?= $(VENV)/bin/gsl
@@ -24,7 +24,7 @@ test: $(INSTALLED) ## Check the style, run the tests.
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/python -m pytest -q -n 2
 
-real: xl330 so101 go2 ## Diagnose logs of three real robots (docs/real-robots.md); a quarter of an hour.
+real: xl330 so101 menagerie go2 ## Diagnose logs of three real robots (docs/real-robots.md); half an hour.
 
 xl330: $(INSTALLED)
 	$(GSL) import mapping=xl330_pendulum name=xl330
@@ -39,6 +39,11 @@ so101: $(INSTALLED)
 	$(GSL) diagnose real=so101 sim=so101 name=so101 'held_out={motion: [$(CHECKED)]}'
 	$(GSL) cross-validate real=so101 sim=so101 name=so101 by=date
 	$(GSL) cross-validate real=so101 sim=so101 name=so101_motions by=motion folds=4
+
+menagerie: $(INSTALLED)
+	$(GSL) import mapping=so101_arm name=so101
+	$(GSL) diagnose real=so101 sim=so101_menagerie name=so101_menagerie 'held_out={motion: [$(CHECKED)]}'
+	$(GSL) cross-validate real=so101 sim=so101_menagerie name=so101_menagerie by=motion folds=4
 
 go2: $(INSTALLED)
 	$(GSL) import mapping=go2_in_air name=go2

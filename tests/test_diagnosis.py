@@ -124,6 +124,17 @@ def test_a_fault_of_one_joint_is_named_there() -> None:
     assert shares["elbow"] > 0.8 and sum(shares.values()) == pytest.approx(1.0)
 
 
+def test_a_simulator_fifty_times_too_stiff_is_told_so() -> None:
+    gains, ranges = dict.fromkeys(("shoulder", "elbow"), (2000.0, 4.0)), {"kp": (0.004, 1.5), "kd": (0.03, 1.5)}
+    stiff = replace(arm(), gains=gains, ranges={"servo_gain": ranges})
+    told = diagnosed(log({}), stiff, nominal(stiff), 0.002, replace(QUICK, most=2), lambda _: None)
+    chosen = told.selection.chosen
+    assert not {"coulomb_friction", "viscous_friction"} & set(told.selection.screening.invisible)  # once it is soft
+    assert chosen.names == ("servo_gain",) and chosen.candidates[0].scope == "all"
+    found = chosen.candidates[0].entry(chosen.parameters[0])
+    assert (found["kp"], found["kd"]) == (pytest.approx(0.02, rel=0.1), pytest.approx(0.25, rel=0.1))
+
+
 def test_two_causes_at_once() -> None:
     result = found({"command_latency": {"delay": 0.02}, "coulomb_friction": {"torque": 0.15}}, most=2)
     assert set(result.selection.chosen.names) == {"command_latency", "coulomb_friction"}

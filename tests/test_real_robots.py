@@ -67,6 +67,14 @@ def test_the_arms_servo_loses_friction_once_at_full_duty_as_at_any_other() -> No
                 assert ours == pytest.approx(torque, abs=1e-12)
 
 
+def test_menageries_arm_is_the_same_but_for_its_servos() -> None:
+    ours, theirs = robot("so101"), robot("so101_menagerie")
+    assert (theirs.name, theirs.controlled) == (ours.name, ours.controlled)
+    assert set(theirs.gains.values()) == {(998.22, 2.731)}
+    servo = nominal(theirs).servo
+    assert limited(100.0, 4.0, float(servo.limit[0]), float(servo.no_load_speed[0])) == pytest.approx(2.94, rel=0.01)
+
+
 def test_the_arm_stands_and_weighs_as_published() -> None:
     arm = robot("so101")
     frames = forward_kinematics(lumped(arm), {})

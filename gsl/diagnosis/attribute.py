@@ -186,13 +186,11 @@ class Gain:
         value: In units of cost.
         low: Lower 95 % bound by bootstrap over samples.
         high: Upper bound.
-        wins: Share of the bootstrap samples in which it is positive.
     """
 
     value: float
     low: float
     high: float
-    wins: float
 
 
 def gain(better: Hypothesis, worse: Hypothesis, *, samples: int = 1000, seed: int = 0) -> Gain:
@@ -201,7 +199,7 @@ def gain(better: Hypothesis, worse: Hypothesis, *, samples: int = 1000, seed: in
     extra = worse.fit.toll - better.fit.toll
     totals = difference[_drawn(len(difference), samples, seed)].sum(axis=1) + extra
     low, high = np.quantile(totals, [0.025, 0.975])
-    return Gain(float(difference.sum() + extra), float(low), float(high), float((totals > 0.0).mean()))
+    return Gain(float(difference.sum() + extra), float(low), float(high))
 
 
 def share(

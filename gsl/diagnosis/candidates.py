@@ -212,4 +212,7 @@ def _axis(setting: Setting, shares: tuple[Sequence[float], Sequence[float]], *, 
     start = _start(setting)
     ends = [end for end in (lower, upper) if abs(end - start) > 1e-12]
     steps = [(end, share) for end in ends for share in shares[len(ends) - 1]]
-    return [start * (end / start) ** share if wide and start > 0.0 else start + share * (end - start) for end, share in steps]
+    return [
+        start * (end / start) ** share if wide and start > 0.0 else start + share * (end - start)
+        for end, share in steps
+    ]

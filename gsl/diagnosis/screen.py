@@ -43,6 +43,11 @@ class Screening:
     leads: tuple[Lead, ...]
     invisible: tuple[str, ...]
 
+    @property
+    def visible(self) -> set[str]:
+        """The effects that leave a trace."""
+        return {lead.candidate.effect for lead in self.leads} - set(self.invisible)
+
 
 @dataclass(frozen=True)
 class Ground:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,7 +46,7 @@ class Selection:
         none: Calibration without an effect.
         chosen: The hypothesis that stands, maybe `none`.
         tried: All hypotheses, best first, `none` among them.
-        screening: The first one.
+        screening: The first one; `invisible` is what no later one saw either, on top of what stood by then.
     """
 
     none: Hypothesis
@@ -74,7 +74,7 @@ def selected(
     """
     none = none or arena.calibration()
     singles, screening = arena.successors(none)
-    tried, chosen = [none, *singles], none
+    tried, chosen, visible = [none, *singles], none, screening.visible
     least = max(thresholds.gain, thresholds.share * none.cost)
     if singles and _stands(singles[0], none, least, FLAW * none.cost):
         chosen = _polished(arena, singles[0], tried) if thresholds.share else singles[0]
@@ -84,7 +84,11 @@ def selected(
             if not (lacking or _shifted(arena, chosen)):
                 break
             where = arena if lacking else arena.only(SHIFTS)
-            found = [one for base in beam for one in where.successors(base, PAIRS)[0]]
+            found = []
+            for base in beam:
+                more, looked = where.successors(base, PAIRS)
+                found += more
+                visible |= looked.visible
             tried += found
             better = [one for one in found if _stands(one, chosen, *_bar(thresholds, chosen, none))]
             if not better:
@@ -95,6 +99,7 @@ def selected(
         chosen = _split(arena, chosen, none, thresholds, tried)
         if thresholds.share:
             chosen = _challenged(arena, chosen, none, tried)
+    screening = replace(screening, invisible=tuple(one for one in screening.invisible if one not in visible))
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
 
 

@@ -5,7 +5,7 @@ Figures of the paper are those of its text and tables; figure 5 has none that ca
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -180,14 +180,6 @@ def worth(trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
     if len(improvements) == len(trials):
         return "improvement over π0 in real [%]", improvements
     return f"in real [{task.unit}]", [task.shown * trial.value for trial in trials]
-
-
-def _distances(trials: Sequence[Trial]) -> tuple[str, list[float]]:
-    return "final distance in real [°]", [_distance(trial.outcome) for trial in trials]
-
-
-def _distance(outcome: Mapping[str, float]) -> float:
-    return next(value for name, value in outcome.items() if name.startswith("distance"))
 
 
 def _best_noise(found: Sequence[Summary], world: str) -> tuple[str, str]:
