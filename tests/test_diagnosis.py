@@ -19,6 +19,7 @@ from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.noise_floor import noise_floor
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.records import records
+from gsl.diagnosis.screen import _between
 from gsl.diagnosis.world_file import diagnosed_effects
 from gsl.effects.effect import applied, built
 from gsl.report.diagnosis_text import summary_lines
@@ -26,6 +27,7 @@ from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo import COMMANDS
 
 PERIOD, NOISE = 0.02, 0.0015
+WIDE = {"servo_gain": {"kp": (0.004, 1.5), "kd": (0.03, 1.5)}}
 QUICK = Options(duels=0, nulls=0, most=1, threads=1)
 
 
@@ -125,14 +127,22 @@ def test_a_fault_of_one_joint_is_named_there() -> None:
 
 
 def test_a_simulator_fifty_times_too_stiff_is_told_so() -> None:
-    gains, ranges = dict.fromkeys(("shoulder", "elbow"), (2000.0, 4.0)), {"kp": (0.004, 1.5), "kd": (0.03, 1.5)}
-    stiff = replace(arm(), gains=gains, ranges={"servo_gain": ranges})
+    stiff = replace(arm(), gains=dict.fromkeys(("shoulder", "elbow"), (2000.0, 4.0)), ranges=WIDE)
     told = diagnosed(log({}), stiff, nominal(stiff), 0.002, replace(QUICK, most=2), lambda _: None)
     chosen = told.selection.chosen
     assert not {"coulomb_friction", "viscous_friction"} & set(told.selection.screening.invisible)  # once it is soft
     assert chosen.names == ("servo_gain",) and chosen.candidates[0].scope == "all"
     found = chosen.candidates[0].entry(chosen.parameters[0])
     assert (found["kp"], found["kd"]) == (pytest.approx(0.02, rel=0.1), pytest.approx(0.25, rel=0.1))
+
+
+def test_what_a_wide_range_holds_is_meant_in_factors() -> None:
+    gain = next(one for one in library(replace(arm(), ranges=WIDE)) if one.free == ("kp",))
+    np.testing.assert_allclose(gain.grid[:5, 0], 0.004 ** np.array([0.05, 0.15, 0.35, 0.65, 1.0]))
+    assert gain.claims_its_name(np.array([0.003])) and not gain.claims_its_name(np.array([0.002]))
+    assert gain.towards(np.array([0.004]), 0.5) == pytest.approx(np.sqrt(0.004))
+    cost = np.log(gain.grid[:, 0] / gain.grid[3, 0]) ** 2
+    assert _between(gain.grid, cost, 3, wide=True) == pytest.approx(gain.grid[3], rel=1e-6)
 
 
 def test_two_causes_at_once() -> None:
@@ -147,7 +157,8 @@ def test_one_motion_alone_makes_nobody_sure() -> None:
     lone = replace(whole, episodes=(steps,), metadata={"episodes": [{"policy": "steps_a"}]})
     found = document(diagnosed(lone, arm(), nominal(arm()), 0.002, QUICK, lambda _: None))
     assert [cause["effect"] for cause in found["causes"]] == ["command_latency"]
-    assert found["causes"][0]["probability"] <= 0.8
+    assert found["causes"][0]["probability"] <= 0.8 and not found["sure"]
+    assert found["summary"].startswith("The gap is probably caused by command latency")
     assert any(one.startswith("There is one motion only") for one in found["caveats"])
     (told,) = [one for one in summary_lines(found) if one.title == "what next"]
     assert "Mind: There is one motion only" in str(told.caption)

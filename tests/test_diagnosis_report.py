@@ -92,6 +92,11 @@ def test_long_records_of_many_joints_stay_small() -> None:
     assert len(report_html(found).encode()) < 400_000
 
 
+def test_a_cause_that_is_not_sure_is_called_probable() -> None:
+    found = {**made.document(causes=1), "sure": False}
+    assert "Probable cause: servo gain of LKneePitch" in words(report_html(found)).split("Caveats")[0]
+
+
 def test_the_first_screen_answers_everything() -> None:
     first = words(report_html(made.document())).split("Caveats")[0]
     assert "2 causes found: servo gain of LKneePitch and command latency of all joints" in first

@@ -71,6 +71,8 @@ def test_menageries_arm_is_the_same_but_for_its_servos() -> None:
     ours, theirs = robot("so101"), robot("so101_menagerie")
     assert (theirs.name, theirs.controlled) == (ours.name, ours.controlled)
     assert set(theirs.gains.values()) == {(998.22, 2.731)}
+    lowest = theirs.ranges["servo_gain"]["kp"][0]
+    assert lowest * 998.22 == pytest.approx(2.94 / 0.9)  # full torque at .9 rad
     servo = nominal(theirs).servo
     assert limited(100.0, 4.0, float(servo.limit[0]), float(servo.no_load_speed[0])) == pytest.approx(2.94, rel=0.01)
 

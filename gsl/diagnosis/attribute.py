@@ -151,12 +151,16 @@ class Arena:
         best, costs = projected(z, slopes, at, bench.simulator.spread)
         return Ground(effects, at, z, slopes, costs, best)
 
+    def screening(self, base: Hypothesis) -> Screening:
+        """Return what each candidate could explain on top of `base`."""
+        ground = self.ground(base)
+        local = [one.on(joint) for joint in self._dominant(ground) for one in self.library if one.on_joints]
+        return screened(self.glance, ground, (*self.library, *local), self.scopes, self.tick)
+
     def successors(self, base: Hypothesis, width: int = WIDTH) -> tuple[list[Hypothesis], Screening]:
         """Return hypotheses with one effect more than `base`, best first, and the screening that led to them."""
-        ground = self.ground(base)
+        screening = self.screening(base)
         used = {(candidate.effect, candidate.scope) for candidate in base.candidates}
-        local = [one.on(joint) for joint in self._dominant(ground) for one in self.library if one.on_joints]
-        screening = screened(self.glance, ground, (*self.library, *local), self.scopes, self.tick)
         leads = [lead for lead in screening.leads if (lead.candidate.effect, lead.candidate.scope) not in used]
         start = np.concatenate([np.zeros(0), *base.parameters])
         found = [

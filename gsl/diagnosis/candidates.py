@@ -65,6 +65,11 @@ class Candidate:
         return (lower > 0.0) & ((self.neutral == 1.0) | (upper > WIDE * lower))
 
     @property
+    def wide(self) -> np.ndarray:
+        """Which documented ranges are over several sizes: near and half way are meant in factors there, shape (p,)."""
+        return _wide(*self.documented)
+
+    @property
     def on_joints(self) -> bool:
         """Whether it has a scope of joints."""
         return "joints" in self.fixed
@@ -88,8 +93,18 @@ class Candidate:
 
     def claims_its_name(self, parameters: np.ndarray) -> bool:
         """Whether the parameters are inside their documented range, as far as a fit can tell."""
-        slack = SLACK * (self.documented[1] - self.documented[0])
-        return bool(((parameters >= self.documented[0] - slack) & (parameters <= self.documented[1] + slack)).all())
+        wide = self.wide
+        values, (lower, upper) = (
+            np.where(wide, np.log(np.where(wide, x, 1.0)), x) for x in (parameters, self.documented)
+        )
+        slack = SLACK * (upper - lower)
+        return bool(((values >= lower - slack) & (values <= upper + slack)).all())
+
+    def towards(self, end: np.ndarray, share: float) -> np.ndarray:
+        """Return the parameters a share of the way from doing nothing to `end`, shape (p,)."""
+        start, wide = self.neutral, self.wide & (self.neutral > 0.0)
+        factor = np.where(wide, end, 1.0) / np.where(wide, start, 1.0)
+        return np.where(wide, start * factor**share, start + share * (end - start))
 
 
 def switched_on(chosen: Sequence[Candidate], parameters: Sequence[np.ndarray]) -> Effects:
@@ -189,6 +204,10 @@ def _candidate(
     return Candidate(name, fixed, tuple(free), neutral, documented, bounds, grid)
 
 
+def _wide(lower: Any, upper: Any) -> Any:
+    return (lower > 0.0) & (upper > WIDE * lower)
+
+
 def _start(setting: Setting) -> float:
     assert setting.lower is not None and setting.upper is not None
     return 0.5 * (setting.lower + setting.upper) if setting.neutral is None else setting.neutral
@@ -206,7 +225,7 @@ def _bounds(setting: Setting) -> tuple[float, float]:
 def _axis(setting: Setting, shares: tuple[Sequence[float], Sequence[float]], *, strength: bool) -> list[float]:
     lower, upper = setting.lower, setting.upper
     assert lower is not None and upper is not None
-    wide = lower > 0.0 and upper > WIDE * lower
+    wide = bool(_wide(lower, upper))
     if not strength:
         return [lower * (upper / lower) ** share if wide else lower + share * (upper - lower) for share in SHAPES]
     start = _start(setting)

@@ -24,6 +24,7 @@ from gsl.effects.effect import effect_class
 RANKED = 12  # hypotheses that are listed
 ASKED, STUCK = 0.05, 0.1  # command [rad], and share of it, below which a joint that moves less does not move
 ROUGH = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
+SURE = 0.9  # probability of every cause from which on they are said to be the causes
 FAR_OFF = 5.0  # spreads of the calibration beyond which it is told
 WIDER = 2.0  # than white noise makes them: what is left of a joint hangs together in time and over nuisances. Estimate
 REPLAYS, SHOWN = 6, 400  # pictures of replays, and their ticks at most
@@ -48,6 +49,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "verdict": found.verdict.word,
         "summary": _summary(found, causes),
         "causes": causes,
+        "sure": _sure(causes),
         "suspects": [_cause(found, one) for one in found.verdict.causes] if found.verdict.word == "unknown" else [],
         "inseparable": [list(group) for group in found.verdict.inseparable if causes],
         "droops": [asdict(one) for one in unsure],
@@ -230,9 +232,27 @@ def _stuck(found: Findings, k: int) -> bool:
 
 
 def _far_off(found: Findings) -> list[str]:
+    """Return the joints whose calibration is far off, each with what is furthest."""
     exp, sizes = found.experiment, found.simulator.spread * nuisance.SIZES[:, None]
-    off = np.abs(found.answer.fit.nuisances[:, : len(exp.joints)] / sizes).max(axis=0)
-    return [name for name, far in zip(exp.joints, off, strict=True) if far > FAR_OFF]
+    fitted = found.answer.fit.nuisances[:, : len(exp.joints)]
+    off = np.abs(fitted / sizes)
+    return [
+        f"{joint} ({_shift(row, fitted[row, k], exp.robot.torque_unit)})"
+        for k, (joint, row) in enumerate(zip(exp.joints, off.argmax(axis=0), strict=True))
+        if off[row, k] > FAR_OFF
+    ]
+
+
+def _shift(row: int, value: float, torque_unit: float) -> str:
+    name = nuisance.NAMES[row]
+    if row in (nuisance.KP, nuisance.KD):
+        return f"{name} x {np.exp(value):.2f}"
+    if row in (nuisance.ZERO, nuisance.OFFSET):
+        return f"{name} {1e3 * value:+.0f} mrad"
+    if row == nuisance.INERTIA:
+        return "inertia"
+    unit = "N·m" if row == nuisance.COULOMB else "N·m·s/rad"
+    return f"{name} {torque_unit * value:+.2g} {unit}"
 
 
 def _summary(found: Findings, causes: Sequence[Mapping[str, Any]]) -> str:
@@ -245,7 +265,13 @@ def _summary(found: Findings, causes: Sequence[Mapping[str, Any]]) -> str:
         groups = "; ".join(" or ".join(group) for group in verdict.inseparable).replace("_", " ")
         return f"The gap looks like {named}, but this log cannot tell apart: {groups}."
     explain = "which together explain" if most else "which explains"
-    return f"The gap is caused by {named}, {explain} {100.0 * verdict.explained:.0f} % of it on held-out data."
+    probably = "" if _sure(causes) else "probably "
+    share = f"{explain} {100.0 * verdict.explained:.0f} % of it on held-out data"
+    return f"The gap is {probably}caused by {named}, {share}."
+
+
+def _sure(causes: Sequence[Mapping[str, Any]]) -> bool:
+    return min((one["probability"] for one in causes), default=1.0) >= SURE
 
 
 def _of(scope: str) -> str:

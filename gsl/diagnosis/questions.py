@@ -115,4 +115,4 @@ def _strong(candidate: Candidate) -> np.ndarray:
     """Return parameters half way from doing nothing to the farther end of their range."""
     lower, upper = candidate.documented
     end = np.where(candidate.neutral - lower > upper - candidate.neutral, lower, upper)
-    return candidate.neutral + STRENGTH * (end - candidate.neutral)
+    return candidate.towards(end, STRENGTH)

@@ -43,11 +43,6 @@ class Screening:
     leads: tuple[Lead, ...]
     invisible: tuple[str, ...]
 
-    @property
-    def visible(self) -> set[str]:
-        """The effects that leave a trace."""
-        return {lead.candidate.effect for lead in self.leads} - set(self.invisible)
-
 
 @dataclass(frozen=True)
 class Ground:
@@ -142,22 +137,33 @@ def _leads(
         best = int(np.argmin(totals))
         chosen = candidate.on(scope) if wide else candidate
         start = np.where(mask, nuisances[best], ground.best)
-        at = grid[best] if grid[best, 0] == candidate.seen else _between(grid, totals, best)
+        at = (
+            grid[best]
+            if grid[best, 0] == candidate.seen
+            else _between(grid, totals, best, wide=bool(candidate.wide.all()))
+        )
         leads.append(Lead(chosen, at, start, float(totals[best])))
     return leads
 
 
-def _between(grid: np.ndarray, totals: np.ndarray, best: int) -> np.ndarray:
-    """Return the lowest point of a parabola through the best grid value of one parameter and its neighbours."""
+def _between(grid: np.ndarray, totals: np.ndarray, best: int, *, wide: bool) -> np.ndarray:
+    """Return the lowest point of a parabola through the best grid value of one parameter and its neighbours.
+
+    Of a wide range it is one over the logarithms.
+    """
     if grid.shape[1] > 1 or len(grid) == 1:
         return grid[best]
     order = np.argsort(grid[:, 0])
     at = int(np.flatnonzero(order == best)[0])
     if at in (0, len(order) - 1):
         return grid[best]
-    x, y = grid[order[at - 1 : at + 2], 0], totals[order[at - 1 : at + 2]]
+    near = grid[order[at - 1 : at + 2], 0]
+    x, y = np.log(near) if wide else near, totals[order[at - 1 : at + 2]]
     a, b, _ = np.polyfit(x, y, 2)
-    return np.clip(np.array([-0.5 * b / a]), x[0], x[2]) if a > 0.0 else grid[best]
+    if a <= 0.0:
+        return grid[best]
+    lowest = np.clip(np.array([-0.5 * b / a]), x[0], x[2])
+    return np.exp(lowest) if wide else lowest
 
 
 def merged(effects: Effects, candidate: Candidate, parameters: np.ndarray) -> Effects:

@@ -46,7 +46,8 @@ class Selection:
         none: Calibration without an effect.
         chosen: The hypothesis that stands, maybe `none`.
         tried: All hypotheses, best first, `none` among them.
-        screening: The first one; `invisible` is what no later one saw either, on top of what stood by then.
+        screening: The first one; what is invisible is so on top of the chosen hypothesis, as long as nothing shakes and
+            nobody walks, where another look costs too much.
     """
 
     none: Hypothesis
@@ -74,7 +75,7 @@ def selected(
     """
     none = none or arena.calibration()
     singles, screening = arena.successors(none)
-    tried, chosen, visible = [none, *singles], none, screening.visible
+    tried, chosen = [none, *singles], none
     least = max(thresholds.gain, thresholds.share * none.cost)
     if singles and _stands(singles[0], none, least, FLAW * none.cost):
         chosen = _polished(arena, singles[0], tried) if thresholds.share else singles[0]
@@ -84,11 +85,7 @@ def selected(
             if not (lacking or _shifted(arena, chosen)):
                 break
             where = arena if lacking else arena.only(SHIFTS)
-            found = []
-            for base in beam:
-                more, looked = where.successors(base, PAIRS)
-                found += more
-                visible |= looked.visible
+            found = [one for base in beam for one in where.successors(base, PAIRS)[0]]
             tried += found
             better = [one for one in found if _stands(one, chosen, *_bar(thresholds, chosen, none))]
             if not better:
@@ -99,7 +96,8 @@ def selected(
         chosen = _split(arena, chosen, none, thresholds, tried)
         if thresholds.share:
             chosen = _challenged(arena, chosen, none, tried)
-    screening = replace(screening, invisible=tuple(one for one in screening.invisible if one not in visible))
+    if chosen.candidates and not thresholds.share:
+        screening = replace(screening, invisible=arena.screening(chosen).invisible)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
 
 

@@ -46,7 +46,9 @@ def _causes(document: Document) -> str:
     found = [cause_name(cause) for cause in entries(document, "causes")]
     if not found:
         return "There is a gap, and its cause was found"
-    return f"{'Cause' if len(found) == 1 else f'{len(found)} causes'} found: {listed(found)}"
+    if document.get("sure", True):
+        return f"{'Cause' if len(found) == 1 else f'{len(found)} causes'} found: {listed(found)}"
+    return f"{'Probable cause' if len(found) == 1 else f'{len(found)} probable causes'}: {listed(found)}"
 
 
 def _inseparable(document: Document) -> str:

@@ -19,7 +19,8 @@ from gsl.core.body import Joint, Link, Robot, lumped
 from gsl.core.dynamics import mass_matrix
 
 TIME_CONSTANT = 0.02  # [s]: .006 (Go2) to .046 (STS3215), see the robots; motors' data sheets say .005 to .05
-FULL_AT = 0.2  # [rad]: .02 (NAO) to .9 (XL330 at factory gains)
+FULL_AT, SOFTEST = 0.2, 0.9  # [rad]: .02 (NAO) to .9 (XL330 at factory gains)
+USUAL, HIGHEST = 0.3, 1.5  # factors on gains that the effect servo_gain documents
 DAMPING = 0.7  # of an oscillator: hardly any overshoot
 LOAD_MASS = 1.0  # of a lone servo's load [kg]; what of it is off the axis is the effect centre_of_mass
 WORTH = 0.5  # of a lone servo's torque that an unknown load may take
@@ -53,7 +54,18 @@ def with_gains(robot: Robot, given: Mapping[str, tuple[float | None, float | Non
         kd = 2.0 * DAMPING * float(np.sqrt(kp * (inertia + joint.armature))) if kd is None else kd
         gains[name] = (kp, kd)
     peak = max(robot.joint(name).effort for name in robot.motors)
-    return replace(robot, gains=gains, torque_unit=torque_unit(peak))
+    made = replace(robot, gains=gains, torque_unit=torque_unit(peak))
+    return replace(made, ranges={**(softer_gains(made) if any(kp for kp, _ in given.values()) else {}), **made.ranges})
+
+
+def softer_gains(robot: Robot) -> dict[str, dict[str, tuple[float, float]]]:
+    """Return how far down a diagnosis has to look for gains, as ranges of servo_gain; nothing where that is usual.
+
+    Simulators of position servos are often far stiffer than any servo: kp may be as low as that of the softest that we
+    know, which has its full torque at an error of SOFTEST, and kd in proportion to its root, as damping goes.
+    """
+    kp = min(robot.joint(name).effort / (SOFTEST * robot.gains[name][0]) for name in robot.motors)
+    return {} if kp >= USUAL else {"servo_gain": {"kp": (kp, HIGHEST), "kd": (min(USUAL, float(np.sqrt(kp))), HIGHEST)}}
 
 
 def lone_servos(
