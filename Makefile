@@ -2,7 +2,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test iterate real xl330 so101 menagerie go2 check clean FORCE
+.PHONY: help demo test iterate real xl330 so101 logs-of-so101 menagerie go2 check clean FORCE
 
 VENV ?= .venv
 GSL ?= $(VENV)/bin/gsl
@@ -34,14 +34,15 @@ xl330: $(INSTALLED)
 CHECKED := chirp_sweep, coupled_joints, hold_under_gravity, single_joint_rotation, single_joint_wrist_roll, \
 	staircase_motion, step_response, velocity_ramp
 
-so101: $(INSTALLED)
+logs-of-so101: $(INSTALLED)
 	$(GSL) import mapping=so101_arm name=so101
+
+so101: logs-of-so101
 	$(GSL) diagnose real=so101 sim=so101 name=so101 'held_out={motion: [$(CHECKED)]}'
 	$(GSL) cross-validate real=so101 sim=so101 name=so101 by=date
 	$(GSL) cross-validate real=so101 sim=so101 name=so101_motions by=motion folds=4
 
-menagerie: $(INSTALLED)
-	$(GSL) import mapping=so101_arm name=so101
+menagerie: logs-of-so101
 	$(GSL) diagnose real=so101 sim=so101_menagerie name=so101_menagerie 'held_out={motion: [$(CHECKED)]}'
 	$(GSL) cross-validate real=so101 sim=so101_menagerie name=so101_menagerie by=motion folds=4
 

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from commands import done, gsl
 
+from gsl.errors import ArtifactError
+from gsl.grounding.gat import ActionTransformation
+from gsl.optimizers.cma_es import CmaEs
+from gsl.stages.ledger import Ledger, recipe
 from gsl.stages.paper_tables import Figure5, LinearWalkTable, Table2, Table3, Table4
 from gsl.stages.study_effort import told
 from gsl.stages.trial import Trial
 from gsl.tasks.arm import Arm
 from gsl.tasks.distance import Distance
 from gsl.tasks.walk import Walk
+from gsl.worlds.bullet import BulletWorld
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
 
 KEPT = {
     "table2": ("none", "ane_02", "gat", "sgat_residual"),
@@ -66,23 +74,61 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     first = tmp_path / "runs/fig5/trials.json"
     rows = json.loads(first.read_text())
     assert [one["number"] for one in rows] == [1, 1]
-    rows[0]["commit"] = "a1b2c3d"
-    first.write_text(json.dumps([*rows, {"recipe": "of another study", "commit": ""}]))
-    said = done(
-        "reproduce", "fig5", *few, "study.trials=2", "study.known=runs/fig5/trials.json", "name=on", folder=tmp_path
-    )
+    rows[0]["made_by"] = "a1b2c3d"
+    elsewhere = tmp_path / "elsewhere.json"
+    elsewhere.write_text(json.dumps([*rows, {**rows[0], "recipe": "of another study"}]))
+    said = done("reproduce", "fig5", *few, "study.trials=2", "study.known=elsewhere.json", "name=on", folder=tmp_path)
     assert "1 of 3 known trials are of other settings" in said.err
     again = json.loads((tmp_path / "runs/on/reproduce/trials.json").read_text())
     assert again[:2] == rows and [one["number"] for one in again] == [1, 1, 2, 2]
     assert not list((tmp_path / "runs/on").rglob("trial_01"))
-    assert "a1b2c3d (1)" in (tmp_path / "runs/on/reproduce/table.md").read_text()
+    assert "trials 1 by a1b2c3d; " in (tmp_path / "runs/on/reproduce/table.md").read_text()
+    assert len(json.loads((tmp_path / "runs/on/trials.json").read_text())) == 5  # nothing that was known is lost
 
 
 def test_a_file_that_holds_no_trials_is_refused(tmp_path: Path) -> None:
     (tmp_path / "figures.json").write_text('[{"value": 1}]')
     said = gsl("reproduce", "fig5", *FEW, "study.known=figures.json", folder=tmp_path)
-    assert (said.code, len(said.lines)) == (2, 1)
-    assert "figures.json: is no file of trials of `gsl reproduce`: rows need a recipe" in said.err
+    assert said.code == 2 and "figures.json: row 1 is no trial of such a study: " in said.lines[-1]
+
+
+class Silent:
+    def status(self, text: str) -> None: ...
+
+
+FIELDS = ("number", "value")
+
+
+def test_a_ledger_only_grows(tmp_path: Path) -> None:
+    path, given = tmp_path / "trials.json", tmp_path / "given.json"
+    before = Ledger(path, {}, FIELDS, Silent())
+    before.add("a", [{"number": 1, "value": 1.0}])
+    before.add("b", [{"number": 2, "value": 2.0}])
+    given.write_text(path.read_text().replace('"b"', '"c"'))
+    after = Ledger(path, {"known": given}, FIELDS, Silent())
+    assert not after.take("d")
+    after.add("b", [{"number": 2, "value": 3.0}])
+    assert {row["recipe"]: row["value"] for row in json.loads(path.read_text())} == {"b": 3.0, "a": 1.0, "c": 2.0}
+    assert after.take("a") and after.figures == [{"number": 1, "value": 1.0}, {"number": 2, "value": 3.0}]
+    with pytest.raises(ArtifactError, match="is what this study writes"):
+        Ledger(path, {"known": path}, FIELDS, Silent())
+    given.write_text(json.dumps([*json.loads(path.read_text()), json.loads(path.read_text())[0]]))
+    with pytest.raises(ArtifactError, match="row 4 is of a trial that the file has already"):
+        Ledger(tmp_path / "new.json", {"known": given}, FIELDS, Silent())
+
+
+def test_a_recipe_is_of_what_a_trial_comes_from(tmp_path: Path) -> None:
+    text = (EXAMPLES / "arm.urdf").read_text()
+    (tmp_path / "arm.urdf").write_text(text)
+    world = BulletWorld(str(tmp_path / "arm.urdf"), {}, floating=False)
+    gat = ActionTransformation("one/train_forward", "one/train_inverse")
+    first = recipe(world, gat, 1)
+    assert first == recipe(world, ActionTransformation("two/train_forward", "two/train_inverse"), 1)
+    assert first != recipe(world, gat, 2) and first != recipe(replace(world, step=0.001), gat, 1)
+    search = CmaEs(candidates=4, generations=2)
+    assert recipe(search, {"workers": 1}) == recipe(search, {"workers": 2}) != recipe(replace(search, sigma=0.1), {})
+    (tmp_path / "arm.urdf").write_text(text.replace('<mass value="', '<mass value="1'))
+    assert recipe(world, gat, 1) != first
 
 
 @pytest.mark.parametrize(

@@ -124,7 +124,7 @@ def test_a_file_beside_it_chooses_joints_and_says_what_is_known(written: Callabl
     assert (ours.name, ours.controlled, dict(ours.coupled)) == ("my_arm", ("elbow", "shoulder"), {})
     elbow = ours.joint("elbow")
     assert (ours.gains["elbow"], elbow.armature, elbow.effort) == ((7.0, 0.1), 0.003, 1.5)
-    assert ours.ranges["servo_gain"]["kp"][0] == pytest.approx(0.2 / 0.9)  # the shoulder's, down to full torque at .9 rad
+    assert ours.ranges["servo_gain"]["kp"][0] == pytest.approx(0.2 / 0.9)  # the shoulder's
     assert ours.joint("shoulder").effort == 3.0
     latency = next(one for one in library(ours) if one.effect == "command_latency")
     np.testing.assert_allclose(latency.documented[:, 0], [0.0, 0.12])

@@ -53,7 +53,7 @@ class Compare:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parent("known", self.known)
+        return known_parent("known", self.known, DATA)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials; write every trial's figures and the tables."""
@@ -67,13 +67,13 @@ class Compare:
         for grounding in self.methods.values():
             self.iterate.chain.check(grounding)
         home, simulators = folder.parent, self.simulators or {"": self.iterate.sim}
-        ledger = Ledger(home / DATA, self.known, console)
+        ledger = Ledger(home / DATA, self.parents(), Trial._fields, console)
         cells = product(range(1, self.trials + 1), self.methods, simulators, self.worlds)
         for number, method, simulator, world in cells:
             where = " ".join(filter(None, (simulator, world)))
             cell, sim = Cell(simulator, world, method, 1), simulators[simulator]
             key = recipe(self.iterate, number, cell, sim, self.worlds[world], self.methods[method], self.rank)
-            if ledger.knows(key):
+            if ledger.take(key):
                 continue
             trials = []
             for trial in self._trial(home, sim, cell, number, console):

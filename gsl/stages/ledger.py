@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,75 +12,103 @@ from gsl.core.described import described
 from gsl.core.setting import setting
 from gsl.errors import ArtifactError
 from gsl.storage.documents import text, write_json
+from gsl.storage.hashing import file_hash, sources_hash
 from gsl.storage.identity import WITHOUT_EFFECT
+from gsl.storage.read_files import read_files
 from gsl.storage.references import resolve
 from gsl.storage.versions import commit
 
-RECIPE, COMMIT = "recipe", "commit"
-DIGITS = 12  # of a recipe's hash
+RECIPE, MADE_BY = "recipe", "made_by"
+DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
 MADE = ("forward_model", "inverse_model", "diagnosis")  # of a grounding: names of what a trial makes itself
+NUMBER = ("number", "trial")  # what rows call their trial
 
 Known = Annotated[str | None, setting("figures of trials that the same study has made before, not to be run again")]
 
 
 def recipe(*parts: Any) -> str:
-    """Return the hash of a trial's settings, without those on which no result depends and without gsl's sources."""
-    return hashlib.sha256(text(_effective(described(list(parts)))).encode()).hexdigest()[:DIGITS]
+    """Return the hash of a trial's settings and of the files that they name, such as a robot's.
+
+    Neither settings on which no result depends nor gsl's sources are part of it: rows say who made them.
+    """
+    files = {name: file_hash(path) for name, path in read_files(list(parts)).items()}
+    told = text([_effective(described(list(parts))), files])
+    return hashlib.sha256(told.encode()).hexdigest()[:DIGITS]
 
 
-def known_parent(role: str, known: str | None) -> dict[str, Path]:
-    """Return the file of earlier trials as a parent of the study.
+def known_parent(role: str, known: str | None, name: str) -> dict[str, Path]:
+    """Return the file of earlier trials, or that of a run, as a parent of the study.
+
+    Args:
+        role: Of the parent.
+        known: As the user gave it.
+        name: Of such a file in a study's artifact.
 
     Raises:
-        ArtifactError: There is none, or it is no such file.
+        ArtifactError: There is none.
     """
     if known is None:
         return {}
-    path = resolve(known)
-    _read(path)
-    return {role: path}
+    place = resolve(known) if Path(known).suffix else resolve(known, kind=("reproduce", "compare"))
+    return {role: place if place.is_file() else place / name}
 
 
 class Ledger:
-    """The trials so far: figures by name, one or several rows a trial, each with recipe and commit of gsl."""
+    """The trials so far: figures by name, one or several rows a trial, each with the trial's recipe and who made it.
 
-    def __init__(self, path: Path, known: str | None, console: Any) -> None:
+    The file only grows: trials of an earlier start stay until they are made anew.
+
+    Raises:
+        ArtifactError: The file of earlier trials holds something else, a trial twice, or is the one to be written.
+    """
+
+    def __init__(self, path: Path, known: Mapping[str, Path], fields: Sequence[str], console: Any) -> None:
         self._path, self._console = path, console
+        self._done: dict[str, list[dict[str, Any]]] = {}
+        self._kept = _read(path, fields) if path.is_file() else {}
         self._known: dict[str, list[dict[str, Any]]] = {}
-        self._used = 0
-        for row in _read(resolve(known)) if known else ():
-            self._known.setdefault(row[RECIPE], []).append(row)
-        self._commit = _short(commit())
-        self._rows: list[dict[str, Any]] = []
+        for file in known.values():
+            if path.exists() and file.samefile(path):
+                raise ArtifactError(file, "is what this study writes; copy it, or give the study another name=")
+            self._known = _read(file, fields)
+        self._me = _made_by()
 
     @property
     def figures(self) -> list[dict[str, Any]]:
-        """The rows of all trials so far, without recipe and commit."""
-        return [{name: value for name, value in row.items() if name not in (RECIPE, COMMIT)} for row in self._rows]
+        """The rows of all trials so far, by trial, without recipe and maker."""
+        return [{name: value for name, value in row.items() if name not in (RECIPE, MADE_BY)} for row in self._rows()]
 
-    def knows(self, key: str) -> bool:
-        """Return whether a trial is known, which then is one of this study."""
+    def take(self, key: str) -> bool:
+        """Make a trial that is known one of this study; say whether it is known."""
         if key not in self._known:
             return False
-        self._used += 1
-        self._write(self._known[key])
+        self._write(key, self._known[key])
         return True
 
     def add(self, key: str, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write down a trial that has ended."""
-        self._write([{**row, RECIPE: key, COMMIT: self._commit} for row in rows])
+        self._write(key, [{**row, RECIPE: key, MADE_BY: self._me} for row in rows])
 
     def close(self, path: Path) -> str:
-        """Write all trials to `path`; return in words who made them."""
-        if unused := len(self._known) - self._used:
+        """Write this study's trials to `path`; say what of the known ones is not among them, return who made which."""
+        if unused := len(self._known.keys() - self._done.keys()):
             self._console.status(f"{unused} of {len(self._known)} known trials are of other settings and were not used")
-        write_json(path, self._rows)
-        made = Counter({row[RECIPE]: row[COMMIT] for row in self._rows}.values())
-        return "Trials by commit: " + ", ".join(f"{name or 'unknown'} ({count})" for name, count in made.items()) + "."
+        write_json(path, self._rows())
+        makers: dict[str, set[int]] = {}
+        for row in self._rows():
+            makers.setdefault(row[MADE_BY], set()).add(_number(row))
+        if len(makers) > 1:
+            self._console.status(f"these trials were made by {len(makers)} versions of gsl; the table says which")
+        told = "; ".join(f"trials {', '.join(map(str, sorted(found)))} by {name}" for name, found in makers.items())
+        return f"Made: {told}."
 
-    def _write(self, rows: Sequence[dict[str, Any]]) -> None:
-        self._rows += rows
-        write_json(self._path, self._rows)
+    def _rows(self) -> list[dict[str, Any]]:
+        return sorted((row for rows in self._done.values() for row in rows), key=_number)
+
+    def _write(self, key: str, rows: Sequence[dict[str, Any]]) -> None:
+        self._done[key] = list(rows)
+        others = {other: made for other, made in {**self._known, **self._kept}.items() if other not in self._done}
+        write_json(self._path, [*self._rows(), *(row for made in others.values() for row in made)])
 
 
 def _effective(told: Any) -> Any:
@@ -91,15 +118,30 @@ def _effective(told: Any) -> Any:
     return [_effective(value) for value in told] if isinstance(told, list) else told
 
 
-def _read(path: Path) -> list[dict[str, Any]]:
+def _read(path: Path, fields: Sequence[str]) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows of each trial."""
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, OSError) as error:
         raise ArtifactError(path, f"is no file of trials: {error}") from error
-    if not isinstance(rows, list) or not all(isinstance(row, dict) and {RECIPE, COMMIT} <= row.keys() for row in rows):
-        raise ArtifactError(path, "is no file of trials of `gsl reproduce`: rows need a recipe and a commit")
-    return rows
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise ArtifactError(path, "is no file of trials: not a list of rows")
+    wanted, found, last = {*fields, RECIPE, MADE_BY}, dict[str, list[dict[str, Any]]](), None
+    for index, row in enumerate(rows, start=1):
+        if wrong := sorted(wanted ^ row.keys()):
+            raise ArtifactError(path, f"row {index} is no trial of such a study: {', '.join(wrong)} lacking or unknown")
+        if row[RECIPE] in found and row[RECIPE] != last:
+            raise ArtifactError(path, f"row {index} is of a trial that the file has already; leave one of the two out")
+        last = row[RECIPE]
+        found.setdefault(last, []).append(row)
+    return found
 
 
-def _short(made: Mapping[str, Any] | None) -> str:
-    return "" if made is None else made["commit"][:7] + (" with changes" if made["dirty"] else "")
+def _number(row: Mapping[str, Any]) -> int:
+    return int(next(row[name] for name in NUMBER if name in row))
+
+
+def _made_by() -> str:
+    """Return gsl's commit, or where its sources are of none, their hash."""
+    made = commit()
+    return f"sources {sources_hash()[:SHORT]}" if made is None or made["dirty"] else str(made["commit"])[:SHORT]

@@ -11,7 +11,7 @@ from gsl.grounding.effects import DiagnosedEffects
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.report.trial_dots import KNOWS, KNOWS_NOTHING, LEARNS, Dots, trial_dots
-from gsl.stages.compare import TABLE, Compare
+from gsl.stages.compare import DATA, TABLE, Compare
 from gsl.stages.comparison import summaries
 from gsl.stages.ledger import known_parent
 from gsl.stages.study_effort import seconds, told
@@ -43,7 +43,7 @@ class Reproduce:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parent("study.known", self.study.known)
+        return known_parent("study.known", self.study.known, DATA)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run the study, say beforehand how long that takes, and write every trial's figures and the table."""

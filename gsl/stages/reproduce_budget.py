@@ -59,7 +59,7 @@ class Budget:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parent("known", self.known)
+        return known_parent("known", self.known, DATA)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials, write the points, the table and the figure.
@@ -71,10 +71,10 @@ class Budget:
             if not isinstance(innermost(grounding), ActionTransformation):
                 raise ConfigError(f"methods.{name}", "learns nothing from real trajectories; take gat or sgat")
         home = folder.parent
-        ledger = Ledger(home / DATA, self.known, console)
+        ledger = Ledger(home / DATA, self.parents(), Point._fields, console)
         for number in range(1, self.trials + 1):
             key = recipe(replace(self, trials=1, known=None), number)
-            if not ledger.knows(key):
+            if not ledger.take(key):
                 ledger.add(key, [one._asdict() for one in self._trial(home, number, console)])
         points = [Point(**row) for row in ledger.figures]
         self._told(folder, points, ledger.close(folder / DATA))

@@ -76,21 +76,22 @@ class NoiseStudy:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parent("known", self.known)
+        return known_parent("known", self.known, DATA)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials; write the points, the table and the figure."""
         for name, world in self.worlds.items():
             check_alike(self.sims.get(name, self.iterate.sim).layout, world.layout)
         home = folder.parent
-        ledger = Ledger(home / DATA, self.known, console)
+        ledger = Ledger(home / DATA, self.parents(), Point._fields, console)
         keys = {number: recipe(replace(self, trials=1, known=None), number) for number in range(1, self.trials + 1)}
-        jobs = [(number, home) for number, key in keys.items() if not ledger.knows(key)]
+        known = {number for number, key in keys.items() if ledger.take(key)}
+        jobs = [(number, home) for number in keys if number not in known]
         with console.progress(len(jobs), "trials") as progress:
             for index, found in arriving(_trial, self, jobs, self.workers, progress):
                 ledger.add(keys[jobs[index][0]], [one._asdict() for one in found])
         made = ledger.close(folder / DATA)
-        points = sorted((Point(**row) for row in ledger.figures), key=lambda one: one.trial)
+        points = [Point(**row) for row in ledger.figures]
         (folder / TABLE).write_text(f"{self._table(points)}\n{made}\n", encoding="utf-8")
         panels = {
             world: Bars(self.noises, {method: self._means(points, world, method) for method in self._shown})
