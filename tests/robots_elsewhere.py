@@ -45,6 +45,6 @@ def requested(
 
 
 def run(folder: Path, *words: str, typed: str = "") -> subprocess.CompletedProcess[str]:
-    """Run a request's runner, `typed` on its keyboard."""
-    line = [sys.executable, "-I", str(folder / "runner.py"), *words]
+    """Run a request's runner, `typed` on its keyboard, like a background job, which SIGINT does not reach."""
+    line = ["sh", "-c", 'trap "" INT; exec "$@"', "sh", sys.executable, "-I", str(folder / "runner.py"), *words]
     return subprocess.run(line, input=typed, capture_output=True, text=True, timeout=60, check=False)
