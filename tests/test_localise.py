@@ -23,7 +23,7 @@ def part(count: int) -> Experiment:
 
 
 def mapped(one: Experiment, z: np.ndarray) -> list[Cell]:
-    return cells(one, z, regimes(one, one.simulator(nominal(arm()), 0.002, 1, 1.0)))
+    return cells(one, z, regimes(one, nominal(arm())))
 
 
 @pytest.mark.parametrize("count", [1, 2, 9])

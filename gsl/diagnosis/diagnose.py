@@ -10,6 +10,7 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
+from gsl.diagnosis import nuisance
 from gsl.diagnosis.arena import LATENCY, arena_of, looked_at
 from gsl.diagnosis.attribute import BEAM, Arena, Hypothesis
 from gsl.diagnosis.experiment import Experiment, experiment
@@ -68,6 +69,12 @@ class Findings:
     refuted: Mapping[str, str] = field(default_factory=dict)
     seed: int = 0
     tolerance: float = 0.0
+
+    @property
+    def corrected(self) -> Plant:
+        """The simulator's robot with the answer's effects and calibration."""
+        own = self.answer.fit.nuisances[:, : len(self.experiment.joints)]
+        return nuisance.calibrated(applied(self.simulator.plant, built(self.answer.effects)), own)
 
     @property
     def answer(self) -> Hypothesis:

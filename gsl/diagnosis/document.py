@@ -44,7 +44,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
     unsure = droops(found)
     causes = [] if found.verdict.word in ("no_gap", "unknown") else [_cause(found, one) for one in found.verdict.causes]
     after = everything.simulator.told(answer.effects, answer.fit.nuisances, exp.pieces)
-    places = [asdict(cell) for cell in cells(exp, z, regimes(exp, sim))]
+    places = [asdict(cell) for cell in cells(exp, z, regimes(exp, found.corrected))]
     return {
         "verdict": found.verdict.word,
         "summary": _summary(found, causes),

@@ -60,7 +60,7 @@ def droops(found: Findings) -> tuple[Droop, ...]:
     exp, n = found.experiment, len(found.experiment.joints)
     if exp.walking:
         return ()
-    plant = _answered(found)
+    plant = found.corrected
     zero = _zeros(plant, n) - _zeros(found.simulator.plant, n)
     pull, stiffness = _statics(found, plant)
     droop = pull / stiffness
@@ -77,11 +77,6 @@ def droops(found: Findings) -> tuple[Droop, ...]:
         return ()
     pull = _reach(plant, limits(exp.robot))
     return tuple(_droop(found, plant, k, float(zero[k]), float(wrong[k]), pull) for k in unsure)
-
-
-def _answered(found: Findings) -> Plant:
-    """Return the simulator with what was found and the calibration that goes with it."""
-    return nuisance.calibrated(applied(found.simulator.plant, built(found.answer.effects)), found.answer.fit.nuisances)
 
 
 def _zeros(plant: Plant, n: int) -> np.ndarray:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.plant import Plant
 from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.records import Pieces
-from gsl.diagnosis.replay import Simulator
 from gsl.effects.effect import applied, built
 
 REST, FAST = 0.01, 0.12  # shares of the no-load speed: slower is rest, faster is fast
@@ -85,10 +85,15 @@ def cells(found: Experiment, z: np.ndarray, regimes: Mapping[str, np.ndarray]) -
     return result
 
 
-def regimes(found: Experiment, simulator: Simulator) -> dict[str, np.ndarray]:
-    """Return which residuals of all windows belong to which regime, shape (W, scored, n_joints) each."""
+def regimes(found: Experiment, plant: Plant) -> dict[str, np.ndarray]:
+    """Return which residuals of all windows belong to which regime, shape (W, scored, n_joints) each.
+
+    Args:
+        found: The log.
+        plant: Whose gains and limits say what torque a command asks for: as near to the robot as is known.
+    """
     cut, n = found.pieces, len(found.joints)
-    kp, limit, no_load = _servos(cut, simulator, n)
+    kp, limit, no_load = _servos(cut, plant, n)
     real = cut.real[..., :n]
     speed = np.gradient(real, found.period, axis=1)
     commands = cut.windows.commands[:, : real.shape[1], :n][:, ::-1]
@@ -113,11 +118,11 @@ def regimes(found: Experiment, simulator: Simulator) -> dict[str, np.ndarray]:
     return {key: _counted(found, mask[:, cut.warm_up :], key) for key, mask in wide.items()}
 
 
-def _servos(cut: Pieces, simulator: Simulator, joints: int) -> np.ndarray:
+def _servos(cut: Pieces, plant: Plant, joints: int) -> np.ndarray:
     """Return kp, torque limit and no-load speed in each window, shape (3, W, 1, n_joints)."""
     told = np.empty((3, len(cut), 1, joints))
     for known, index in cut.alike:
-        servo = applied(simulator.plant, built(known)).servo
+        servo = applied(plant, built(known)).servo
         told[:, index, 0] = np.array([servo.kp, servo.limit, servo.no_load_speed])[:, None, :joints]
     return told
 

@@ -94,7 +94,7 @@ def ceiling(exp: Experiment, before: np.ndarray, *, seed: int = 0) -> float | No
 
 def _by_regime(found: Findings, z: dict[str, np.ndarray]) -> list[dict[str, Any]]:
     exp, rows = found.experiment, []
-    for name, mask in regimes(exp, found.simulator).items():
+    for name, mask in regimes(exp, found.corrected).items():
         part = mask[exp.held_out]
         if part.sum() > 50:
             values = {key: float(np.sqrt(np.mean(z[key][exp.held_out][part] ** 2))) for key in ("before", "after")}

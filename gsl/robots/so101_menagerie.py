@@ -5,7 +5,8 @@
 Menagerie says of them that they are "not a 1-to-1 mapping of the servo gains used in Lerobot" and "were calculated ...
 assuming that the servo proportional gain is set to 16". So both are derived from a register P of 16: so101.py by the
 duty per error that was measured on a bench, 11.7 N·m/rad. The joints' damping of .60 N·m·s/rad and friction of .052 N·m
-are the world's. Body, limits and engine are ours. It is the same robot and has its name, which its logs bear.
+are the world's. Body, limits and engine are ours, and so is the speed at which torque vanishes. It is the same robot
+and has its name, which its logs bear.
 
 Source: google-deepmind/mujoco_menagerie, robotstudio_so101/so101.xml at 191a7ba, class sts3215 (Apache-2.0).
 """
@@ -19,7 +20,6 @@ from gsl.robots.defaults import softer_gains
 from gsl.robots.so101 import so101
 
 KP, KV, FORCE, ARMATURE = 998.22, 2.731, 2.94, 0.028
-UNLIMITED = 100.0  # times the joints' speed: torque does not fall with speed there
 
 
 def so101_menagerie() -> Robot:
@@ -27,5 +27,5 @@ def so101_menagerie() -> Robot:
     ours = so101()
     joints = tuple(replace(joint, effort=FORCE, armature=ARMATURE) for joint in ours.joints)
     gains = dict.fromkeys(ours.controlled, (KP, KV))
-    arm = replace(ours, joints=joints, no_load_speed=UNLIMITED, gains=gains)
+    arm = replace(ours, joints=joints, gains=gains)
     return replace(arm, ranges={**arm.ranges, **softer_gains(arm)})
