@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsl.core.setting import settings_of
-from gsl.effects.effect import effect_class
+from gsl.effects.effect import documented
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import Draw, RandomisedEffects, randomised
+from gsl.robots.catalogue import robot
 from gsl.worlds.bullet import BulletWorld
 
 WORLD = BulletWorld(robot="nao", effects={"coulomb_friction": {"torque": 0.1}}, floating=False, settle=0.0)
@@ -39,9 +39,11 @@ def test_an_episode_is_a_function_of_its_seed_whatever_came_before() -> None:
 
 def test_a_draw_stays_within_its_share_of_the_documented_ranges_and_reaches_its_ends() -> None:
     width, rng = 0.4, np.random.default_rng(0)
-    drawn = [Draw(SETTINGS.effects, width, "torso")(rng) for _ in range(400)]
+    own = replace(robot("nao"), ranges={"command_latency": {"delay": (0.0, 0.2)}})
+    drawn = [Draw(SETTINGS.effects, width, own)(rng) for _ in range(400)]
+    assert max(one["command_latency"]["delay"] for one in drawn) > 0.07  # of .08
     for name in SETTINGS.effects:
-        for key, known in settings_of(effect_class(name)).items():
+        for key, known in documented(name, own).items():
             if known.neutral is None:
                 continue
             values = np.array([one[name][key] for one in drawn])

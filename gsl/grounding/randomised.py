@@ -15,7 +15,7 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.layout import Layout
 from gsl.core.setting import Setting, component, setting, settings_of
-from gsl.effects.effect import effect_class
+from gsl.effects.effect import documented, effect_class
 from gsl.errors import ConfigError
 from gsl.grounding.grounding import GroundingRun
 from gsl.worlds.bullet import BulletWorld
@@ -49,7 +49,7 @@ class RandomisedEffects:
             ConfigError: One of them.
         """
         for name in self.effects:
-            if not _strengths(name):
+            if not _strengths(settings_of(effect_class(name))):
                 raise ConfigError("effects", "has no strength that could be drawn; leave it out", given=name)
 
     @property
@@ -73,20 +73,21 @@ class Draw:
     Attributes:
         effects: Their names.
         width: Share of each documented range.
-        base: Link that carries masses.
+        robot: Whose documented ranges they are; its base carries masses.
     """
 
     effects: tuple[str, ...]
     width: float
-    base: str
+    robot: Robot
 
     def __call__(self, rng: np.random.Generator) -> Mapping[str, Any]:
         """Return an `effects:` mapping."""
         return {name: self._entry(name, rng) for name in self.effects}
 
     def _entry(self, name: str, rng: np.random.Generator) -> dict[str, float | str]:
-        place = {"link": self.base} if "link" in settings_of(effect_class(name)) else {}
-        return {**place, **{key: self._value(known, rng) for key, known in _strengths(name).items()}}
+        known = documented(name, self.robot)
+        place = {"link": self.robot.base} if "link" in known else {}
+        return {**place, **{key: self._value(one, rng) for key, one in _strengths(known).items()}}
 
     def _value(self, known: Setting, rng: np.random.Generator) -> float:
         assert known.neutral is not None and known.lower is not None and known.upper is not None
@@ -102,10 +103,8 @@ def randomised(world: Any, settings: RandomisedEffects, width: float) -> Randomi
     """
     if not isinstance(world, BulletWorld):
         raise ConfigError("grounding", "only Bullet worlds have effects to draw; take another grounding")
-    robot: Robot = world.plant.robot
-    return RandomisedWorld(world, Draw(settings.effects, width, robot.base))
+    return RandomisedWorld(world, Draw(settings.effects, width, world.plant.robot))
 
 
-def _strengths(name: str) -> Mapping[str, Setting]:
-    known = settings_of(effect_class(name))
+def _strengths(known: Mapping[str, Setting]) -> Mapping[str, Setting]:
     return {key: one for key, one in known.items() if one.neutral is not None}
