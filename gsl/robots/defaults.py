@@ -62,10 +62,10 @@ def softer_gains(robot: Robot) -> dict[str, dict[str, tuple[float, float]]]:
     """Return how far down a diagnosis has to look for gains, as ranges of servo_gain; nothing where that is usual.
 
     Simulators of position servos are often far stiffer than any servo: kp may be as low as that of the softest that we
-    know, which has its full torque at an error of SOFTEST, and kd in proportion to its root, as damping goes.
+    know, which has its full torque at an error of SOFTEST, and kd may be lower by as much.
     """
-    kp = min(robot.joint(name).effort / (SOFTEST * robot.gains[name][0]) for name in robot.motors)
-    return {} if kp >= USUAL else {"servo_gain": {"kp": (kp, HIGHEST), "kd": (min(USUAL, float(np.sqrt(kp))), HIGHEST)}}
+    least = min(robot.joint(name).effort / (SOFTEST * robot.gains[name][0]) for name in robot.motors)
+    return {} if least >= USUAL else {"servo_gain": dict.fromkeys(("kp", "kd"), (least, HIGHEST))}
 
 
 def lone_servos(
