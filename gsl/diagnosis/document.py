@@ -13,6 +13,7 @@ from gsl.core.setting import settings_of
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Hypothesis, share
 from gsl.diagnosis.candidates import Candidate
+from gsl.diagnosis.deviations import far_off
 from gsl.diagnosis.diagnose import NOISE_COST, Findings
 from gsl.diagnosis.droop import Droop, droops
 from gsl.diagnosis.localise import cells, horizon, regimes, sides
@@ -25,7 +26,6 @@ RANKED = 12  # hypotheses that are listed
 ASKED, STUCK = 0.05, 0.1  # command [rad], and share of it, below which a joint that moves less does not move
 ROUGH = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
 SURE = 0.9  # probability of every cause from which on they are said to be the causes
-FAR_OFF = 5.0  # spreads of the calibration beyond which it is told
 WIDER = 2.0  # than white noise makes them: what is left of a joint hangs together in time and over nuisances. Estimate
 REPLAYS, SHOWN = 6, 400  # pictures of replays, and their ticks at most
 WORDS = {
@@ -209,7 +209,7 @@ def _caveats(found: Findings, unsure: Sequence[Droop]) -> list[str]:
     stuck = [name for k, name in enumerate(exp.joints) if _stuck(found, k)]
     if stuck:
         said.append(f"These joints are commanded to move and do not: {', '.join(stuck)}. Look at them first.")
-    far = _far_off(found)
+    far = far_off(found)
     if far:
         said.append(
             f"The calibration of these joints is far from what robots of one make differ by, so that it may hide a "
@@ -229,30 +229,6 @@ def _stuck(found: Findings, k: int) -> bool:
     asked = max(float(np.ptp(one.targets[:, k])) for one in records)
     moved = max(float(np.ptp(one.position[:, k])) for one in records)
     return asked > ASKED and moved < STUCK * asked
-
-
-def _far_off(found: Findings) -> list[str]:
-    """Return the joints whose calibration is far off, each with what is furthest."""
-    exp, sizes = found.experiment, found.simulator.spread * nuisance.SIZES[:, None]
-    fitted = found.answer.fit.nuisances[:, : len(exp.joints)]
-    off = np.abs(fitted / sizes)
-    return [
-        f"{joint} ({_shift(row, fitted[row, k], exp.robot.torque_unit)})"
-        for k, (joint, row) in enumerate(zip(exp.joints, off.argmax(axis=0), strict=True))
-        if off[row, k] > FAR_OFF
-    ]
-
-
-def _shift(row: int, value: float, torque_unit: float) -> str:
-    name = nuisance.NAMES[row]
-    if row in (nuisance.KP, nuisance.KD):
-        return f"{name} x {np.exp(value):.2f}"
-    if row in (nuisance.ZERO, nuisance.OFFSET):
-        return f"{name} {1e3 * value:+.0f} mrad"
-    if row == nuisance.INERTIA:
-        return "inertia"
-    unit = "N·m" if row == nuisance.COULOMB else "N·m·s/rad"
-    return f"{name} {torque_unit * value:+.2g} {unit}"
 
 
 def _summary(found: Findings, causes: Sequence[Mapping[str, Any]]) -> str:

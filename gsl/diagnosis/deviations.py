@@ -1,0 +1,34 @@
+"""Joints whose calibration is further off than robots of one make differ by, and by how much."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gsl.diagnosis import nuisance
+from gsl.diagnosis.diagnose import Findings
+
+FAR_OFF = 5.0  # spreads of the calibration beyond which it is told
+
+
+def far_off(found: Findings) -> list[str]:
+    """Return the joints whose calibration is far off, each with what is furthest."""
+    exp, sizes = found.experiment, found.simulator.spread * nuisance.SIZES[:, None]
+    fitted = found.answer.fit.nuisances[:, : len(exp.joints)]
+    off = np.abs(fitted / sizes)
+    return [
+        f"{joint} ({_shift(row, fitted[row, k], exp.robot.torque_unit)})"
+        for k, (joint, row) in enumerate(zip(exp.joints, off.argmax(axis=0), strict=True))
+        if off[row, k] > FAR_OFF
+    ]
+
+
+def _shift(row: int, value: float, torque_unit: float) -> str:
+    name = nuisance.NAMES[row]
+    if row in (nuisance.KP, nuisance.KD):
+        return f"{name} x {np.exp(value):.2f}"
+    if row in (nuisance.ZERO, nuisance.OFFSET):
+        return f"{name} {1e3 * value:+.0f} mrad"
+    if row == nuisance.INERTIA:
+        return "inertia"
+    unit = "N·m" if row == nuisance.COULOMB else "N·m·s/rad"
+    return f"{name} {torque_unit * value:+.2g} {unit}"
