@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -44,8 +45,12 @@ def processes_starting() -> Iterator[None]:
 
     from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
 
-    resource_tracker.ensure_running()  # both would let Ctrl-C through again when they start in the block
+    # Both would let Ctrl-C through again when they start in the block. What an interruption leaves they tidy up, and
+    # would warn of a semaphore whose last thread was stopped just before it said that the semaphore is gone.
+    sys.warnoptions.append("ignore:resource_tracker")
+    resource_tracker.ensure_running()
     loky_resource_tracker.ensure_running()
+    sys.warnoptions.remove("ignore:resource_tracker")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

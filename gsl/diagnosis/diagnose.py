@@ -176,9 +176,19 @@ def _upheld(
         selection = selected(arena, thresholds, none, most=options.most, width=width)
         reasons = refuted(selection.chosen, found, arena.train.simulator.plant)
         if not reasons:
-            return selection, wrong
+            return _looked_again(arena, selection, thresholds), wrong
         wrong |= reasons
         arena = replace(arena, library=tuple(one for one in arena.library if one.effect not in wrong))
+
+
+def _looked_again(arena: Arena, found: Selection, thresholds: Thresholds) -> Selection:
+    """Return a selection that knows what is invisible on top of the chosen hypothesis.
+
+    Where joints shake or a robot walks another look costs too much: there it is what the plain simulator does not show.
+    """
+    if thresholds.share or not found.chosen.candidates:
+        return found
+    return replace(found, screening=replace(found.screening, invisible=arena.screening(found.chosen).invisible))
 
 
 def _survivors(found: Selection) -> list[Hypothesis]:

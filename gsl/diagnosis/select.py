@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -46,8 +46,7 @@ class Selection:
         none: Calibration without an effect.
         chosen: The hypothesis that stands, maybe `none`.
         tried: All hypotheses, best first, `none` among them.
-        screening: The first one; what is invisible is so on top of the chosen hypothesis, as long as nothing shakes and
-            nobody walks, where another look costs too much.
+        screening: The first one.
     """
 
     none: Hypothesis
@@ -96,8 +95,6 @@ def selected(
         chosen = _split(arena, chosen, none, thresholds, tried)
         if thresholds.share:
             chosen = _challenged(arena, chosen, none, tried)
-    if chosen.candidates and not thresholds.share:
-        screening = replace(screening, invisible=arena.screening(chosen).invisible)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
 
 

@@ -17,10 +17,11 @@ import numpy as np
 
 from gsl.core.body import Joint, Link, Robot, lumped
 from gsl.core.dynamics import mass_matrix
+from gsl.core.setting import settings_of
+from gsl.effects.effect import effect_class
 
 TIME_CONSTANT = 0.02  # [s]: .006 (Go2) to .046 (STS3215), see the robots; motors' data sheets say .005 to .05
 FULL_AT, SOFTEST = 0.2, 0.9  # [rad]: .02 (NAO) to .9 (XL330 at factory gains)
-USUAL, HIGHEST = 0.3, 1.5  # factors on gains that the effect servo_gain documents
 DAMPING = 0.7  # of an oscillator: hardly any overshoot
 LOAD_MASS = 1.0  # of a lone servo's load [kg]; what of it is off the axis is the effect centre_of_mass
 WORTH = 0.5  # of a lone servo's torque that an unknown load may take
@@ -65,7 +66,9 @@ def softer_gains(robot: Robot) -> dict[str, dict[str, tuple[float, float]]]:
     know, which has its full torque at an error of SOFTEST, and kd may be lower by as much.
     """
     least = min(robot.joint(name).effort / (SOFTEST * robot.gains[name][0]) for name in robot.motors)
-    return {} if least >= USUAL else {"servo_gain": dict.fromkeys(("kp", "kd"), (least, HIGHEST))}
+    usual = settings_of(effect_class("servo_gain"))["kp"]
+    assert usual.lower is not None and usual.upper is not None
+    return {} if least >= usual.lower else {"servo_gain": dict.fromkeys(("kp", "kd"), (least, usual.upper))}
 
 
 def lone_servos(
