@@ -19,6 +19,7 @@ from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.fit import Fit
 from gsl.diagnosis.nuisance import none
 from gsl.diagnosis.refuted import refuted
+from gsl.diagnosis.select import _stands
 
 
 def with_channels(batch: Batch, channels: Mapping[str, Any]) -> Batch:
@@ -71,6 +72,20 @@ def test_a_logged_torque_refutes_a_gain_that_it_does_not_have(factor: float) -> 
     torque = {f"torque.{name}": lambda t, q, k=k: told(t, q, k) for k, name in enumerate(("shoulder", "elbow"))}
     exp = experiment(with_channels(log({"servo_gain": {"kp": factor}}), torque), arm())
     assert ("servo_gain" in refuted(claim("servo_gain", [0.5], ("kp",)), exp, nominal(arm()))) == (factor == 1.0)
+
+
+@pytest.mark.parametrize(("alone", "is_enough"), [(0.2, True), (0.5, False)])
+def test_a_smaller_set_beyond_its_documented_range_is_no_simpler_explanation(alone: float, is_enough: bool) -> None:
+    """Friction far beyond what servos have does another cause's work: that one only has to be better."""
+    few, costs = claim("stribeck_friction", [alone, 0.1], ("torque", "velocity")), np.array([100.0, 160.0])
+    few = replace(few, costs=costs, counts=np.ones(2))
+    load = claim("load_friction", [0.2], ("coefficient",))
+    both = replace(few, candidates=few.candidates + load.candidates, costs=np.array([110.0, 120.0]))
+    both = replace(both, parameters=(np.array([0.2, 0.1]), np.array([0.2])))
+    assert few.claims_its_names == is_enough
+    assert both.claims_its_names
+    assert _stands(both, few, 20.0, 25.0) != is_enough
+    assert not _stands(both, few, 40.0, 25.0)  # a gain of 30 that chance has as well
 
 
 def test_a_value_beyond_the_documented_range_is_no_cause() -> None:

@@ -57,6 +57,11 @@ class Hypothesis:
         return tuple(candidate.effect for candidate in self.candidates)
 
     @property
+    def claims_its_names(self) -> bool:
+        """Whether all parameters are inside their documented ranges, as far as a fit can tell."""
+        return all(one.claims_its_name(values) for one, values in zip(self.candidates, self.parameters, strict=True))
+
+    @property
     def cost(self) -> float:
         """Held-out cost, that of the nuisances included."""
         return float(self.costs.sum()) + self.fit.toll

@@ -35,6 +35,7 @@ DOUBT_ON_FOOT, DOUBT = (
     0.05,
     0.08,
 )  # share of the cost by which two causes differ by chance, there and of joints that shake
+WIDER = 2.0  # than white noise makes intervals: what is left of a joint hangs together in time. Estimate
 RESTARTS = 40  # windows that measure what a log does not show of a walk
 
 
@@ -75,6 +76,11 @@ class Findings:
         """The simulator's robot with the answer's effects and calibration."""
         own = self.answer.fit.nuisances[:, : len(self.experiment.joints)]
         return nuisance.calibrated(applied(self.simulator.plant, built(self.answer.effects)), own)
+
+    @property
+    def widening(self) -> float:
+        """How much wider an interval is than noise alone makes it: what is left unexplained widens it."""
+        return float(WIDER * np.sqrt(max(1.0, self.verdict.remaining)))
 
     @property
     def answer(self) -> Hypothesis:

@@ -26,7 +26,6 @@ RANKED = 12  # hypotheses that are listed
 ASKED, STUCK = 0.05, 0.1  # command [rad], and share of it, below which a joint that moves less does not move
 ROUGH = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
 SURE = 0.9  # probability of every cause from which on they are said to be the causes
-WIDER = 2.0  # than white noise makes them: what is left of a joint hangs together in time and over nuisances. Estimate
 REPLAYS, SHOWN = 6, 400  # pictures of replays, and their ticks at most
 WORDS = {
     "no_gap": "The simulator and the robot agree as far as noise and a per-joint calibration can tell.",
@@ -66,6 +65,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         },
         "invisible": list(found.selection.screening.invisible),
         "caveats": _caveats(found, unsure),
+        "limits": [],
         "next_experiment": None,
         "policy_gap": None,
         "replays": _replays(found, told, after),
@@ -84,16 +84,11 @@ def _cause(found: Findings, one: Cause) -> dict[str, Any]:
         "joints": _joints(found.experiment.robot, candidate),
         "scope": candidate.scope,
         "fixed": {key: value for key, value in candidate.fixed.items() if key != "joints"},
-        "parameters": _parameters(candidate, values, sd * _widening(found)),
+        "parameters": _parameters(candidate, values, sd * found.widening),
         "probability": one.probability,
         "gain": {"value": one.value, "low": one.low, "high": one.high},
         "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
     }
-
-
-def _widening(found: Findings) -> float:
-    """Return how much wider an interval is than noise alone makes it: what is left unexplained widens it."""
-    return float(WIDER * np.sqrt(max(1.0, found.verdict.remaining)))
 
 
 def _joints(robot: Robot, candidate: Candidate) -> list[str]:

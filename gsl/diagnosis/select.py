@@ -99,8 +99,14 @@ def selected(
 
 
 def _stands(one: Hypothesis, other: Hypothesis, least: float, flaw: float) -> bool:
-    """Whether a hypothesis is surely better, be it on the residuals beyond a flaw, or by freeing the nuisances."""
+    """Whether a hypothesis is surely better, be it on the residuals beyond a flaw, or by freeing the nuisances.
+
+    Over one that loses its claim to a name it only has to be better: what is beyond its documented range does the work
+    of something else.
+    """
     found, freed = gain(one, other), other.fit.toll - one.fit.toll
+    if one.claims_its_names and not other.claims_its_names:
+        return found.value > least
     on_residuals = found.value - freed
     beyond = freed + (max(0.0, on_residuals - flaw) if on_residuals > 0.0 else on_residuals)
     return found.low > 0.0 and beyond > least

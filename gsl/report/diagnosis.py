@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from gsl.report.diagnosis_answers import answers
 from gsl.report.diagnosis_html import element
+from gsl.report.diagnosis_limits import limits
 from gsl.report.diagnosis_look import STYLE
 from gsl.report.diagnosis_method import calibration, caveats, method, noise_floor, self_test
 from gsl.report.diagnosis_policies import policies
@@ -20,6 +21,7 @@ _SECTIONS = (
     growth,
     sides,
     causes,
+    limits,
     ranking,
     shrinkage,
     parts,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from gsl.report.diagnosis_limits import limits_sentence
 from gsl.report.diagnosis_next import steps
 from gsl.report.diagnosis_policies import policy_lines
 from gsl.report.diagnosis_verdict import (
@@ -99,7 +100,7 @@ def _next(document: Document) -> Told:
     rows = [(words, str(document[key])) for key, words in files.items() if document.get(key)]
     doubts = [str(one) for one in entries(document, "caveats")]
     more = [f"{len(doubts) - CAVEATS} more of these in the report"] if len(doubts) > CAVEATS else []
-    told = [*(f"Mind: {one}" for one in doubts[:CAVEATS]), *more]
+    told = [*filter(None, [limits_sentence(document)]), *(f"Mind: {one}" for one in doubts[:CAVEATS]), *more]
     told += [
         line for step in steps(document) for line in (step.why, *(f"    {one}" for one in step.command.splitlines()))
     ]

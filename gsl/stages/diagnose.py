@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import shlex
 import time
-from collections.abc import Mapping
-from dataclasses import field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, ClassVar
 
@@ -17,6 +17,7 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import Findings, diagnosed
 from gsl.diagnosis.document import document
+from gsl.diagnosis.limits import Limit, limits
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.verify import in_bullet
 from gsl.diagnosis.world_file import diagnosed_effects, joined
@@ -91,7 +92,8 @@ class Diagnose:
             walking=on_ground(logs["real"]),
         )
         gap = self._policy_gap(measured, found, console) if measured else None
-        return self._written(found, logs["real"], gap, folder, time.perf_counter() - begin)
+        room = limits(found, Telling(console))
+        return self._written(found, logs["real"], gap, room, folder, time.perf_counter() - begin)
 
     def document(self, folder: Path) -> dict[str, Any]:
         """Return what --json shows of an artifact: the report without its curves."""
@@ -123,7 +125,13 @@ class Diagnose:
         return policy_gap(measured, self.sim, after, named=named, effort=effort, console=console)
 
     def _written(
-        self, found: Findings, batch: Batch, gap: Mapping[str, Any] | None, folder: Path, seconds: float
+        self,
+        found: Findings,
+        batch: Batch,
+        gap: Mapping[str, Any] | None,
+        room: Sequence[Limit],
+        folder: Path,
+        seconds: float,
     ) -> Mapping[str, Any]:
         checked = found.verdict.word in ("causes", "inseparable") and not found.experiment.walking
         told = document(
@@ -132,6 +140,7 @@ class Diagnose:
             next_experiment=write_next_experiment(found, self.sim.robot, folder),
             effects=diagnosed_effects(found),
             policy_gap=gap,
+            limits=[asdict(one) for one in room],
             world_file=WORLD,
             report=PAGE,
             data=self._data(found, batch),

@@ -1,0 +1,88 @@
+"""Limits: how much of an effect that was not named a log leaves room for, on top of what was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gsl.core.setting import settings_of
+from gsl.diagnosis.attribute import Hypothesis
+from gsl.diagnosis.candidates import Candidate
+from gsl.diagnosis.diagnose import Findings
+from gsl.effects.effect import effect_class
+
+TOLD, LEAST = 0.5, 0.002  # shares of a documented range: a limit above says nothing, one below is not searched
+HALVINGS = 5  # which leaves a limit 1.2 times too high at most
+ROUNDS = 3
+CERTAIN = 1.96**2  # rise of a cost that an interval of 95 % holds
+
+
+@dataclass(frozen=True)
+class Limit:
+    """How much of an effect, on all joints, there may be.
+
+    Attributes:
+        effect: Its name.
+        parameter: Its only one.
+        unit: Of the parameter.
+        most: From where on the log speaks against it, with 95 % certainty.
+        documented: Upper end of its documented range.
+    """
+
+    effect: str
+    parameter: str
+    unit: str
+    most: float
+    documented: float
+
+
+def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
+    """Return what is below half of its documented range, the tightest first.
+
+    Every effect that all joints may have none of is held at a value, all else fitted anew, until the value costs too
+    much (a profile of the likelihood). Where a gap is unexplained, joints shake or a robot walks there is no answer to
+    hold it against.
+    """
+    exp, answer = found.experiment, found.answer
+    if found.verdict.word == "unknown" or exp.walking or exp.comparison.shaking.any():
+        return []
+    left_out = {*answer.names, *found.selection.screening.invisible, *found.refuted}
+    asked = [one for one in found.arena.library if one.effect not in left_out and _none_or_some(one)]
+    if asked:
+        tick("what the log leaves room for")
+    told = [limit for one in asked if (limit := _limit(found, one))]
+    return sorted(told, key=lambda one: one.most / one.documented)
+
+
+def _none_or_some(one: Candidate) -> bool:
+    return one.scope == "all" and len(one.fixed) == 1 and len(one.free) == 1 and one.documented[0, 0] == 0.0
+
+
+def _limit(found: Findings, one: Candidate) -> Limit | None:
+    """Return the limit of an effect, None if half of what is documented costs too little."""
+    (name,), documented = one.free, float(one.documented[1, 0])
+    within = CERTAIN * found.widening**2
+    standing = _with(found, one, 0.0, found.answer)
+    least, low, high = standing.fit.cost, LEAST, TOLD
+    at_most = _with(found, one, high * documented, standing)
+    if at_most.fit.cost <= least + within:
+        return None
+    for _ in range(HALVINGS):
+        middle = float(np.sqrt(low * high))
+        tried = _with(found, one, middle * documented, standing)
+        least = min(least, tried.fit.cost)
+        low, high = (low, middle) if tried.fit.cost > least + within else (middle, high)
+    unit = settings_of(effect_class(one.effect))[name].unit
+    return Limit(one.effect, name, unit, high * documented, documented)
+
+
+def _with(found: Findings, one: Candidate, value: float, at: Hypothesis) -> Hypothesis:
+    """Return the answer with an effect held at a value, all else fitted from another hypothesis."""
+    nothing = np.empty((2, 0))
+    held = replace(
+        one, fixed=one.entry(np.array([value])), free=(), neutral=nothing[0], documented=nothing, bounds=nothing
+    )
+    start = np.concatenate([np.zeros(0), *at.parameters])
+    return found.arena.fitted((*found.answer.candidates, held), start, at.fit.nuisances, every=1, rounds=ROUNDS)

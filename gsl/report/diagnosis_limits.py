@@ -1,0 +1,34 @@
+"""What a log leaves room for: effects that were not named, and how much of each there may be all the same."""
+
+from __future__ import annotations
+
+from gsl.report.diagnosis_html import Html, element, section, table
+from gsl.report.diagnosis_words import Document, entries, in_unit, listed, name, said
+
+TOLD = 4  # in a terminal
+
+
+def limits(document: Document) -> Html | None:
+    """Return the effects of which there is little or none."""
+    rows = [
+        (name(said(one, "effect")), element("code", said(one, "parameter")), _at(one, "most"), _at(one, "documented"))
+        for one in entries(document, "limits")
+    ]
+    note = (
+        "Fitted on top of the causes, with the calibration, on all joints: at most so much of an effect, with 95 % "
+        "certainty, beside the most that is documented of any robot."
+    )
+    columns = ("effect", "parameter", "at most", "documented up to")
+    return section("What else there may be", table(columns, rows) if rows else None, note=note)
+
+
+def limits_sentence(document: Document) -> str | None:
+    """Return the tightest limits in a sentence, None if there are none."""
+    found = entries(document, "limits")
+    told = [f"{name(said(one, 'effect'))} {_at(one, 'most')}" for one in found[:TOLD]]
+    more = [f"{len(found) - TOLD} more, in the report"] if len(found) > TOLD else []
+    return f"At most there is also: {listed([*told, *more], most=99)}." if told else None
+
+
+def _at(one: Document, key: str) -> str:
+    return in_unit({"unit": one.get("unit"), "value": one.get(key)})(one.get(key))

@@ -1,0 +1,52 @@
+"""What a log leaves room for is at least what there is, and no more than the log can show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+from test_diagnosis import QUICK, arm, found, log
+
+from gsl.core.plant import nominal
+from gsl.diagnosis.diagnose import diagnosed
+from gsl.diagnosis.limits import Limit, limits
+from gsl.report.diagnosis_limits import limits_sentence
+
+HIDDEN = {"command_latency": ("delay", 2e-4), "target_smoothing": ("time_constant", 3e-4), "load_friction": ("coefficient", 5e-3)}
+
+
+def left_room(effects: Mapping[str, Any], **how: Any) -> dict[str, Limit]:
+    result = diagnosed(log(effects, **how), arm(), nominal(arm()), 0.002, QUICK, lambda _: None)
+    assert result.answer.names == ()
+    return {one.effect: one for one in limits(result, lambda _: None)}
+
+
+@pytest.mark.parametrize("effect", HIDDEN)
+def test_what_hides_below_the_noise_is_within_the_limit(effect: str) -> None:
+    name, value = HIDDEN[effect]
+    limit = left_room({effect: {name: value}}, noise=5e-3)[effect]
+    assert limit.parameter == name
+    assert value <= limit.most < 0.25 * limit.documented
+
+
+def test_limits_are_on_top_of_what_was_named() -> None:
+    told = limits(found({"coulomb_friction": {"torque": 0.15}}), lambda _: None)
+    shares = [one.most / one.documented for one in told]
+    assert shares == sorted(shares) and shares[-1] <= 0.5
+    assert {"backlash", "command_latency", "load_friction"} <= {one.effect for one in told}
+    assert not {"coulomb_friction", "servo_gain", "zero_offset"} & {one.effect for one in told}
+
+
+def test_where_a_gap_is_unexplained_nothing_is_ruled_out() -> None:
+    lagging = ("command_latency", "target_smoothing", "sensor_delay", "armature", "viscous_friction", "servo_gain")
+    assert limits(found({"command_latency": {"delay": 0.03}}, without=lagging), lambda _: None) == []
+
+
+def test_a_sentence_tells_the_tightest() -> None:
+    rows = [{"effect": f"effect_{k}", "parameter": "width", "unit": "rad", "most": 0.001 * k} for k in range(1, 7)]
+    assert limits_sentence({"limits": rows}) == (
+        "At most there is also: effect 1 0.0573°, effect 2 0.115°, effect 3 0.172°, effect 4 0.229° and 2 more, "
+        "in the report."
+    )
+    assert limits_sentence({"limits": []}) is None
