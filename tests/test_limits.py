@@ -13,7 +13,11 @@ from gsl.diagnosis.diagnose import diagnosed
 from gsl.diagnosis.limits import Limit, limits
 from gsl.report.diagnosis_limits import limits_sentence
 
-HIDDEN = {"command_latency": ("delay", 2e-4), "target_smoothing": ("time_constant", 3e-4), "load_friction": ("coefficient", 5e-3)}
+HIDDEN = {
+    "command_latency": ("delay", 2e-4),
+    "target_smoothing": ("time_constant", 3e-4),
+    "load_friction": ("coefficient", 5e-3),
+}
 
 
 def left_room(effects: Mapping[str, Any], **how: Any) -> dict[str, Limit]:

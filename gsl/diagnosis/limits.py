@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gsl.core.setting import settings_of
-from gsl.diagnosis.attribute import Hypothesis
+from gsl.diagnosis.attribute import Hypothesis, gain
 from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.diagnose import Findings
 from gsl.effects.effect import effect_class
@@ -16,7 +16,7 @@ from gsl.effects.effect import effect_class
 TOLD, LEAST = 0.5, 0.002  # shares of a documented range: a limit above says nothing, one below is not searched
 HALVINGS = 5  # which leaves a limit 1.2 times too high at most
 ROUNDS = 3
-CERTAIN = 1.96**2  # rise of a cost that an interval of 95 % holds
+CERTAIN = 1.96**2  # rise of a cost that an interval of 95 % holds, were windows independent
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,8 @@ class Limit:
 def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
     """Return what is below half of its documented range, the tightest first.
 
-    Every effect that all joints may have none of is held at a value, all else fitted anew, until the value costs too
-    much (a profile of the likelihood). Where a gap is unexplained, joints shake or a robot walks there is no answer to
-    hold it against.
+    Every effect that all joints may have none of is held at a value, all else fitted anew, until that is surely worse
+    on held-out windows. Where a gap is unexplained, joints shake or a robot walks there is no answer to hold it against.
     """
     exp, answer = found.experiment, found.answer
     if found.verdict.word == "unknown" or exp.walking or exp.comparison.shaking.any():
@@ -64,16 +63,18 @@ def _limit(found: Findings, one: Candidate) -> Limit | None:
     """Return the limit of an effect, None if half of what is documented costs too little."""
     (name,), documented = one.free, float(one.documented[1, 0])
     within = CERTAIN * found.widening**2
-    standing = _with(found, one, 0.0, found.answer)
-    least, low, high = standing.fit.cost, LEAST, TOLD
-    at_most = _with(found, one, high * documented, standing)
-    if at_most.fit.cost <= least + within:
+    without = _with(found, one, 0.0, found.answer)
+
+    def surely_worse(share: float) -> bool:
+        loss = gain(without, _with(found, one, share * documented, without))
+        return loss.low > 0.0 and loss.value > within
+
+    low, high = LEAST, TOLD
+    if not surely_worse(high):
         return None
     for _ in range(HALVINGS):
         middle = float(np.sqrt(low * high))
-        tried = _with(found, one, middle * documented, standing)
-        least = min(least, tried.fit.cost)
-        low, high = (low, middle) if tried.fit.cost > least + within else (middle, high)
+        low, high = (low, middle) if surely_worse(middle) else (middle, high)
     unit = settings_of(effect_class(one.effect))[name].unit
     return Limit(one.effect, name, unit, high * documented, documented)
 

@@ -81,18 +81,19 @@ class Diagnose:
             )
         if warning := self._stranger(logs["real"]):
             console.status(f"warning: {warning}")
+        telling = Telling(console)
         found = diagnosed(
             logs["real"],
             robot,
             self.sim.plant,
             self.sim.step,
             self._options(logs["real"]),
-            Telling(console),
+            telling,
             reference=logs.get("reference"),
             walking=on_ground(logs["real"]),
         )
         gap = self._policy_gap(measured, found, console) if measured else None
-        room = limits(found, Telling(console))
+        room = limits(found, telling)
         return self._written(found, logs["real"], gap, room, folder, time.perf_counter() - begin)
 
     def document(self, folder: Path) -> dict[str, Any]:
