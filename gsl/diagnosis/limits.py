@@ -42,7 +42,7 @@ def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
     """Return what is below half of its documented range, the tightest first.
 
     Every effect that all joints may have none of is held at a value, all else fitted anew, until that is surely worse
-    on held-out windows. Where a gap is unexplained, joints shake or a robot walks there is no answer to hold it against.
+    on held-out windows. Where a gap is unexplained, joints shake or a robot walks there is no answer to compare with.
     """
     exp, answer = found.experiment, found.answer
     if found.verdict.word == "unknown" or exp.walking or exp.comparison.shaking.any():
