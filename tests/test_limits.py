@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from test_diagnosis import QUICK, arm, found, log
 
@@ -35,11 +37,13 @@ def test_what_hides_below_the_noise_is_within_the_limit(effect: str) -> None:
 
 
 def test_limits_are_on_top_of_what_was_named() -> None:
+    """Play of no width is not none, since its teeth give: .07 mrad of it would be ruled out for that alone."""
     told = limits(found({"coulomb_friction": {"torque": 0.15}}), lambda _: None)
+    assert next(one.most for one in told if one.effect == "backlash") > 2e-4
     shares = [one.most / one.documented for one in told]
     assert shares == sorted(shares) and shares[-1] <= 0.5
     assert {"backlash", "command_latency", "load_friction"} <= {one.effect for one in told}
-    assert not {"coulomb_friction", "servo_gain", "zero_offset"} & {one.effect for one in told}
+    assert not {"coulomb_friction", "viscous_friction", "servo_gain", "zero_offset"} & {one.effect for one in told}
 
 
 def test_where_a_gap_is_unexplained_nothing_is_ruled_out() -> None:
@@ -47,10 +51,22 @@ def test_where_a_gap_is_unexplained_nothing_is_ruled_out() -> None:
     assert limits(found({"command_latency": {"delay": 0.03}}, without=lagging), lambda _: None) == []
 
 
+def test_what_shakes_walks_or_is_explained_in_part_has_no_limits() -> None:
+    result = found({})
+    assert limits(result, lambda _: None)
+    shaking = replace(result.experiment.comparison, shaking=np.array([True, False]))
+    part = replace(result.verdict, word="causes", explained=0.88, remaining=1.5)
+    for other in (
+        replace(result, verdict=part),
+        replace(result, experiment=replace(result.experiment, comparison=shaking)),
+    ):
+        assert limits(other, lambda _: None) == []
+
+
 def test_a_sentence_tells_the_tightest() -> None:
     rows = [{"effect": f"effect_{k}", "parameter": "width", "unit": "rad", "most": 0.001 * k} for k in range(1, 7)]
     assert limits_sentence({"limits": rows}) == (
-        "At most there is also: effect 1 0.0573°, effect 2 0.115°, effect 3 0.172°, effect 4 0.229° and 2 more, "
-        "in the report."
+        "All joints alike have at most: effect 1 0.0573°, effect 2 0.115°, effect 3 0.172°, effect 4 0.229° "
+        "and 2 more, in the report."
     )
     assert limits_sentence({"limits": []}) is None

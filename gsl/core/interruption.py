@@ -45,12 +45,14 @@ def processes_starting() -> Iterator[None]:
 
     from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
 
-    # Both would let Ctrl-C through again when they start in the block. What an interruption leaves they tidy up, and
-    # would warn of a semaphore whose last thread was stopped just before it said that the semaphore is gone.
+    # Both would let Ctrl-C through again when they start in the block. They tidy up what an interruption leaves and do
+    # not warn of it: a thread may have been stopped just before it said that its semaphore is gone already.
     sys.warnoptions.append("ignore:resource_tracker")
-    resource_tracker.ensure_running()
-    loky_resource_tracker.ensure_running()
-    sys.warnoptions.remove("ignore:resource_tracker")
+    try:
+        resource_tracker.ensure_running()
+        loky_resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions.remove("ignore:resource_tracker")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -211,7 +211,7 @@ def _caveats(found: Findings, unsure: Sequence[Droop]) -> list[str]:
             f"cause: {', '.join(far)}."
         )
     said += [f"{effect} would explain much, but {reason}." for effect, reason in found.refuted.items()]
-    if 0.0 < found.verdict.explained < 0.9 and found.verdict.word in ("causes", "inseparable"):
+    if found.verdict.in_part:
         said.append(
             f"{100.0 * (1.0 - found.verdict.explained):.0f} % of the excess remains: something else is at work as well."
         )

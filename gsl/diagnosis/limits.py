@@ -11,10 +11,12 @@ from gsl.core.setting import settings_of
 from gsl.diagnosis.attribute import Hypothesis, gain
 from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.diagnose import Findings
+from gsl.diagnosis.shared import ROWS
+from gsl.diagnosis.verdict import FOREIGN
 from gsl.effects.effect import effect_class
 
 TOLD, LEAST = 0.5, 0.002  # shares of a documented range: a limit above says nothing, one below is not searched
-HALVINGS = 5  # which leaves a limit 1.2 times too high at most
+HALVINGS = 4  # to a factor of 1.4
 ROUNDS = 3
 CERTAIN = 1.96**2  # rise of a cost that an interval of 95 % holds, were windows independent
 
@@ -28,7 +30,7 @@ class Limit:
         parameter: Its only one.
         unit: Of the parameter.
         most: From where on the log speaks against it, with 95 % certainty.
-        documented: Upper end of its documented range.
+        documented: Upper end of its documented range, of this robot if it has its own.
     """
 
     effect: str
@@ -42,10 +44,13 @@ def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
     """Return what is below half of its documented range, the tightest first.
 
     Every effect that all joints may have none of is held at a value, all else fitted anew, until that is surely worse
-    on held-out windows. Where a gap is unexplained, joints shake or a robot walks there is no answer to compare with.
+    on held-out windows. Left out is what a calibration does as well, whose prior would be the limit. Where much is left
+    unexplained, joints shake or a robot walks there is no answer to compare with; one motion alone is too little.
     """
     exp, answer = found.experiment, found.answer
-    if found.verdict.word == "unknown" or exp.walking or exp.comparison.shaking.any():
+    verdict = found.verdict
+    unexplained = verdict.word == "unknown" or (verdict.in_part and verdict.remaining > FOREIGN)
+    if unexplained or not exp.by_record or exp.walking or exp.comparison.shaking.any():
         return []
     left_out = {*answer.names, *found.selection.screening.invisible, *found.refuted}
     asked = [one for one in found.arena.library if one.effect not in left_out and _none_or_some(one)]
@@ -56,17 +61,21 @@ def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
 
 
 def _none_or_some(one: Candidate) -> bool:
-    return one.scope == "all" and len(one.fixed) == 1 and len(one.free) == 1 and one.documented[0, 0] == 0.0
+    alone = one.scope == "all" and len(one.fixed) == 1 and len(one.free) == 1
+    return alone and one.documented[0, 0] == 0.0 and (one.effect, one.free[0]) not in ROWS
 
 
 def _limit(found: Findings, one: Candidate) -> Limit | None:
-    """Return the limit of an effect, None if half of what is documented costs too little."""
+    """Return the limit of an effect, None if half of what is documented costs too little.
+
+    It is compared with hardly any of the effect and not with none: play of no width has teeth that give all the same.
+    """
     (name,), documented = one.free, float(one.documented[1, 0])
     within = CERTAIN * found.widening**2
-    without = _with(found, one, 0.0, found.answer)
+    hardly = _with(found, one, LEAST * documented, found.answer)
 
     def surely_worse(share: float) -> bool:
-        loss = gain(without, _with(found, one, share * documented, without))
+        loss = gain(hardly, _with(found, one, share * documented, hardly))
         return loss.low > 0.0 and loss.value > within
 
     low, high = LEAST, TOLD

@@ -46,7 +46,7 @@ class Selection:
         none: Calibration without an effect.
         chosen: The hypothesis that stands, maybe `none`.
         tried: All hypotheses, best first, `none` among them.
-        screening: The first one.
+        screening: The first one; a diagnosis asks once more what is invisible, on top of the chosen hypothesis.
     """
 
     none: Hypothesis
@@ -101,15 +101,14 @@ def selected(
 def _stands(one: Hypothesis, other: Hypothesis, least: float, flaw: float) -> bool:
     """Whether a hypothesis is surely better, be it on the residuals beyond a flaw, or by freeing the nuisances.
 
-    Over one that loses its claim to a name it only has to be better: what is beyond its documented range does the work
-    of something else.
+    Over one with a value beyond its documented range it only has to be better, not surely so: such a value does the
+    work of something else.
     """
     found, freed = gain(one, other), other.fit.toll - one.fit.toll
-    if one.claims_its_names and not other.claims_its_names:
-        return found.value > least
+    surely = found.low > 0.0 or (one.claims_its_names and not other.claims_its_names)
     on_residuals = found.value - freed
     beyond = freed + (max(0.0, on_residuals - flaw) if on_residuals > 0.0 else on_residuals)
-    return found.low > 0.0 and beyond > least
+    return surely and beyond > least
 
 
 def _bar(thresholds: Thresholds, standing: Hypothesis, none: Hypothesis) -> tuple[float, float]:
@@ -145,11 +144,11 @@ def _distinct(singles: list[Hypothesis], width: int) -> list[Hypothesis]:
 def _pruned(
     arena: Arena, chosen: Hypothesis, none: Hypothesis, thresholds: Thresholds, tried: list[Hypothesis]
 ) -> Hypothesis:
-    """Drop effects that the others can do without."""
+    """Drop effects that the others can do without, within their documented ranges if that is possible."""
     while len(chosen.candidates) > 1:
         fewer = [_without(arena, chosen, k) for k in range(len(chosen.candidates))]
         tried += fewer
-        best = min(fewer, key=lambda one: one.cost)
+        best = min(fewer, key=lambda one: (chosen.claims_its_names and not one.claims_its_names, one.cost))
         if _stands(chosen, best, *_bar(thresholds, best, none)):
             break
         chosen = best

@@ -15,6 +15,7 @@ ALIKE = tuple(frozenset(pair) for pair in TWINS.items())  # in the air
 SEPARATED = 0.75  # probability below which two causes are not told apart
 BLUNT = 12.0  # least spread of a difference of costs, where no self-test has measured it
 COARSE = 0.12  # share of a difference of costs that an imperfect model makes
+WHOLE = 0.9  # share of the excess from which on causes are all there is
 FOREIGN, EXPLAINED = 1.12, 0.85  # remaining cost, and share explained, beyond which nothing of the library is the cause
 LOCAL = 1.5  # and remaining cost of one joint
 KNOWN_SOFT = 0.15
@@ -59,6 +60,11 @@ class Verdict:
     explained: float
     remaining: float
     known: float
+
+    @property
+    def in_part(self) -> bool:
+        """Whether causes are named and leave so much that something else is at work as well."""
+        return self.word in ("causes", "inseparable") and 0.0 < self.explained < WHOLE
 
 
 def judged(

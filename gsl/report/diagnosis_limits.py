@@ -1,4 +1,4 @@
-"""What a log leaves room for: effects that were not named, and how much of each there may be all the same."""
+"""What a log leaves room for: how much of an effect that was not named there may be all the same."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def limits(document: Document) -> Html | None:
         for one in entries(document, "limits")
     ]
     note = (
-        "Fitted on top of the causes, with the calibration, on all joints: at most so much of an effect, with 95 % "
-        "certainty, beside the most that is documented of any robot."
+        "On top of the simulator with the causes, on all joints alike: at most so much of an effect, with 95 % "
+        "certainty, beside the most that is documented. One joint alone may have more."
     )
     columns = ("effect", "parameter", "at most", "documented up to")
     return section("What else there may be", table(columns, rows) if rows else None, note=note)
@@ -27,7 +27,7 @@ def limits_sentence(document: Document) -> str | None:
     found = entries(document, "limits")
     told = [f"{name(said(one, 'effect'))} {_at(one, 'most')}" for one in found[:TOLD]]
     more = [f"{len(found) - TOLD} more, in the report"] if len(found) > TOLD else []
-    return f"At most there is also: {listed([*told, *more], most=99)}." if told else None
+    return f"All joints alike have at most: {listed([*told, *more], most=99)}." if told else None
 
 
 def _at(one: Document, key: str) -> str:

@@ -58,6 +58,7 @@ class Diagnose:
     nulls: Nulls = 3
     workers: Workers = -1
     tolerance: Tolerance = 0.0
+    limits: Annotated[bool, setting("ask how much of what is not named there may be all the same")] = True
     held_out: Annotated[
         Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
     ] = field(default_factory=dict)
@@ -93,7 +94,7 @@ class Diagnose:
             walking=on_ground(logs["real"]),
         )
         gap = self._policy_gap(measured, found, console) if measured else None
-        room = limits(found, telling)
+        room = limits(found, telling) if self.limits else []
         return self._written(found, logs["real"], gap, room, folder, time.perf_counter() - begin)
 
     def document(self, folder: Path) -> dict[str, Any]:

@@ -67,6 +67,7 @@ class DiagnosisPlan:
                 most=self.most,
                 duels=self.duels,
                 nulls=self.nulls,
+                limits=False,
                 workers=workers,
                 seed=seed,
             )
