@@ -11,6 +11,7 @@ from gsl.core.setting import settings_of
 from gsl.diagnosis.attribute import Hypothesis, gain
 from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.diagnose import Findings
+from gsl.diagnosis.select import FLAW
 from gsl.diagnosis.shared import ROWS
 from gsl.diagnosis.verdict import FOREIGN
 from gsl.effects.effect import effect_class
@@ -44,8 +45,9 @@ def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
     """Return what is below half of its documented range, the tightest first.
 
     Every effect that all joints may have none of is held at a value, all else fitted anew, until that is surely worse
-    on held-out windows. Left out is what a calibration does as well, whose prior would be the limit. Where much is left
-    unexplained, joints shake or a robot walks there is no answer to compare with; one motion alone is too little.
+    on held-out windows, by more than a simulator's own flaws may make of it. Left out is what a calibration does as
+    well, whose prior would be the limit. Where much is left unexplained, joints shake or a robot walks there is no
+    answer to compare with; one motion alone is too little.
     """
     exp, answer = found.experiment, found.answer
     verdict = found.verdict
@@ -71,7 +73,7 @@ def _limit(found: Findings, one: Candidate) -> Limit | None:
     It is compared with hardly any of the effect and not with none: play of no width has teeth that give all the same.
     """
     (name,), documented = one.free, float(one.documented[1, 0])
-    within = CERTAIN * found.widening**2
+    within = max(CERTAIN * found.widening**2, FLAW * found.selection.none.cost)  # as little is no reason to name it
     hardly = _with(found, one, LEAST * documented, found.answer)
 
     def surely_worse(share: float) -> bool:
