@@ -1,4 +1,4 @@
-"""What a log leaves room for is at least what there is, and no more than the log can show."""
+"""What is left: a log leaves room for at least what there is, and parts that are as far off as before are told."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from test_diagnosis import QUICK, arm, found, log
 from gsl.core.plant import nominal
 from gsl.diagnosis.diagnose import diagnosed
 from gsl.diagnosis.limits import Limit, limits
+from gsl.diagnosis.shrinkage import unexplained
 from gsl.report.diagnosis_limits import limits_sentence
 
 HIDDEN = {
@@ -66,7 +67,15 @@ def test_what_shakes_walks_or_is_explained_in_part_has_no_limits() -> None:
 def test_a_sentence_tells_the_tightest() -> None:
     rows = [{"effect": f"effect_{k}", "parameter": "width", "unit": "rad", "most": 0.001 * k} for k in range(1, 7)]
     assert limits_sentence({"limits": rows}) == (
-        "All joints alike have at most: effect 1 0.0573°, effect 2 0.115°, effect 3 0.172°, effect 4 0.229° "
+        "All joints alike have at most: effect 1 0.06°, effect 2 0.11°, effect 3 0.2°, effect 4 0.2° "
         "and 2 more, in the report."
     )
+    assert str(limits_sentence({"limits": rows, "causes": [{}]})).startswith("If these causes are right, all joints")
     assert limits_sentence({"limits": []}) is None
+
+
+def test_a_part_of_the_log_that_is_as_far_off_as_before_is_not_explained() -> None:
+    regimes = [{"regime": "all", "before": 4.0, "after": 4.0}, {"regime": "high_load", "before": 11.0, "after": 12.0}]
+    joints = [{"joint": "Jaw", "before": 2.5, "after": 2.4}, {"joint": "Elbow", "before": 5.0, "after": 3.0},
+              {"joint": "Wrist", "before": 1.5, "after": 1.6}]  # fmt: skip
+    assert unexplained({"by_regime": regimes, "by_joint": joints}) == ["high load (12.0 x)", "Jaw (2.4 x)"]

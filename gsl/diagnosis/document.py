@@ -18,7 +18,7 @@ from gsl.diagnosis.diagnose import NOISE_COST, Findings
 from gsl.diagnosis.droop import Droop, droops
 from gsl.diagnosis.localise import cells, horizon, regimes, sides
 from gsl.diagnosis.records import FEW
-from gsl.diagnosis.shrinkage import shrinkage
+from gsl.diagnosis.shrinkage import shrinkage, unexplained
 from gsl.diagnosis.verdict import Cause
 from gsl.effects.effect import effect_class
 
@@ -43,6 +43,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
     unsure = droops(found)
     causes = [] if found.verdict.word in ("no_gap", "unknown") else [_cause(found, one) for one in found.verdict.causes]
     after = everything.simulator.told(answer.effects, answer.fit.nuisances, exp.pieces)
+    shrunk = shrinkage(found, told, after)
     places = [asdict(cell) for cell in cells(exp, z, regimes(exp, found.corrected))]
     return {
         "verdict": found.verdict.word,
@@ -55,7 +56,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "where": [place for place in places if place["named"] or place["regime"] == "all"],
         "horizon": {"time": times, "rms": growth},
         "sides": sides(exp, z),
-        "shrinkage": shrinkage(found, told, after),
+        "shrinkage": shrunk,
         "ranking": _ranking(found),
         "calibration": _calibration(exp.joints, answer.fit.nuisances[:, : len(exp.joints)], exp.robot.torque_unit),
         "floor": {
@@ -64,7 +65,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
             "sd": dict(zip(exp.channels, exp.comparison.floor.tolist(), strict=True)),
         },
         "invisible": list(found.selection.screening.invisible),
-        "caveats": _caveats(found, unsure),
+        "caveats": [*_caveats(found, unsure), *_unexplained(shrunk, causes)],
         "limits": [],
         "next_experiment": None,
         "policy_gap": None,
@@ -216,6 +217,11 @@ def _caveats(found: Findings, unsure: Sequence[Droop]) -> list[str]:
             f"{100.0 * (1.0 - found.verdict.explained):.0f} % of the excess remains: something else is at work as well."
         )
     return said
+
+
+def _unexplained(shrunk: Mapping[str, Any], causes: Sequence[Any]) -> list[str]:
+    far = unexplained(shrunk) if causes else []
+    return [f"Not explained, no nearer to the robot than before, in noise floors: {', '.join(far)}."] if far else []
 
 
 def _stuck(found: Findings, k: int) -> bool:

@@ -19,6 +19,7 @@ from gsl.effects.effect import effect_class
 TOLD, LEAST = 0.5, 0.002  # shares of a documented range: a limit above says nothing, one below is not searched
 HALVINGS = 4  # to a factor of 1.4
 ROUNDS = 3
+CALIBRATED = {effect for effect, _ in ROWS} | {"armature"}
 CERTAIN = 1.96**2  # rise of a cost that an interval of 95 % holds, were windows independent
 
 
@@ -30,7 +31,7 @@ class Limit:
         effect: Its name.
         parameter: Its only one.
         unit: Of the parameter.
-        most: From where on the log speaks against it, with 95 % certainty.
+        most: From where on the log speaks against it, if the answer is right; no angle below a step of the encoders.
         documented: Upper end of its documented range, of this robot if it has its own.
     """
 
@@ -64,7 +65,7 @@ def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
 
 def _none_or_some(one: Candidate) -> bool:
     alone = one.scope == "all" and len(one.fixed) == 1 and len(one.free) == 1
-    return alone and one.documented[0, 0] == 0.0 and (one.effect, one.free[0]) not in ROWS
+    return alone and one.documented[0, 0] == 0.0 and one.effect not in CALIBRATED
 
 
 def _limit(found: Findings, one: Candidate) -> Limit | None:
@@ -87,7 +88,8 @@ def _limit(found: Findings, one: Candidate) -> Limit | None:
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if surely_worse(middle) else (middle, high)
     unit = settings_of(effect_class(one.effect))[name].unit
-    return Limit(one.effect, name, unit, high * documented, documented)
+    most = max(high * documented, found.experiment.robot.encoder_step if unit == "rad" else 0.0)
+    return Limit(one.effect, name, unit, most, documented) if most < TOLD * documented else None
 
 
 def _with(found: Findings, one: Candidate, value: float, at: Hypothesis) -> Hypothesis:

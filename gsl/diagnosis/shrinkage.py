@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.localise import regimes
 
 SAMPLES = 1000
+FAR, ALIKE = 2.0, 0.95  # floors, and a share of what they were before: a part of the log above both is not explained
 NOTHING = 0.02  # of an excess in squared floors: below it there is nothing to shrink
 
 
@@ -43,6 +45,20 @@ def shrinkage(found: Findings, before: np.ndarray, after: np.ndarray) -> dict[st
         ],
         "by_regime": _by_regime(found, z),
     }
+
+
+def unexplained(told: Mapping[str, Any]) -> list[str]:
+    """Return the joints and regimes that are far off and no nearer than before, each with its floors.
+
+    Args:
+        told: From `shrinkage`.
+    """
+    parts = [(one.get("joint") or one["regime"], one) for one in (*told["by_regime"], *told["by_joint"])]
+    return [
+        f"{name.replace('_', ' ')} ({one['after']:.1f} x)"
+        for name, one in parts
+        if name != "all" and one["after"] > max(FAR, ALIKE * one["before"])
+    ]
 
 
 def _mean_square(z: np.ndarray, used: np.ndarray) -> np.ndarray:
