@@ -67,7 +67,7 @@ def test_what_shakes_walks_or_is_explained_in_part_has_no_limits() -> None:
 def test_a_sentence_tells_the_tightest() -> None:
     rows = [{"effect": f"effect_{k}", "parameter": "width", "unit": "rad", "most": 0.001 * k} for k in range(1, 7)]
     assert limits_sentence({"limits": rows}) == (
-        "All joints alike have at most: effect 1 0.06°, effect 2 0.11°, effect 3 0.2°, effect 4 0.2° "
+        "All joints alike have at most: effect 1 0.06°, effect 2 0.11°, effect 3 0.17°, effect 4 0.23° "
         "and 2 more, in the report."
     )
     assert str(limits_sentence({"limits": rows, "causes": [{}]})).startswith("If these causes are right, all joints")

@@ -47,7 +47,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
     places = [asdict(cell) for cell in cells(exp, z, regimes(exp, found.corrected))]
     return {
         "verdict": found.verdict.word,
-        "summary": _summary(found, causes),
+        "summary": _summary(found, causes, shrunk),
         "causes": causes,
         "sure": _sure(causes),
         "suspects": [_cause(found, one) for one in found.verdict.causes] if found.verdict.word == "unknown" else [],
@@ -232,7 +232,7 @@ def _stuck(found: Findings, k: int) -> bool:
     return asked > ASKED and moved < STUCK * asked
 
 
-def _summary(found: Findings, causes: Sequence[Mapping[str, Any]]) -> str:
+def _summary(found: Findings, causes: Sequence[Mapping[str, Any]], shrunk: Mapping[str, Any]) -> str:
     verdict = found.verdict
     if verdict.word in WORDS and not causes:
         return WORDS[verdict.word]
@@ -241,10 +241,12 @@ def _summary(found: Findings, causes: Sequence[Mapping[str, Any]]) -> str:
     if verdict.word == "inseparable":
         groups = "; ".join(" or ".join(group) for group in verdict.inseparable).replace("_", " ")
         return f"The gap looks like {named}, but this log cannot tell apart: {groups}."
-    explain = "which together explain" if most else "which explains"
     probably = "" if _sure(causes) else "probably "
-    share = f"{explain} {100.0 * verdict.explained:.0f} % of it on held-out data"
-    return f"The gap is {probably}caused by {named}, {share}."
+    told = f"The gap is {probably}caused by {named}"
+    if shrunk["fraction"] is None:
+        return f"{told}."
+    gone, alone = (f"{100.0 * share:.0f} %" for share in (shrunk["fraction"], shrunk["calibration_fraction"]))
+    return f"{told}; with the calibration {gone} of it is gone on held-out data, {alone} with the calibration alone."
 
 
 def _sure(causes: Sequence[Mapping[str, Any]]) -> bool:

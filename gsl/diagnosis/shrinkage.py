@@ -36,6 +36,7 @@ def shrinkage(found: Findings, before: np.ndarray, after: np.ndarray) -> dict[st
         "floor": 1.0,
         **{key: float(np.sqrt(value.mean())) for key, value in mean.items()},
         "fraction": fraction,
+        "calibration_fraction": removed(exp, z["before"], z["calibration"])[0],
         "low": low,
         "high": high,
         "ceiling_fraction": ceiling(exp, before, seed=found.seed),
