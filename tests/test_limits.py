@@ -11,8 +11,10 @@ import pytest
 from test_diagnosis import QUICK, arm, found, log
 
 from gsl.core.plant import nominal
+from gsl.diagnosis.deviations import far_off
 from gsl.diagnosis.diagnose import diagnosed
 from gsl.diagnosis.limits import Limit, limits
+from gsl.diagnosis.nuisance import INERTIA, bounded
 from gsl.diagnosis.shrinkage import unexplained
 from gsl.report.diagnosis_limits import limits_sentence
 
@@ -72,6 +74,16 @@ def test_a_sentence_tells_the_tightest() -> None:
     )
     assert str(limits_sentence({"limits": rows, "causes": [{}]})).startswith("If these causes are right, all joints")
     assert limits_sentence({"limits": []}) is None
+
+
+def test_a_rotor_that_is_as_light_as_it_can_be_is_far_off() -> None:
+    result = found({})
+    fit = result.answer.fit
+    light = bounded(np.where(np.arange(7)[:, None] == INERTIA, -99.0, 0.0) * np.array([1.0, 0.0]))
+    answer = replace(result.selection.none, fit=replace(fit, nuisances=light))
+    selection = replace(result.selection, none=answer, chosen=answer)
+    assert far_off(replace(result, selection=selection)) == ["shoulder (inertia)"]
+    assert far_off(result) == []
 
 
 def test_a_part_of_the_log_that_is_as_far_off_as_before_is_not_explained() -> None:

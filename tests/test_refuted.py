@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.fit import Fit
 from gsl.diagnosis.nuisance import none
 from gsl.diagnosis.refuted import refuted
-from gsl.diagnosis.select import _stands
+from gsl.diagnosis.select import Thresholds, _pruned, _stands
 
 
 def with_channels(batch: Batch, channels: Mapping[str, Any]) -> Batch:
@@ -93,3 +93,20 @@ def test_a_value_beyond_the_documented_range_is_no_cause() -> None:
     assert "command_latency" in result.refuted
     assert "command_latency" not in result.selection.chosen.names
     assert any("command_latency would explain much" in caveat for caveat in document(result)["caveats"])
+
+
+def test_what_is_dropped_leaves_the_others_within_their_ranges(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A smaller set beyond its ranges is a little cheaper; the one within them shows that an effect is superfluous."""
+    parts = (
+        claim("stribeck_friction", [0.2, 0.1], ("torque", "velocity")),
+        claim("load_friction", [0.2], ("coefficient",)),
+    )
+    stiction, load = (replace(one, costs=np.full(8, 30.0), counts=np.ones(8)) for one in parts)
+    beyond = replace(stiction, parameters=(np.array([0.5, 0.1]),), costs=np.full(8, 29.0))
+    both = replace(
+        load, candidates=stiction.candidates + load.candidates, parameters=stiction.parameters + load.parameters
+    )
+    nothing = replace(both, candidates=(), parameters=(), costs=np.full(8, 500.0))
+    fewer = iter([load, beyond])
+    monkeypatch.setattr("gsl.diagnosis.select._without", lambda *_: next(fewer))
+    assert _pruned(cast(Any, None), both, nothing, Thresholds(), []) is load

@@ -7,7 +7,7 @@ import numpy as np
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.diagnose import Findings
 
-FAR_OFF = 5.0  # spreads of the calibration beyond which it is told
+FAR_OFF = 5.0  # spreads of the calibration from which on it is told: what a rotor may be too light by, at most
 
 
 def far_off(found: Findings) -> list[str]:
@@ -18,7 +18,7 @@ def far_off(found: Findings) -> list[str]:
     return [
         f"{joint} ({_shift(row, fitted[row, k], exp.robot.torque_unit)})"
         for k, (joint, row) in enumerate(zip(exp.joints, off.argmax(axis=0), strict=True))
-        if off[row, k] > FAR_OFF
+        if off[row, k] >= FAR_OFF
     ]
 
 

@@ -19,7 +19,7 @@ from gsl.effects.effect import effect_class
 TOLD, LEAST = 0.5, 0.002  # shares of a documented range: a limit above says nothing, one below is not searched
 HALVINGS = 4  # to a factor of 1.4
 ROUNDS = 3
-CALIBRATED = {effect for effect, _ in ROWS} | {"armature"}
+CALIBRATED = {effect for effect, _ in ROWS} | {"armature"}  # whose row is of inertia units and shared with nothing
 CERTAIN = 1.96**2  # rise of a cost that an interval of 95 % holds, were windows independent
 
 
