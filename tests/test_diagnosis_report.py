@@ -20,7 +20,7 @@ from gsl.report.diagnosis_html import element, escaped, prose
 from gsl.report.diagnosis_next import steps
 from gsl.report.diagnosis_scatter import Pair, Span, scatter
 from gsl.report.diagnosis_text import summary_lines
-from gsl.report.diagnosis_verdict import cause_name, headline, where_sentence
+from gsl.report.diagnosis_verdict import cause_name, headline, places, where_sentence
 from gsl.report.diagnosis_words import between, interval, level, listed, probability, share, short, value
 
 DOCUMENTS: dict[str, Callable[[], dict[str, Any]]] = {
@@ -100,9 +100,10 @@ def test_a_cause_that_is_not_sure_is_called_probable() -> None:
 def test_the_first_screen_answers_everything() -> None:
     first = words(report_html(made.document())).split("Caveats")[0]
     assert "2 causes found: servo gain of LKneePitch and command latency of all joints" in first
-    assert "In 3 of 14 joints: LKneePitch 60 % of the excess (most when fast), LHipRoll 22 % and LHipPitch 8 %" in first
+    assert "In 3 of 14 joints: LKneePitch 60 % of the excess (most when fast, " in first
+    assert " ×), LHipRoll 22 % and LHipPitch 8 %. The others stay within the noise." in first
     assert "kp 0.57 (0.55 to 0.60)" in first and "delay 31.2 ms (29.0 to 33.5 ms)" in first
-    assert "97 % sure, explains 81 % of the gap (70 to 90 %)" in first
+    assert "97 % sure, 81 % of the gap comes back without it (70 to 90 %)" in first
     assert "From 3.20 × to 1.05 × the noise floor on held-out records: 98 % of the excess is gone (95 to 99 %)" in first
     assert "gsl collect task=excite policy.file=runs/worn/diagnose/next.json name=next" in first
 
@@ -302,16 +303,37 @@ def test_noise_is_told_in_mrad_and_where_it_comes_from() -> None:
 
 
 def test_calibration_is_told_without_a_minus_before_nothing() -> None:
-    row = {"joint": "Knee", "kp": 0.9951, "kd": 1.0, "coulomb": -2e-6, "viscous": 0.01234, "zero": -1e-6}
-    assert "Knee 0.995 1.000 0.0000 0.0123 0.00" in words(report_html({"calibration": [row]}))
+    row = {"joint": "Knee", "kp": 0.9951, "kd": 1.0, "coulomb": -2e-6, "viscous": 0.01234, "zero": -1e-6, "inertia": -5}
+    assert "Knee 0.995 1.000 0.0000 0.0123 0.00 −5.0" in words(report_html({"calibration": [row]}))
 
 
 def test_where_speaks_of_regimes_if_no_joint_stands_out_as_a_whole() -> None:
-    cell = {"joint": "Knee", "regime": "high_load", "share": 0.4, "named": True}
-    other = {"joint": "Hip", "regime": "all", "share": 0.01, "named": False}
-    assert where_sentence({"where": [cell, other]}).startswith(
-        "In 1 of 2 joints: Knee 40 % of the excess (most when under high load)"
+    cell = {"joint": "Knee", "regime": "high_load", "share": 0.4, "rms": 5.2, "named": True}
+    whole = {"joint": "Knee", "regime": "all", "share": 0.1, "rms": 1.1, "named": False}
+    hip = {"joint": "Hip", "regime": "all", "share": 0.01, "named": False}
+    told = where_sentence({"where": [cell, whole, hip]})
+    assert told == (
+        "No joint stands out as a whole. Within the noise but for some motions: Knee when under high load, 5.20 ×. "
+        "The others stay within the noise."
     )
+    beside = where_sentence({"where": [cell, whole, {**hip, "share": 0.6, "rms": 3.0, "named": True}]})
+    assert beside == (
+        "In 1 of 2 joints: Hip 60 % of the excess. Within the noise but for some motions: Knee when under high load, "
+        "5.20 ×."
+    )
+
+
+def test_a_place_is_told_with_the_figures_of_the_whole_joint() -> None:
+    cell = {"joint": "Knee", "regime": "fast", "share": 0.4, "rms": 5.2, "named": True}
+    whole = {"joint": "Knee", "regime": "all", "share": 0.1, "rms": 1.1, "named": False}
+    (place,) = places({"where": [cell, whole]})
+    assert (place.cell, place.when) == (whole, "fast, 5.20 ×")
+
+
+def test_an_explanation_that_costs_less_says_why_it_is_not_the_verdict() -> None:
+    one = {"effects": ["backlash"], "scopes": ["all"], "gain": {"value": 0.9}, "behind": -300.0}
+    told = words(report_html({"ranking": [{**one, "passed_over": "not surely better"}], "least_gain": 2800.0}))
+    assert "costs −300, passed over: not surely better" in told and "2,800 and more is a clear difference" in told
 
 
 def test_a_side_is_worse_only_where_it_is_more_than_noise_and_chance() -> None:

@@ -14,6 +14,7 @@ from commands import done
 
 from gsl.core.trajectory import Batch
 from gsl.stages.logs import read_logs
+from gsl.storage.importers.suspicions import STUCK, saturated
 from gsl.storage.trajectories import read
 
 JOINTS = ("shoulder", "elbow")
@@ -326,3 +327,20 @@ def test_the_pendulum_says_what_hung_on_it(tmp_path: Path) -> None:
     assert labels[0].items() >= {"mass": 0.49, "length": 0.1, "vin": 7.4, "trajectory": "sin_sin"}.items()
     off = next(one for one, label in zip(batch.episodes, labels, strict=True) if label["trajectory"] == "lift_and_drop")
     assert 0.0 < np.mean(off.sensors["enabled"]) < 1.0 and off.sensors["voltage"].min() > 5.0
+
+
+CLOCK = 0.02 * np.arange(1000)
+SWING = 0.5 * np.sin(CLOCK)
+HELD = np.minimum(CLOCK, 0.5) - np.clip(CLOCK - 18.0, 0.0, 0.5)
+STEPS = np.repeat([0.0, 0.3, 0.4, 0.5, 0.2], 200)
+
+
+@pytest.mark.parametrize(
+    ("command", "stop", "is_at_it"),
+    [(SWING, 0.3, True), (SWING, 1.0, False), (HELD, 1.0, False), (STEPS, 0.3, True), (STEPS, 1.0, False)],
+)
+def test_a_joint_that_rests_where_its_command_rests_is_at_no_stop(
+    command: np.ndarray, stop: float, is_at_it: bool
+) -> None:
+    position = np.minimum(np.concatenate([np.zeros(4), command[:-4]]), stop)
+    assert (saturated(position, command) > STUCK) == is_at_it

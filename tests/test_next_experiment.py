@@ -142,6 +142,14 @@ def test_a_log_that_shows_all_that_a_motion_can_leaves_nothing_to_play() -> None
     assert found.verdict.word == "no_gap" and next_experiment(found, dishes()) is None
 
 
+def test_nobody_is_sent_to_the_ends_of_all_joints_for_a_stop_that_nothing_hints_at() -> None:
+    alone = played({}, whole(), without=but("command_latency", "joint_limit"))
+    assert hidden(alone) == []
+    assert next_experiment(alone, dishes()) is None
+    besides = played({}, swings(0.01, 0.3, 0.5), without=but("torque_limit", "joint_limit"))
+    assert {one.names[0] for one in hidden(besides)} == {"torque_limit", "joint_limit"}
+
+
 def test_what_is_alike_in_the_air_by_nature_wants_feet_on_the_ground() -> None:
     found = played({"zero_offset": {"offset": 0.03}}, whole(), without=but("zero_offset", "sensor_bias"))
     wanted = next_experiment(found, dishes())

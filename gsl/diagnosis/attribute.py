@@ -57,6 +57,11 @@ class Hypothesis:
         return tuple(candidate.effect for candidate in self.candidates)
 
     @property
+    def places(self) -> frozenset[tuple[str, str]]:
+        """Its effects and where each acts."""
+        return frozenset((candidate.effect, candidate.scope) for candidate in self.candidates)
+
+    @property
     def claims_its_names(self) -> bool:
         """Whether all parameters are inside their documented ranges, as far as a fit can tell."""
         return all(one.claims_its_name(values) for one, values in zip(self.candidates, self.parameters, strict=True))

@@ -18,6 +18,7 @@ from gsl.diagnosis.diagnose import NOISE_COST, Findings
 from gsl.diagnosis.droop import Droop, droops
 from gsl.diagnosis.localise import cells, horizon, regimes, sides
 from gsl.diagnosis.records import FEW
+from gsl.diagnosis.select import passed_over
 from gsl.diagnosis.shrinkage import shrinkage, unexplained
 from gsl.diagnosis.verdict import Cause
 from gsl.effects.effect import effect_class
@@ -58,6 +59,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "sides": sides(exp, z),
         "shrinkage": shrunk,
         "ranking": _ranking(found),
+        "least_gain": found.selection.least,
         "calibration": _calibration(exp.joints, answer.fit.nuisances[:, : len(exp.joints)], exp.robot.torque_unit),
         "floor": {
             "source": exp.noise.source,
@@ -117,7 +119,7 @@ def _ranking(found: Findings) -> list[dict[str, Any]]:
     none, rows = found.selection.none, []
     best: dict[frozenset[tuple[str, str]], Hypothesis] = {}
     for one in found.selection.tried:
-        best.setdefault(frozenset((candidate.effect, candidate.scope) for candidate in one.candidates), one)
+        best.setdefault(one.places, one)
     for one in [*best.values()][:RANKED]:
         value, low, high = share(one, none, none, NOISE_COST)
         rows.append(
@@ -128,6 +130,7 @@ def _ranking(found: Findings) -> list[dict[str, Any]]:
                 "gain": {"value": value, "low": low, "high": high},
                 "level": one.level,
                 "behind": one.cost - found.selection.chosen.cost,
+                "passed_over": passed_over(one, found.selection.chosen),
             }
         )
     return rows
@@ -150,8 +153,9 @@ def _calibration(joints: Sequence[str], nuisances: np.ndarray, torque_unit: floa
             "coulomb": torque_unit * float(coulomb),
             "viscous": torque_unit * float(viscous),
             "zero": float(zero + offset),
+            "inertia": float(inertia),
         }
-        for joint, (kp, kd, coulomb, zero, offset, _, viscous) in zip(joints, nuisances.T, strict=True)
+        for joint, (kp, kd, coulomb, zero, offset, inertia, viscous) in zip(joints, nuisances.T, strict=True)
     ]
 
 

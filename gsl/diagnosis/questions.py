@@ -18,6 +18,7 @@ from gsl.diagnosis.verdict import ALIKE
 NOTHING = "no effect"
 STRENGTH = 0.5  # share of the way to the end of its range at which an effect should be seen
 SHOWN = 30.0  # log-odds from which a log shows an effect of that strength: two a joint of a NAO
+AT_THE_ENDS = "joint_limit"  # shows where joints come to their stops, and nowhere else
 LIKE_DRY = "load_friction"  # and Coulomb friction of each joint's own are one under a single load
 DRY = (0.0, 0.03, 0.1, 0.22, 0.45)  # Coulomb friction that is tried in its place [N·m]
 LOOSE = 10.0  # how much freer the calibration is beside it
@@ -76,7 +77,10 @@ def _explanation(one: Hypothesis, joints: int) -> Explanation:
 
 
 def hidden(found: Findings) -> list[Question]:
-    """Return the effects that the log does not show at half their documented strength, each against its absence."""
+    """Return the effects that the log does not show at half their documented strength, each against its absence.
+
+    A stop alone is no question: to drive a robot to the ends of all its joints takes a reason.
+    """
     chosen = _explanation(found.selection.chosen, len(found.experiment.joints))
     nothing, dry = (NOTHING, (chosen,), 1.0), ("coulomb_friction", _dry(chosen), LOOSE)
     seen = _seen_in(found)
@@ -89,7 +93,8 @@ def hidden(found: Findings) -> list[Question]:
             question = Question((candidate.effect, name), truth, absent, loose)
             questions.setdefault(candidate.effect, question)
             shown |= {candidate.effect} if seen(question) else set()
-    return [question for name, question in questions.items() if name not in shown]
+    left = [question for name, question in questions.items() if name not in shown]
+    return left if any(one.names[0] != AT_THE_ENDS for one in left) else []
 
 
 def _seen_in(found: Findings) -> Callable[[Question], bool]:

@@ -47,12 +47,14 @@ class Selection:
         chosen: The hypothesis that stands, maybe `none`.
         tried: All hypotheses, best first, `none` among them.
         screening: The first one; a diagnosis asks once more what is invisible, on top of the chosen hypothesis.
+        least: What an effect has to gain in cost here, to be more than chance.
     """
 
     none: Hypothesis
     chosen: Hypothesis
     tried: tuple[Hypothesis, ...]
     screening: Screening
+    least: float = 0.0
 
     @property
     def gain(self) -> Gain:
@@ -95,7 +97,19 @@ def selected(
         chosen = _split(arena, chosen, none, thresholds, tried)
         if thresholds.share:
             chosen = _challenged(arena, chosen, none, tried)
-    return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening)
+    return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening, least)
+
+
+def passed_over(one: Hypothesis, chosen: Hypothesis) -> str | None:
+    """Return why a hypothesis that costs less than the chosen one is not the answer, None if it costs no less."""
+    if one.cost >= chosen.cost or one.places == chosen.places:
+        return None
+    if not one.claims_its_names:
+        return "a value beyond its documented range"
+    if gain(one, chosen).low <= 0.0:
+        return "not surely better"
+    more = len(one.candidates) > len(chosen.candidates)
+    return "gains too little for another effect" if more else "no surer than fewer effects"
 
 
 def _stands(one: Hypothesis, other: Hypothesis, least: float, flaw: float) -> bool:
@@ -174,6 +188,7 @@ def _split(
         one = arena.fitted(candidates, np.concatenate(values), chosen.fit.nuisances, every=1)
         tried.append(one)
         if _stands(one, chosen, *_bar(thresholds, chosen, none)):
+            tried += [_without(arena, one, index) for index in range(k, k + len(apart))]  # what each is good for
             return one
     return chosen
 

@@ -19,6 +19,7 @@ WHOLE = 0.9  # share of the excess from which on causes are all there is
 FOREIGN, EXPLAINED = 1.12, 0.85  # remaining cost, and share explained, beyond which nothing of the library is the cause
 LOCAL = 1.5  # and remaining cost of one joint
 KNOWN_SOFT = 0.15
+UNRIVALLED = 0.9  # probability of an effect in whose place no other was tried
 LONE = 0.8  # factor on probabilities where parts of one motion were held out: they share what is particular to it
 
 
@@ -30,7 +31,7 @@ class Cause:
         index: Its place there.
         probability: That it is this effect.
         rival: The effect that comes nearest in its place, if any.
-        value, low, high: Share of the excess that is gone with it, with 95 % interval.
+        value, low, high: Share of the excess that comes back without it, with 95 % interval.
     """
 
     index: int
@@ -100,8 +101,8 @@ def judged(
     alike = () if walking else ALIKE
     groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in alike if twins & set(chosen.names)]
     for cause in causes:
-        if cause.rival is not None and cause.probability < SEPARATED:
-            groups.append((chosen.names[cause.index], cause.rival))
+        if cause.rival not in (None, chosen.names[cause.index]) and cause.probability < SEPARATED:
+            groups.append((chosen.names[cause.index], str(cause.rival)))
     unique = tuple(dict.fromkeys(tuple(sorted(set(group))) for group in groups))
     sure = known * (LONE if lone else 1.0)
     scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
@@ -117,15 +118,22 @@ def _known(explained: float, strange: float) -> float:
 
 
 def _cause(found: Selection, k: int, expected: float, spreads: dict[str, float], doubt: float) -> Cause:
-    chosen, effect = found.chosen, found.chosen.names[k]
-    rivals = [one for one in found.tried if len(one.candidates) <= len(chosen.candidates) and effect not in one.names]
+    chosen = found.chosen
+    rivals = [one for one in found.tried if len(one.candidates) <= len(chosen.candidates) and _lacks(one, chosen, k)]
     fewer = min((one for one in rivals if len(one.candidates) < len(chosen.candidates)), key=_cost, default=found.none)
     value, low, high = (max(0.0, x) for x in share(chosen, fewer, found.none, expected))
     best = min((one for one in rivals if len(one.candidates) == len(chosen.candidates)), key=_cost, default=None)
     if best is None:
-        return Cause(k, 0.99, None, value, low, high)
+        return Cause(k, UNRIVALLED, None, value, low, high)
     other = next((name for name in best.names if name not in chosen.names), best.names[-1])
     return Cause(k, _ahead(best, chosen, max(spreads.get(other, 0.0), doubt * chosen.cost)), other, value, low, high)
+
+
+def _lacks(one: Hypothesis, chosen: Hypothesis, k: int) -> bool:
+    """Whether a hypothesis has not the chosen one's k-th effect; the same elsewhere it may have if that one has it."""
+    effect = chosen.candidates[k].effect
+    beside = [(other.effect, other.fixed) for index, other in enumerate(chosen.candidates) if index != k]
+    return all(own.effect != effect or (own.effect, own.fixed) in beside for own in one.candidates)
 
 
 def _ahead(rival: Hypothesis, chosen: Hypothesis, spread: float) -> float:

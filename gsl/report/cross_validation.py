@@ -12,6 +12,7 @@ from gsl.core.statistics import Interval, bootstrap_interval
 from gsl.report.markdown import table as markdown
 
 AS_IT_WAS, CALIBRATED, DIAGNOSED = "as it was", "calibrated", "diagnosed"
+SAID = {"unknown": " (suspected)", "inseparable": " (or another that the log cannot tell apart)"}
 GAT, DIAGNOSED_GAT = "GAT", "diagnosed + GAT"
 
 
@@ -67,7 +68,7 @@ def table(folds: Sequence[Fold], by: str) -> str:
             *(_mean(one.replayed[way]) for way in ways),
             _percent(one.removed),
             _percent(one.ceiling),
-            f"{', '.join(one.causes) or '-'}{' (suspected)' if one.verdict == 'unknown' else ''}",
+            f"{', '.join(one.causes) or '-'}{SAID.get(one.verdict, '')}",
         )
         for one in folds
     ]

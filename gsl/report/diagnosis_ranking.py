@@ -32,7 +32,7 @@ SHOWN = 12
 def causes(document: Document) -> Html | None:
     """Return every fitted parameter of the causes as it stands in the corrected simulator."""
     rows = [row for cause in entries(document, "causes") for row in _parameters(cause)]
-    columns = ("cause", "parameter", "value", "95 % interval", "in the file", "sure", "explains")
+    columns = ("cause", "parameter", "value", "95 % interval", "in the file", "sure", "back without it")
     return section("The causes in numbers", table(columns, rows) if rows else None)
 
 
@@ -52,6 +52,7 @@ def _parameters(cause: Document) -> list[tuple[Part, ...]]:
 def ranking(document: Document) -> Html | None:
     """Return the hypotheses with what each explains, as dots with whiskers."""
     found = entries(document, "ranking")
+    least = finite(document.get("least_gain")) or 20.0
     shares = all(abs(finite(part(one, "gain").get("value")) or 0.0) <= 1.5 for one in found)
     form = share if shares else short
     chosen = [(cause.get("effect"), said(cause, "scope")) for cause in entries(document, "causes")]
@@ -59,8 +60,9 @@ def ranking(document: Document) -> Html | None:
     measure = "the share of the gap that it explains" if shares else "the cost that it saves"
     note = (
         f"Each was fitted on some records and judged on others. Shown: {measure}, with its 95 % interval (left of the "
-        "line it makes things worse), and how much more it costs than the verdict, which is in colour: 20 and more is "
-        "a clear difference, a few are none."
+        "line it makes things worse), and how much more it costs than the verdict, which is in colour: "
+        f"{least:,.0f} and more is a clear difference here, where chance gains less. One that costs less and is not "
+        "the verdict says why."
     )
     rest = f"{len(found) - SHOWN} more did worse." if len(found) > SHOWN else None
     return section(
@@ -76,7 +78,8 @@ def _dot(one: Document, form: Callable[[Any], str], *, chosen: bool) -> Dot:
     bounds = between(gain, form)
     told = [f"{form(gain.get('value'))}{f' ({bounds})' if bounds else ''}"]
     behind = finite(one.get("behind"))
-    told += [] if behind is None or chosen else [f"costs {behind:+,.0f}"]
+    told += [] if behind is None or chosen else [f"costs {behind:+,.0f}".replace("-", "−")]
+    told += [f"passed over: {one['passed_over']}"] if one.get("passed_over") else []
     told += [f"best: {probability(one['probability'])}"] if finite(one.get("probability")) is not None else []
     value, low, high = (finite(gain.get(key)) for key in ("value", "low", "high"))
     return Dot(_label(one), value, low, high, prose(", ".join(told)), "after" if chosen else "other")

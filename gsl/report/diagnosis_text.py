@@ -55,7 +55,7 @@ def _causes(document: Document) -> Told:
         alike = [("either", alternatives(group)) for group in entries(document, "inseparable")]
         alike += [("nearest", nearest(document))] if nearest(document) else []
         return Told(headline(document), ("", ""), [*alike, *_shrinkage(document)], summary)
-    columns = ("cause", "parameter", "value", "95 % interval", "probability", "explains")
+    columns = ("cause", "parameter", "value", "95 % interval", "probability", "back without it")
     caption = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
     more = [f"and {len(rows) - CAUSES} more, in the report"] if len(rows) > CAUSES else []
     told = "\n".join([*more, *filter(None, [summary]), *caption])

@@ -85,14 +85,14 @@ def alternatives(group: Sequence[str]) -> str:
 
 
 def sureness(cause: Document) -> str:
-    """Return how sure a cause is and what it explains."""
+    """Return how sure a cause is and how much of the gap comes back without it."""
     gain = part(cause, "gain")
     told = []
     if finite(cause.get("probability")) is not None:
         told.append(f"{probability(cause['probability'])} sure")
     if finite(gain.get("value")) is not None:
         bounds = between(gain, share)
-        told.append(f"explains {share(gain['value'])} of the gap" + (f" ({bounds})" if bounds else ""))
+        told.append(f"{share(gain['value'])} of the gap comes back without it" + (f" ({bounds})" if bounds else ""))
     return ", ".join(told)
 
 
@@ -101,8 +101,8 @@ class Place(NamedTuple):
 
     Attributes:
         joint: Its name.
-        cell: As a whole, if that stands out, else its worst regime.
-        when: Its worst regime in words, nothing if there is none.
+        cell: As a whole, also where only a regime of it stands out.
+        when: Its worst regime in words, with its multiple of the noise; nothing if there is none.
     """
 
     joint: str
@@ -111,16 +111,17 @@ class Place(NamedTuple):
 
 
 def places(document: Document) -> list[Place]:
-    """Return the joints that stand out of the noise, worst first."""
-    named = [cell for cell in entries(document, "where") if cell.get("named")]
-    ordered = sorted(named, key=lambda cell: -(finite(cell.get("share")) or 0.0))
+    """Return the joints that stand out of the noise, as a whole or in some regime, worst first."""
+    cells = sorted(entries(document, "where"), key=lambda cell: -(finite(cell.get("share")) or 0.0))
     found = []
-    for joint in dict.fromkeys(said(cell, "joint") for cell in ordered):
-        own = [cell for cell in ordered if said(cell, "joint") == joint]
-        parts = [cell for cell in own if cell.get("regime") != "all"]
+    for joint in dict.fromkeys(said(cell, "joint") for cell in cells):
+        own = [cell for cell in cells if said(cell, "joint") == joint]
         whole = next((cell for cell in own if cell.get("regime") == "all"), own[0])
-        found.append(Place(joint, whole, regime(said(parts[0], "regime")) if parts else ""))
-    return found
+        named = [cell for cell in own if cell.get("named")]
+        worst = next((cell for cell in named if cell is not whole), None)
+        when = f"{regime(said(worst, 'regime'))}, {level(worst.get('rms'))}" if worst else ""
+        found += [Place(joint, whole, when)] if named else []
+    return sorted(found, key=lambda place: -(finite(place.cell.get("share")) or 0.0))
 
 
 def where_sentence(document: Document) -> str:
@@ -129,11 +130,16 @@ def where_sentence(document: Document) -> str:
     if not found:
         return "No joint stands out of the noise."
     of = len({said(cell, "joint") for cell in entries(document, "where")})
-    first, *others = (f"{place.joint} {share(place.cell.get('share'))}" for place in found)
-    when = f" (most when {found[0].when})" if found[0].when else ""
+    whole = [place for place in found if place.cell.get("named")]
+    parts = [f"{place.joint} when {place.when}" for place in found if place not in whole]
     within = " The others stay within the noise." if of > len(found) else ""
-    count = f"In {len(found)} of {of} joints: " if of > 1 else ""
-    return f"{count}{listed([f'{first} of the excess{when}', *others])}.{within}"
+    only = f" Within the noise but for some motions: {listed(parts)}." if parts else ""
+    if not whole:
+        return f"No joint stands out as a whole.{only}{within}"
+    first, *others = (f"{place.joint} {share(place.cell.get('share'))}" for place in whole)
+    when = f" (most when {whole[0].when})" if whole[0].when else ""
+    count = f"In {len(whole)} of {of} joints: " if of > 1 else ""
+    return f"{count}{listed([f'{first} of the excess{when}', *others])}.{only}{within}"
 
 
 def shrinkage_sentence(document: Document) -> str:

@@ -21,7 +21,7 @@ the difference; the rest is friction of the gears under load, .29 to .30 of it i
 load_friction. Without that the arm is too strong where it stalls, at errors beyond .38 rad.
 
 Without the integral term gravity droop stays. D is left out: the register's scale is not published, and kd / kp alone
-is a lag of 80 ms; the logs' at slow speed is 60 to 97 ms.
+is a lag of 80 ms; that of the logs' quick motions is 61 to 134 ms by correlation (`gsl import --check`).
 
 Sources:
     A  TheRobotStudio/SO-ARM100, Simulation/SO101/so101_new_calib.urdf (Apache-2.0): links, joints, limits. Masses are
@@ -87,7 +87,7 @@ _JOINTS = (
 )  # fmt: skip
 
 RANGES = {  # where they differ from those of a NAO's class
-    "command_latency": {"delay": (0.0, 0.15)},  # E: 85 to 120 ms of lag in all
+    "command_latency": {"delay": (0.0, 0.15)},  # E: 61 to 134 ms of lag in all
     "target_smoothing": {"time_constant": (0.0, 0.12)},  # E: smoothing in the firmware
     "backlash": {"width": (0.0, 0.05)},  # C and robonine.com: .015 to .023, loaded .031 to .045
     "viscous_friction": {"coefficient": (0.0, 0.6)},  # B: the whole damping is .94 to 1.8

@@ -1,0 +1,70 @@
+"""What a selection allows to say: how sure each cause is, what comes back without it, why others were passed over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from test_refuted import claim
+
+from gsl.diagnosis.attribute import Hypothesis
+from gsl.diagnosis.select import Selection, passed_over
+from gsl.diagnosis.verdict import UNRIVALLED, judged
+
+PER_SAMPLE = np.full(8, 100.0)
+EMPTY = claim("coulomb_friction", [0.1], ("torque",))
+NONE = replace(EMPTY, candidates=(), parameters=(), costs=np.full(8, 1100.0), counts=PER_SAMPLE)
+
+
+def friction(joints: str, cost: float) -> Hypothesis:
+    one = claim("coulomb_friction", [0.1], ("torque",))
+    return replace(one, candidates=(one.candidates[0].on(joints),), costs=np.full(8, cost), counts=PER_SAMPLE)
+
+
+def with_both(one: Hypothesis, other: Hypothesis, cost: float) -> Hypothesis:
+    parts = {"candidates": one.candidates + other.candidates, "parameters": one.parameters + other.parameters}
+    return replace(one, costs=np.full(8, cost), **cast(Any, parts))
+
+
+def selection(chosen: Hypothesis, *others: Hypothesis) -> Selection:
+    return Selection(NONE, chosen, tuple(sorted([NONE, chosen, *others], key=lambda one: one.cost)), cast(Any, None))
+
+
+def test_two_causes_of_one_effect_are_each_judged_against_the_other_alone() -> None:
+    shoulder, elbow = friction("shoulder", 300.0), friction("elbow", 900.0)
+    found = judged(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, friction("all", 200.0)), 1.0)
+    first, second = found.causes
+    assert first.value == pytest.approx(0.8)  # elbow alone leaves 800 of 1000
+    assert second.value == pytest.approx(0.2)
+    assert found.word == "causes"
+
+
+def test_a_cause_in_whose_place_no_other_was_tried_is_not_certain() -> None:
+    shoulder, elbow = friction("shoulder", 300.0), friction("elbow", 900.0)
+    alone = judged(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow), 1.0)
+    assert [one.rival for one in alone.causes] == [None, None]
+    assert max(one.probability for one in alone.causes) <= UNRIVALLED
+    load = replace(claim("load_friction", [0.2], ("coefficient",)), costs=np.full(8, 900.0), counts=PER_SAMPLE)
+    rivals = with_both(shoulder, load, 200.0), with_both(elbow, load, 200.0)
+    tried = judged(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, *rivals), 1.0)
+    assert [one.rival for one in tried.causes] == ["load_friction", "load_friction"]
+    assert min(one.probability for one in tried.causes) > UNRIVALLED
+
+
+@pytest.mark.parametrize(
+    ("costs", "torque", "why"),
+    [
+        (np.full(8, 110.0), 0.1, None),
+        (np.full(8, 90.0), 0.1, "gains too little for another effect"),
+        (np.array([0.0] * 4 + [150.0] * 4), 0.1, "not surely better"),
+        (np.full(8, 50.0), 50.0, "a value beyond its documented range"),
+    ],
+)
+def test_what_costs_less_and_is_not_chosen_has_a_reason(costs: np.ndarray, torque: float, why: str | None) -> None:
+    chosen = friction("shoulder", 100.0)
+    more = with_both(chosen, friction("elbow", 900.0), 0.0)
+    more = replace(more, costs=costs, parameters=(*chosen.parameters, np.array([torque])))
+    assert passed_over(more, chosen) == why
+    assert passed_over(friction("shoulder", 90.0), chosen) is None  # the same, fitted otherwise
