@@ -36,8 +36,8 @@ def test_two_causes_of_one_effect_are_each_judged_against_the_other_alone() -> N
     shoulder, elbow = friction("shoulder", 300.0), friction("elbow", 900.0)
     found = judged(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, friction("all", 200.0)), 1.0)
     first, second = found.causes
-    assert first.value == pytest.approx(0.8)  # elbow alone leaves 800 of 1000
-    assert second.value == pytest.approx(0.2)
+    assert first.value == pytest.approx(800 / 1004)  # elbow alone leaves 900 of 1100, of which 96 are noise
+    assert second.value == pytest.approx(200 / 1004)
     assert found.word == "causes"
 
 

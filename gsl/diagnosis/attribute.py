@@ -19,6 +19,7 @@ from gsl.diagnosis.residual import loss
 from gsl.diagnosis.screen import Ground, Screening, best_of, screened
 from gsl.diagnosis.shared import shares
 
+NOISE_COST = 0.96  # robust cost of a residual that is noise and nothing else
 WIDTH = 8  # leads that are fitted after a screening
 BEAM = 2  # sets of effects that are continued
 ROUNDS = 4

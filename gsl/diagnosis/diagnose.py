@@ -12,7 +12,7 @@ from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.arena import LATENCY, arena_of, looked_at
-from gsl.diagnosis.attribute import BEAM, Arena, Hypothesis
+from gsl.diagnosis.attribute import BEAM, NOISE_COST, Arena, Hypothesis
 from gsl.diagnosis.experiment import Experiment, experiment
 from gsl.diagnosis.on_ground import Walking, model_error
 from gsl.diagnosis.options import Options
@@ -26,7 +26,6 @@ from gsl.effects.effect import applied, built
 from gsl.errors import InputError
 from gsl.worlds.fits import fitting_step
 
-NOISE_COST = 0.96  # robust cost of a residual that is noise and nothing else
 GAIN, CHANCE = 20.0, 1.3  # least gain of an effect, and how far above the best gain of chance it has to be
 RIVALS = 3  # hypotheses that duel, at most
 ON_FOOT = 0.1  # share of the cost that chance gains on the ground, where no log can be simulated: measured on walks

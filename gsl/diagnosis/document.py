@@ -11,10 +11,10 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.setting import settings_of
 from gsl.diagnosis import nuisance
-from gsl.diagnosis.attribute import Hypothesis, share
+from gsl.diagnosis.attribute import NOISE_COST, Hypothesis, share
 from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.deviations import far_off
-from gsl.diagnosis.diagnose import NOISE_COST, Findings
+from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.droop import Droop, droops
 from gsl.diagnosis.localise import cells, horizon, regimes, sides
 from gsl.diagnosis.records import FEW

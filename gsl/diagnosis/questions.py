@@ -52,9 +52,9 @@ def rivals(found: Findings) -> list[Question]:
     if found.verdict.word == "unknown":
         near = [one for one in tried if one.candidates]
         other = next((one for one in near[1:] if set(one.names) != set(near[0].names)), None)
-        return [] if other is None else [_question(near[0], other, joints)]
+        return [] if other is None else [question(near[0], other, joints)]
     pairs = [group for group in found.verdict.inseparable if set(group) not in ALIKE]
-    return [_question(chosen, other, joints) for pair in pairs if (other := _rival(chosen, pair, tried)) is not None]
+    return [question(chosen, other, joints) for pair in pairs if (other := _rival(chosen, pair, tried)) is not None]
 
 
 def _rival(chosen: Hypothesis, pair: Sequence[str], tried: Sequence[Hypothesis]) -> Hypothesis | None:
@@ -65,7 +65,8 @@ def _rival(chosen: Hypothesis, pair: Sequence[str], tried: Sequence[Hypothesis])
     return min(fits, key=lambda one: (len(one.candidates) != len(chosen.candidates), one.cost), default=None)
 
 
-def _question(first: Hypothesis, other: Hypothesis, joints: int) -> Question:
+def question(first: Hypothesis, other: Hypothesis, joints: int) -> Question:
+    """Return whether one hypothesis or another one, in what they differ by."""
     apart = [[name for name in a.names if name not in b.names] for a, b in ((first, other), (other, first))]
     names = apart[0][0] if apart[0] else NOTHING, apart[1][0] if apart[1] else NOTHING
     return Question(names, _explanation(first, joints), (_explanation(other, joints),))
@@ -79,12 +80,12 @@ def _explanation(one: Hypothesis, joints: int) -> Explanation:
 def hidden(found: Findings) -> list[Question]:
     """Return the effects that the log does not show at half their documented strength, each against its absence.
 
-    A stop alone is no question: to drive a robot to the ends of all its joints takes a reason.
+    A stop is no such question: to drive a robot to the ends of all its joints takes a suspicion.
     """
     chosen = _explanation(found.selection.chosen, len(found.experiment.joints))
     nothing, dry = (NOTHING, (chosen,), 1.0), ("coulomb_friction", _dry(chosen), LOOSE)
     seen = _seen_in(found)
-    shown = set(found.selection.chosen.names)
+    shown = {*found.selection.chosen.names, AT_THE_ENDS}
     questions: dict[str, Question] = {}
     for candidate in found.arena.library:
         if candidate.effect not in shown:
@@ -93,8 +94,7 @@ def hidden(found: Findings) -> list[Question]:
             question = Question((candidate.effect, name), truth, absent, loose)
             questions.setdefault(candidate.effect, question)
             shown |= {candidate.effect} if seen(question) else set()
-    left = [question for name, question in questions.items() if name not in shown]
-    return left if any(one.names[0] != AT_THE_ENDS for one in left) else []
+    return [question for name, question in questions.items() if name not in shown]
 
 
 def _seen_in(found: Findings) -> Callable[[Question], bool]:

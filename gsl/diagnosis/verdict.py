@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gsl.diagnosis.attribute import Hypothesis, gain, share
+from gsl.diagnosis.attribute import NOISE_COST, Hypothesis, gain, share
 from gsl.diagnosis.select import Selection
 from gsl.effects.effect import TWINS
 
@@ -96,7 +96,7 @@ def judged(
     if not chosen.candidates:
         return Verdict("unknown" if strange > 1.0 else "no_gap", (), (), 0.0, remaining, 1.0)
     spreads = dict(margins)
-    causes = tuple(_cause(found, k, expected, spreads, doubt) for k in range(len(chosen.candidates)))
+    causes = tuple(_cause(found, k, min(expected, NOISE_COST), spreads, doubt) for k in range(len(chosen.candidates)))
     known = _known(explained, float(strange))
     alike = () if walking else ALIKE
     groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in alike if twins & set(chosen.names)]
@@ -117,11 +117,11 @@ def _known(explained: float, strange: float) -> float:
     return float(1.0 / (1.0 + np.exp(min(missing, unexplained) / KNOWN_SOFT)))
 
 
-def _cause(found: Selection, k: int, expected: float, spreads: dict[str, float], doubt: float) -> Cause:
+def _cause(found: Selection, k: int, noise: float, spreads: dict[str, float], doubt: float) -> Cause:
     chosen = found.chosen
     rivals = [one for one in found.tried if len(one.candidates) <= len(chosen.candidates) and _lacks(one, chosen, k)]
     fewer = min((one for one in rivals if len(one.candidates) < len(chosen.candidates)), key=_cost, default=found.none)
-    value, low, high = (max(0.0, x) for x in share(chosen, fewer, found.none, expected))
+    value, low, high = (max(0.0, x) for x in share(chosen, fewer, found.none, noise))
     best = min((one for one in rivals if len(one.candidates) == len(chosen.candidates)), key=_cost, default=None)
     if best is None:
         return Cause(k, UNRIVALLED, None, value, low, high)
