@@ -21,7 +21,7 @@ WEIGHT, LOADED, OTHERS = "link_mass", "load_friction", ("coulomb_friction", "str
 WEIGHTS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)  # that one has at hand [kg]
 HOLDS = 0.5  # share of a motor's torque that gravity may take with it
 LIGHT = 0.05  # share of the moving mass below which a link (a finger, a cover) is no place for it
-LONG = 40.0  # of the log, that is rehearsed [s]
+LONG = 200.0  # of the log, that is rehearsed [s]
 BETTER = 2.0  # times the log-odds of a mere repeat, from which on it is worth the trouble
 
 
