@@ -17,7 +17,7 @@ from gsl.diagnosis.rehearsal import Rehearsal
 
 ENOUGH = 30.0  # log-odds with which a question is answered: what comes on top decides only between equals
 WORTH = 3.0  # log-odds below which a motion is not worth playing
-CERTAIN = 100.0  # log-odds beyond which their size says nothing any more
+CERTAIN = 100.0  # log-odds, and times as many, beyond which their size says nothing any more
 LISTED = 4  # effects that a sentence names
 PAIR = ("zero_offset", "gravity_droop")
 ON_GROUND = "any motion with the feet on the ground"
@@ -104,9 +104,10 @@ def _ladder(unsure: tuple[Droop, ...], found: Findings) -> NextExperiment:
 
 def _loaded(weight: Payload) -> NextExperiment:
     played = f"the same motions with {weight.mass:g} kg on {weight.link}"
+    better = f"{weight.better:.0f}" if weight.better < CERTAIN else f"over {CERTAIN:.0f}"
     why = (
         f"Loads tell {LOADED} from {weight.rival}, and those of this log are the robot's own. {played.capitalize()}, "
-        f"beside those without, are expected to part the two by {weight.better:.0f} times the log-odds of a mere "
+        f"beside those without, are expected to part the two by {better} times the log-odds of a mere "
         "repeat, every joint calibrated anew."
     ).replace("_", " ")
     return NextExperiment(played, ((LOADED, weight.rival),), (), f"{why} Say so by the mapping's conditions: {WEIGHT}.")
