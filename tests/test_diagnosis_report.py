@@ -101,7 +101,7 @@ def test_the_first_screen_answers_everything() -> None:
     first = words(report_html(made.document())).split("Caveats")[0]
     assert "2 causes found: servo gain of LKneePitch and command latency of all joints" in first
     assert "In 3 of 14 joints: LKneePitch 60 % of the excess (most when fast, " in first
-    assert " ×), LHipRoll 22 % and LHipPitch 8 %. The others stay within the noise." in first
+    assert " ×), LHipRoll 22 % and LHipPitch 8 %. The others are not surely beyond the noise." in first
     assert "kp 0.57 (0.55 to 0.60)" in first and "delay 31.2 ms (29.0 to 33.5 ms)" in first
     assert "97 % sure, 81 % of the gap comes back without it (70 to 90 %)" in first
     assert "From 3.20 × to 1.05 × the noise floor on held-out records: 98 % of the excess is gone (95 to 99 %)" in first
@@ -303,8 +303,16 @@ def test_noise_is_told_in_mrad_and_where_it_comes_from() -> None:
 
 
 def test_calibration_is_told_without_a_minus_before_nothing() -> None:
-    row = {"joint": "Knee", "kp": 0.9951, "kd": 1.0, "coulomb": -2e-6, "viscous": 0.01234, "zero": -1e-6, "inertia": -5}
-    assert "Knee 0.995 1.000 0.0000 0.0123 0.00 −5.0" in words(report_html({"calibration": [row]}))
+    row = {
+        "joint": "Knee",
+        "kp": 0.9951,
+        "kd": 1.0,
+        "coulomb": -2e-6,
+        "viscous": 0.01234,
+        "zero": -1e-6,
+        "inertia": -5e-5,
+    }
+    assert "Knee 0.995 1.000 0.0000 0.0123 0.00 −0.05" in words(report_html({"calibration": [row]}))
 
 
 def test_where_speaks_of_regimes_if_no_joint_stands_out_as_a_whole() -> None:
@@ -313,12 +321,12 @@ def test_where_speaks_of_regimes_if_no_joint_stands_out_as_a_whole() -> None:
     hip = {"joint": "Hip", "regime": "all", "share": 0.01, "named": False}
     told = where_sentence({"where": [cell, whole, hip]})
     assert told == (
-        "No joint stands out as a whole. Within the noise but for some motions: Knee when under high load, 5.20 ×. "
-        "The others stay within the noise."
+        "No joint stands out as a whole. Surely beyond the noise only at times: Knee when under high load, 5.20 ×. "
+        "The others are not surely beyond the noise."
     )
     beside = where_sentence({"where": [cell, whole, {**hip, "share": 0.6, "rms": 3.0, "named": True}]})
     assert beside == (
-        "In 1 of 2 joints: Hip 60 % of the excess. Within the noise but for some motions: Knee when under high load, "
+        "In 1 of 2 joints: Hip 60 % of the excess. Surely beyond the noise only at times: Knee when under high load, "
         "5.20 ×."
     )
 
@@ -333,7 +341,7 @@ def test_a_place_is_told_with_the_figures_of_the_whole_joint() -> None:
 def test_an_explanation_that_costs_less_says_why_it_is_not_the_verdict() -> None:
     one = {"effects": ["backlash"], "scopes": ["all"], "gain": {"value": 0.9}, "behind": -300.0}
     told = words(report_html({"ranking": [{**one, "passed_over": "not surely better"}], "least_gain": 2800.0}))
-    assert "costs −300, passed over: not surely better" in told and "2,800 and more is a clear difference" in told
+    assert "costs −300, passed over: not surely better" in told and "has to save 2,800 over calibration alone" in told
 
 
 def test_a_side_is_worse_only_where_it_is_more_than_noise_and_chance() -> None:

@@ -14,7 +14,7 @@ from commands import done
 
 from gsl.core.trajectory import Batch
 from gsl.stages.logs import read_logs
-from gsl.storage.importers.suspicions import STUCK, saturated
+from gsl.storage.importers.suspicions import STUCK, saturated, stopped
 from gsl.storage.trajectories import read
 
 JOINTS = ("shoulder", "elbow")
@@ -332,15 +332,40 @@ def test_the_pendulum_says_what_hung_on_it(tmp_path: Path) -> None:
 CLOCK = 0.02 * np.arange(1000)
 SWING = 0.5 * np.sin(CLOCK)
 HELD = np.minimum(CLOCK, 0.5) - np.clip(CLOCK - 18.0, 0.0, 0.5)
-STEPS = np.repeat([0.0, 0.3, 0.4, 0.5, 0.2], 200)
+STEPS = np.repeat([0.0, 0.5, 0.0, 0.5, 0.2], 200)
+SQUARE = 0.5 * np.sign(np.sin(8.0 * CLOCK))
+
+
+def followed(command: np.ndarray, *, stop: float = 1.0, play: float = 0.0, lag: int = 4) -> np.ndarray:
+    """What a joint with play and a stop does, in steps of an encoder of 12 bits."""
+    middle, position = 0.0, []
+    for target in np.minimum(np.concatenate([np.zeros(lag), command[:-lag]]), stop):
+        middle = min(max(middle, target - play), target + play)
+        position.append(middle)
+    return np.asarray(np.round(np.array(position) * 4096 / (2 * np.pi)) * (2 * np.pi) / 4096)
 
 
 @pytest.mark.parametrize(
-    ("command", "stop", "is_at_it"),
-    [(SWING, 0.3, True), (SWING, 1.0, False), (HELD, 1.0, False), (STEPS, 0.3, True), (STEPS, 1.0, False)],
+    ("command", "how", "is_at_it"),
+    [
+        (SWING, {"stop": 0.3}, True),
+        (STEPS, {"stop": 0.3}, True),
+        (-STEPS, {"stop": 1.0}, False),
+        (STEPS, {}, False),
+        (SWING, {}, False),
+        (SWING, {"play": 0.02}, False),
+        (0.6 * SWING, {"play": 0.02}, False),
+        (0.2 * SWING, {}, False),
+        (HELD, {}, False),
+        (SQUARE, {"lag": 6}, False),
+    ],
 )
-def test_a_joint_that_rests_where_its_command_rests_is_at_no_stop(
-    command: np.ndarray, stop: float, is_at_it: bool
+def test_a_joint_is_at_a_stop_where_its_command_is_beyond_it(
+    command: np.ndarray, how: dict[str, Any], is_at_it: bool
 ) -> None:
-    position = np.minimum(np.concatenate([np.zeros(4), command[:-4]]), stop)
-    assert (saturated(position, command) > STUCK) == is_at_it
+    assert (stopped(followed(command, **how), command) > STUCK) == is_at_it
+
+
+def test_a_torque_at_its_end_while_the_command_moves_is_saturated() -> None:
+    torque = np.clip(4.0 * SWING, -1.0, 1.0)
+    assert saturated(torque, SWING) > STUCK > saturated(2.0 * SWING, SWING)

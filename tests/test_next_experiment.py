@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from gsl.diagnosis import nuisance
 from gsl.diagnosis.diagnose import Findings, diagnosed
 from gsl.diagnosis.menu import Dish, menu, to_the_ends
 from gsl.diagnosis.next_experiment import next_experiment
-from gsl.diagnosis.payload import payload
 from gsl.diagnosis.questions import NOTHING, hidden, rivals
 from gsl.diagnosis.rehearsal import Explanation, Rehearsal
 from gsl.effects.effect import applied, built, names
@@ -144,28 +142,9 @@ def test_a_log_that_shows_all_that_a_motion_can_leaves_nothing_to_play() -> None
     assert found.verdict.word == "no_gap" and next_experiment(found, dishes()) is None
 
 
-def test_nobody_is_sent_to_the_ends_of_all_joints_for_a_stop_that_nothing_hints_at() -> None:
+def test_a_stop_that_nothing_hints_at_is_no_question() -> None:
     found = played({}, swings(0.01, 0.3, 0.5), without=but("torque_limit", "joint_limit"))
     assert [one.names[0] for one in hidden(found)] == ["torque_limit"]
-
-
-def test_a_weight_tells_friction_under_load_from_other_friction() -> None:
-    some = but("load_friction", "coulomb_friction")
-    found = played({"load_friction": {"coefficient": 0.25}}, whole(), without=some)
-    assert found.selection.chosen.names == ("load_friction",) and found.verdict.word == "causes"
-    wanted = next_experiment(found, dishes())
-    assert wanted is not None and wanted.separates == (("load_friction", "coulomb_friction"),) and not wanted.episodes
-    weight = payload(found)
-    assert weight is not None and weight.better > 2.0 and f"{weight.mass:g} kg on {weight.link}" in wanted.excitation
-    known = {"conditions": {"link_mass": {"link": weight.link, "mass": weight.mass}}}
-    records = found.experiment.records
-    loaded = (replace(records[0], about=known), *records[1:])
-    assert payload(replace(found, experiment=replace(found.experiment, records=loaded))) is None
-
-
-def test_friction_that_loads_do_not_change_asks_for_no_weight() -> None:
-    some = but("load_friction", "coulomb_friction")
-    assert payload(played({"coulomb_friction": {"torque": 0.2}}, whole(), without=some)) is None
 
 
 def test_what_is_alike_in_the_air_by_nature_wants_feet_on_the_ground() -> None:

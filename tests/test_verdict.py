@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from test_diagnosis import found
 from test_refuted import claim
 
 from gsl.diagnosis.attribute import Hypothesis
@@ -34,11 +35,11 @@ def selection(chosen: Hypothesis, *others: Hypothesis) -> Selection:
 
 def test_two_causes_of_one_effect_are_each_judged_against_the_other_alone() -> None:
     shoulder, elbow = friction("shoulder", 300.0), friction("elbow", 900.0)
-    found = judged(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, friction("all", 200.0)), 1.0)
-    first, second = found.causes
+    verdict = judged(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, friction("all", 200.0)), 1.0)
+    first, second = verdict.causes
     assert first.value == pytest.approx(800 / 1004)  # elbow alone leaves 900 of 1100, of which 96 are noise
     assert second.value == pytest.approx(200 / 1004)
-    assert found.word == "causes"
+    assert verdict.word == "causes"
 
 
 def test_a_cause_in_whose_place_no_other_was_tried_is_not_certain() -> None:
@@ -57,7 +58,7 @@ def test_a_cause_in_whose_place_no_other_was_tried_is_not_certain() -> None:
     ("costs", "torque", "why"),
     [
         (np.full(8, 110.0), 0.1, None),
-        (np.full(8, 90.0), 0.1, "gains too little for another effect"),
+        (np.full(8, 90.0), 0.1, "little gain for another effect"),
         (np.array([0.0] * 4 + [150.0] * 4), 0.1, "not surely better"),
         (np.full(8, 50.0), 50.0, "a value beyond its documented range"),
     ],
@@ -68,3 +69,9 @@ def test_what_costs_less_and_is_not_chosen_has_a_reason(costs: np.ndarray, torqu
     more = replace(more, costs=costs, parameters=(*chosen.parameters, np.array([torque])))
     assert passed_over(more, chosen) == why
     assert passed_over(friction("shoulder", 90.0), chosen) is None  # the same, fitted otherwise
+
+
+def test_every_cause_is_challenged_by_another_effect_in_its_place() -> None:
+    result = found({"command_latency": {"delay": 0.02}, "coulomb_friction": {"torque": 0.15}})
+    assert set(result.selection.chosen.names) == {"command_latency", "coulomb_friction"}
+    assert all(one.rival is not None for one in result.verdict.causes)

@@ -60,7 +60,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "shrinkage": shrunk,
         "ranking": _ranking(found),
         "least_gain": found.selection.least,
-        "calibration": _calibration(exp.joints, answer.fit.nuisances[:, : len(exp.joints)], exp.robot.torque_unit),
+        "calibration": _calibration(found),
         "floor": {
             "source": exp.noise.source,
             "pairs": exp.noise.pairs,
@@ -144,18 +144,21 @@ def _written(one: Hypothesis) -> str:
     )
 
 
-def _calibration(joints: Sequence[str], nuisances: np.ndarray, torque_unit: float) -> list[dict[str, Any]]:
+def _calibration(found: Findings) -> list[dict[str, Any]]:
+    joints, unit = found.experiment.joints, found.experiment.robot.torque_unit
+    rotors = nuisance.inertia_unit(found.simulator.plant.servo)
+    columns = zip(joints, found.answer.fit.nuisances.T, rotors, strict=False)  # coupled motors and a base follow
     return [
         {
             "joint": joint,
             "kp": float(np.exp(kp)),
             "kd": float(np.exp(kd)),
-            "coulomb": torque_unit * float(coulomb),
-            "viscous": torque_unit * float(viscous),
+            "coulomb": unit * float(coulomb),
+            "viscous": unit * float(viscous),
             "zero": float(zero + offset),
-            "inertia": float(inertia),
+            "inertia": float(inertia * rotor),
         }
-        for joint, (kp, kd, coulomb, zero, offset, inertia, viscous) in zip(joints, nuisances.T, strict=True)
+        for joint, (kp, kd, coulomb, zero, offset, inertia, viscous), rotor in columns
     ]
 
 

@@ -96,8 +96,9 @@ def _statics(found: Findings, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     every = max(1, -(-len(poses) // LOOKED_AT))
     for known, index in exp.pieces.alike:
         under = applied(plant, built(known))
+        robot = lumped(under.robot)
         some = index[::every]
-        pull += [*gravity_at(under, poses[some, :n])]
+        pull += [_torque(under, robot, pose) for pose in poses[some, :n]]
         stiffness += [under.servo.kp[:n].clip(1e-9)] * len(some)
     return np.array(pull), np.array(stiffness)
 
@@ -140,12 +141,6 @@ def _reach(plant: Plant, bounds: Limits) -> np.ndarray:
 def tried(bounds: Limits) -> np.ndarray:
     """Return the positions that are tried of each joint within its room [rad], shape (n_joints, TRIED)."""
     return np.linspace(bounds.rest - bounds.down, bounds.rest + bounds.up, TRIED, axis=1)
-
-
-def gravity_at(plant: Plant, poses: np.ndarray) -> np.ndarray:
-    """Return the torques that hold poses [rad] against gravity [N·m], both of shape (n, n_joints)."""
-    robot = lumped(plant.robot)
-    return np.array([_torque(plant, robot, pose) for pose in poses])
 
 
 def _torque(plant: Plant, robot: Robot, pose: np.ndarray) -> np.ndarray:

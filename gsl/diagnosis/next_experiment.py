@@ -10,14 +10,13 @@ import numpy as np
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.droop import Droop, droops
 from gsl.diagnosis.menu import Dish
-from gsl.diagnosis.payload import LOADED, WEIGHT, Payload, payload
 from gsl.diagnosis.pose_ladder import ladder
 from gsl.diagnosis.questions import NOTHING, Question, alike, hidden, rivals
 from gsl.diagnosis.rehearsal import Rehearsal
 
 ENOUGH = 30.0  # log-odds with which a question is answered: what comes on top decides only between equals
 WORTH = 3.0  # log-odds below which a motion is not worth playing
-CERTAIN = 100.0  # log-odds, and times as many, beyond which their size says nothing any more
+CERTAIN = 100.0  # log-odds beyond which their size says nothing any more
 LISTED = 4  # effects that a sentence names
 PAIR = ("zero_offset", "gravity_droop")
 ON_GROUND = "any motion with the feet on the ground"
@@ -43,18 +42,14 @@ class NextExperiment:
 def next_experiment(found: Findings, dishes: Sequence[Dish]) -> NextExperiment | None:
     """Return the best of a menu; None if the log leaves nothing open, or nothing that any of it would show.
 
-    Causes that cannot be told apart come first, then zeros that may be loads, then effects that the log cannot show,
-    and last a weight where the kind of friction hangs on loads that hardly differed.
+    Causes that cannot be told apart come first, then zeros that may be loads, then effects that the log cannot show.
     """
     unsure = tuple(one for one in droops(found) if one.told)
     if unsure and not rivals(found) and not alike(found):
         return _ladder(unsure, found)
     questions = rivals(found) or ([] if alike(found) else hidden(found))
     best = _best(questions, Rehearsal.of(found, dishes), dishes) if questions else None
-    if best is not None or alike(found):
-        return best or _on_ground(alike(found))
-    weight = payload(found)
-    return None if weight is None else _loaded(weight)
+    return best or (_on_ground(alike(found)) if alike(found) else None)
 
 
 def _best(questions: Sequence[Question], rehearsal: Rehearsal, dishes: Sequence[Dish]) -> NextExperiment | None:
@@ -100,17 +95,6 @@ def _ladder(unsure: tuple[Droop, ...], found: Findings) -> NextExperiment:
         f"{1e3 * most.apart:.0f} mrad apart; {seconds:.0f} s with a second variant and a repeat."
     )
     return NextExperiment("pose_ladder", (PAIR,), dish.episodes, why)
-
-
-def _loaded(weight: Payload) -> NextExperiment:
-    played = f"the same motions with {weight.mass:g} kg on {weight.link}"
-    better = f"{weight.better:.0f}" if weight.better < CERTAIN else f"over {CERTAIN:.0f}"
-    why = (
-        f"Loads tell {LOADED} from {weight.rival}, and those of this log are the robot's own. {played.capitalize()}, "
-        f"beside those without, are expected to part the two by {better} times the log-odds of a mere "
-        "repeat, every joint calibrated anew."
-    ).replace("_", " ")
-    return NextExperiment(played, ((LOADED, weight.rival),), (), f"{why} Say so by the mapping's conditions: {WEIGHT}.")
 
 
 def _on_ground(groups: Sequence[tuple[str, ...]]) -> NextExperiment:

@@ -52,9 +52,9 @@ def rivals(found: Findings) -> list[Question]:
     if found.verdict.word == "unknown":
         near = [one for one in tried if one.candidates]
         other = next((one for one in near[1:] if set(one.names) != set(near[0].names)), None)
-        return [] if other is None else [question(near[0], other, joints)]
+        return [] if other is None else [_question(near[0], other, joints)]
     pairs = [group for group in found.verdict.inseparable if set(group) not in ALIKE]
-    return [question(chosen, other, joints) for pair in pairs if (other := _rival(chosen, pair, tried)) is not None]
+    return [_question(chosen, other, joints) for pair in pairs if (other := _rival(chosen, pair, tried)) is not None]
 
 
 def _rival(chosen: Hypothesis, pair: Sequence[str], tried: Sequence[Hypothesis]) -> Hypothesis | None:
@@ -65,8 +65,7 @@ def _rival(chosen: Hypothesis, pair: Sequence[str], tried: Sequence[Hypothesis])
     return min(fits, key=lambda one: (len(one.candidates) != len(chosen.candidates), one.cost), default=None)
 
 
-def question(first: Hypothesis, other: Hypothesis, joints: int) -> Question:
-    """Return whether one hypothesis or another one, in what they differ by."""
+def _question(first: Hypothesis, other: Hypothesis, joints: int) -> Question:
     apart = [[name for name in a.names if name not in b.names] for a, b in ((first, other), (other, first))]
     names = apart[0][0] if apart[0] else NOTHING, apart[1][0] if apart[1] else NOTHING
     return Question(names, _explanation(first, joints), (_explanation(other, joints),))

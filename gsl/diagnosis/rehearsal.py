@@ -72,10 +72,10 @@ class Rehearsal:
         return _rehearsal(found, records, np.arange(len(dishes)))
 
     @classmethod
-    def again(cls, found: Findings, records: Sequence[Record] | None = None) -> Rehearsal:
-        """Prepare to go through the diagnosed log in the air, or some records, once more, all of it as one motion."""
-        played = found.experiment.records if records is None else records
-        return _rehearsal(found, [replace(one, base=None) for one in played], np.zeros(len(played), dtype=int))
+    def again(cls, found: Findings) -> Rehearsal:
+        """Prepare to go through the diagnosed log in the air once more, all of it as one motion."""
+        records = found.experiment.records
+        return _rehearsal(found, [replace(one, base=None) for one in records], np.zeros(len(records), dtype=int))
 
     def log_odds(self, truth: Explanation, rivals: tuple[Explanation, ...], *, loose: float = 1.0) -> np.ndarray:
         """Return how far each motion is expected to speak for the truth, natural logarithm, shape (n_motions,).

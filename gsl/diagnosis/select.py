@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -97,19 +97,20 @@ def selected(
         chosen = _split(arena, chosen, none, thresholds, tried)
         if thresholds.share:
             chosen = _challenged(arena, chosen, none, tried)
+        else:
+            _rivalled(arena, chosen, none, tried)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening, least)
 
 
 def passed_over(one: Hypothesis, chosen: Hypothesis) -> str | None:
-    """Return why a hypothesis that costs less than the chosen one is not the answer, None if it costs no less."""
+    """Return what speaks against a hypothesis that costs less than the chosen one, None if it costs no less."""
     if one.cost >= chosen.cost or one.places == chosen.places:
         return None
-    if not one.claims_its_names:
-        return "a value beyond its documented range"
     if gain(one, chosen).low <= 0.0:
         return "not surely better"
-    more = len(one.candidates) > len(chosen.candidates)
-    return "gains too little for another effect" if more else "no surer than fewer effects"
+    if not one.claims_its_names:
+        return "a value beyond its documented range"
+    return "little gain for another effect" if len(one.candidates) > len(chosen.candidates) else None
 
 
 def _stands(one: Hypothesis, other: Hypothesis, least: float, flaw: float) -> bool:
@@ -188,8 +189,7 @@ def _split(
         one = arena.fitted(candidates, np.concatenate(values), chosen.fit.nuisances, every=1)
         tried.append(one)
         if _stands(one, chosen, *_bar(thresholds, chosen, none)):
-            tried += [_without(arena, one, index) for index in range(k, k + len(apart))]  # what each is good for
-            return one
+            return _pruned(arena, one, none, thresholds, tried)
     return chosen
 
 
@@ -197,6 +197,24 @@ def _without(arena: Arena, chosen: Hypothesis, k: int) -> Hypothesis:
     rest = [index for index in range(len(chosen.candidates)) if index != k]
     start = np.concatenate([chosen.parameters[index] for index in rest])
     return arena.fitted(tuple(chosen.candidates[index] for index in rest), start, chosen.fit.nuisances)
+
+
+def lacks(one: Hypothesis, chosen: Hypothesis, k: int) -> bool:
+    """Whether a hypothesis has not the chosen one's k-th effect; the same elsewhere it may have if that one has it."""
+    effect = chosen.candidates[k].effect
+    beside = [(other.effect, other.fixed) for index, other in enumerate(chosen.candidates) if index != k]
+    return all(own.effect != effect or (own.effect, own.fixed) in beside for own in one.candidates)
+
+
+def _rivalled(arena: Arena, chosen: Hypothesis, none: Hypothesis, tried: list[Hypothesis]) -> None:
+    """Try the likeliest other effect in the place of each one that nothing has been tried for yet."""
+    size = len(chosen.candidates)
+    for k, candidate in enumerate(chosen.candidates):
+        if any(len(one.candidates) == size and lacks(one, chosen, k) for one in tried):
+            continue
+        others = replace(arena, library=tuple(one for one in arena.library if one.effect != candidate.effect))
+        if others.library:
+            tried += others.successors(_without(arena, chosen, k) if size > 1 else none, 1)[0]
 
 
 def _challenged(arena: Arena, chosen: Hypothesis, none: Hypothesis, tried: list[Hypothesis]) -> Hypothesis:

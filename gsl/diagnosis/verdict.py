@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gsl.diagnosis.attribute import NOISE_COST, Hypothesis, gain, share
-from gsl.diagnosis.select import Selection
+from gsl.diagnosis.select import Selection, lacks
 from gsl.effects.effect import TWINS
 
 ALIKE = tuple(frozenset(pair) for pair in TWINS.items())  # in the air
@@ -19,7 +19,7 @@ WHOLE = 0.9  # share of the excess from which on causes are all there is
 FOREIGN, EXPLAINED = 1.12, 0.85  # remaining cost, and share explained, beyond which nothing of the library is the cause
 LOCAL = 1.5  # and remaining cost of one joint
 KNOWN_SOFT = 0.15
-UNRIVALLED = 0.9  # probability of an effect in whose place no other was tried
+UNRIVALLED = 0.9  # probability of an effect in whose place no other was tried: where replays are slow
 LONE = 0.8  # factor on probabilities where parts of one motion were held out: they share what is particular to it
 
 
@@ -119,7 +119,7 @@ def _known(explained: float, strange: float) -> float:
 
 def _cause(found: Selection, k: int, noise: float, spreads: dict[str, float], doubt: float) -> Cause:
     chosen = found.chosen
-    rivals = [one for one in found.tried if len(one.candidates) <= len(chosen.candidates) and _lacks(one, chosen, k)]
+    rivals = [one for one in found.tried if len(one.candidates) <= len(chosen.candidates) and lacks(one, chosen, k)]
     fewer = min((one for one in rivals if len(one.candidates) < len(chosen.candidates)), key=_cost, default=found.none)
     value, low, high = (max(0.0, x) for x in share(chosen, fewer, found.none, noise))
     best = min((one for one in rivals if len(one.candidates) == len(chosen.candidates)), key=_cost, default=None)
@@ -127,13 +127,6 @@ def _cause(found: Selection, k: int, noise: float, spreads: dict[str, float], do
         return Cause(k, UNRIVALLED, None, value, low, high)
     other = next((name for name in best.names if name not in chosen.names), best.names[-1])
     return Cause(k, _ahead(best, chosen, max(spreads.get(other, 0.0), doubt * chosen.cost)), other, value, low, high)
-
-
-def _lacks(one: Hypothesis, chosen: Hypothesis, k: int) -> bool:
-    """Whether a hypothesis has not the chosen one's k-th effect; the same elsewhere it may have if that one has it."""
-    effect = chosen.candidates[k].effect
-    beside = [(other.effect, other.fixed) for index, other in enumerate(chosen.candidates) if index != k]
-    return all(own.effect != effect or (own.effect, own.fixed) in beside for own in one.candidates)
 
 
 def _ahead(rival: Hypothesis, chosen: Hypothesis, spread: float) -> float:

@@ -30,18 +30,17 @@ def calibration(document: Document) -> Html | None:
             _scaled(one.get("coulomb"), 1.0, decimals=4),
             _scaled(one.get("viscous"), 1.0, decimals=4),
             _scaled(one.get("zero"), 180.0 / math.pi, decimals=2),
-            _scaled(one.get("inertia"), 1.0, decimals=1),
+            _scaled(one.get("inertia"), 1000.0, decimals=2),
         )
         for one in entries(document, "calibration")
     ]
     columns = (
         *("joint", "kp, factor", "kd, factor", "Coulomb friction, added [N·m]", "viscous friction, added [N·m·s/rad]"),
         "zero of the log [°]",
-        "rotor's inertia, off by [5 % and half a millisecond of kd]",
+        "inertia, added [g·m²]",
     )
     note = (
-        "Small deviations that every robot has; they were refitted for every explanation, so that none hides in them. "
-        "A rotor is lighter by 5 of its units at most."
+        "Small deviations that every robot has; they were refitted for every explanation, so that none hides in them."
     )
     return section("Calibration", table(columns, rows) if rows else None, note=note)
 

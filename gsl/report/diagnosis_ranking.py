@@ -55,14 +55,14 @@ def ranking(document: Document) -> Html | None:
     least = finite(document.get("least_gain")) or 20.0
     shares = all(abs(finite(part(one, "gain").get("value")) or 0.0) <= 1.5 for one in found)
     form = share if shares else short
-    chosen = [(cause.get("effect"), said(cause, "scope")) for cause in entries(document, "causes")]
+    chosen = sorted((str(cause.get("effect")), said(cause, "scope")) for cause in entries(document, "causes"))
     dots = [_dot(one, form, chosen=_what(one) == chosen) for one in found[:SHOWN]]
     measure = "the share of the gap that it explains" if shares else "the cost that it saves"
     note = (
         f"Each was fitted on some records and judged on others. Shown: {measure}, with its 95 % interval (left of the "
-        "line it makes things worse), and how much more it costs than the verdict, which is in colour: "
-        f"{least:,.0f} and more is a clear difference here, where chance gains less. One that costs less and is not "
-        "the verdict says why."
+        "line it makes things worse), and how much more it costs than the verdict, which is in colour. An effect has "
+        f"to save {least:,.0f} over calibration alone here, to be more than chance; how sure a difference between two "
+        "explanations is, is the probability of the causes."
     )
     rest = f"{len(found) - SHOWN} more did worse." if len(found) > SHOWN else None
     return section(
@@ -85,8 +85,8 @@ def _dot(one: Document, form: Callable[[Any], str], *, chosen: bool) -> Dot:
     return Dot(_label(one), value, low, high, prose(", ".join(told)), "after" if chosen else "other")
 
 
-def _what(one: Document) -> list[tuple[Any, str]]:
-    return list(zip(entries(one, "effects"), map(str, entries(one, "scopes")), strict=False))
+def _what(one: Document) -> list[tuple[str, str]]:
+    return sorted(zip(map(str, entries(one, "effects")), map(str, entries(one, "scopes")), strict=False))
 
 
 def _label(one: Document) -> Html:

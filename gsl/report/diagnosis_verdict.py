@@ -132,8 +132,8 @@ def where_sentence(document: Document) -> str:
     of = len({said(cell, "joint") for cell in entries(document, "where")})
     whole = [place for place in found if place.cell.get("named")]
     parts = [f"{place.joint} when {place.when}" for place in found if place not in whole]
-    within = " The others stay within the noise." if of > len(found) else ""
-    only = f" Within the noise but for some motions: {listed(parts)}." if parts else ""
+    within = " The others are not surely beyond the noise." if of > len(found) else ""
+    only = f" Surely beyond the noise only at times: {listed(parts)}." if parts else ""
     if not whole:
         return f"No joint stands out as a whole.{only}{within}"
     first, *others = (f"{place.joint} {share(place.cell.get('share'))}" for place in whole)

@@ -9,7 +9,7 @@ import numpy as np
 
 from gsl.core.series import Lag
 from gsl.storage.importers.assembly import Episode
-from gsl.storage.importers.suspicions import MOVES, STUCK, Suspicion, is_clear, lags_of, saturated, suspicions
+from gsl.storage.importers.suspicions import MOVES, STUCK, Suspicion, is_clear, lags_of, saturated, stopped, suspicions
 from gsl.storage.trajectory_contract import UNITS
 
 UNEVEN = 0.5  # of a period, by which a row may be early or late before a diagnosis refuses it
@@ -69,8 +69,9 @@ def _channels(found: Sequence[Episode]) -> Iterator[Document]:
     """Return for each column its range, and whether it is constant or stuck at an end."""
     for name, parts, commands in _columns(found):
         values = np.concatenate(parts).astype(float)
-        moving = [saturated(*pair) for pair in zip(parts, commands, strict=True)] if commands else []
         group = name.partition(".")[0]
+        at_end = stopped if group == "position" else saturated
+        moving = [at_end(*pair) for pair in zip(parts, commands, strict=True)] if commands else []
         yield {
             "column": name,
             "unit": UNITS.get(name, UNITS.get(name.rpartition(".")[0], UNITS.get(group, ""))),

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from gsl.core.series import Lag, lag
 from gsl.storage.importers.assembly import Episode
@@ -21,8 +20,7 @@ FASTER = 10.0  # times the slope of the positions that velocities may be
 SLOW = 0.05  # slopes below are noise [rad/s]
 SLOWEST, FASTEST = 1.0, 2e-5  # from one row to the next [s]
 STUCK = 0.05  # share of the rows at one end, above which a channel is told to be saturated
-SAME, OTHER = 1e-6, 0.1  # of a channel's range: what is no difference, and what is one
-NEAR = 5  # rows within which a command that changes is moving
+SAME, BEYOND = 1e-6, 0.1  # of a range: what is no difference, and what is one
 CONTRAST = 2e-3  # of correlations, from which on a lag is clear
 MOSTLY = 0.75  # share of the contrast that has to be of negative lags before columns are called swapped
 NONE = Lag(0.0, 0.0, 0.0)
@@ -59,23 +57,30 @@ def lags_of(episode: Episode) -> list[Lag]:
 
 
 def saturated(values: np.ndarray, command: np.ndarray) -> float:
-    """Return the share of rows in which a channel is at one of its ends while the command asks for other values.
-
-    A joint that rests where its command rests, at the far end of a motion, is no such thing.
-    """
+    """Return the share of rows in which a channel is at one of its ends while the command goes on moving."""
     if np.ptp(values) == 0.0 or np.ptp(command) < MOVES:
         return 0.0
-    steps = np.abs(np.diff(command, prepend=command[0])) > SAME * np.ptp(command)
-    moving = maximum_filter1d(steps, 2 * NEAR + 1)
     shares = []
     for end in (values.min(), values.max()):
         there = np.abs(values - end) <= SAME * np.ptp(values)
-        stays = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]))).reshape(-1, 2)
-        begins, ends = stays[np.ptp(stays, axis=1) > 2 * NEAR].T
-        within = [command[begins + ((ends - begins) * part).astype(int)] for part in (0.25, 0.5, 0.75)]
-        others = len(begins) > 0 and np.ptp(within) > OTHER * np.ptp(command)
-        shares.append(float(np.mean(there if others else there & moving)))
+        moving = np.ptp(command[there]) > BEYOND * np.ptp(command)
+        shares.append(float(np.mean(there)) if moving else 0.0)
     return max(shares)
+
+
+def stopped(position: np.ndarray, command: np.ndarray) -> float:
+    """Return the share of rows in which a joint is at one of its ends while its command is well beyond that [rad].
+
+    A joint that rests where its command rests, or turns round with it, is at no stop.
+    """
+    if np.ptp(position) == 0.0 or np.ptp(command) < MOVES:
+        return 0.0
+    same, beyond = SAME * np.ptp(position), BEYOND * np.ptp(command)
+    ends = (
+        (position <= position.min() + same) & (command < position - beyond),
+        ((position >= position.max() - same) & (command > position + beyond)),
+    )
+    return max(float(np.mean(there)) for there in ends)
 
 
 def _all(found: Sequence[Episode], name: str, index: int) -> np.ndarray:
