@@ -148,6 +148,7 @@ def test_what_a_wide_range_holds_is_meant_in_factors() -> None:
 def test_two_causes_at_once() -> None:
     result = found({"command_latency": {"delay": 0.02}, "coulomb_friction": {"torque": 0.15}}, most=2)
     assert set(result.selection.chosen.names) == {"command_latency", "coulomb_friction"}
+    assert all(one.rival is not None for one in result.verdict.causes)  # each was challenged in its place
 
 
 def test_one_motion_alone_makes_nobody_sure() -> None:

@@ -7,7 +7,6 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from test_diagnosis import found
 from test_refuted import claim
 
 from gsl.diagnosis.attribute import Hypothesis
@@ -69,9 +68,3 @@ def test_what_costs_less_and_is_not_chosen_has_a_reason(costs: np.ndarray, torqu
     more = replace(more, costs=costs, parameters=(*chosen.parameters, np.array([torque])))
     assert passed_over(more, chosen) == why
     assert passed_over(friction("shoulder", 90.0), chosen) is None  # the same, fitted otherwise
-
-
-def test_every_cause_is_challenged_by_another_effect_in_its_place() -> None:
-    result = found({"command_latency": {"delay": 0.02}, "coulomb_friction": {"torque": 0.15}})
-    assert set(result.selection.chosen.names) == {"command_latency", "coulomb_friction"}
-    assert all(one.rival is not None for one in result.verdict.causes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -98,7 +98,7 @@ def selected(
         if thresholds.share:
             chosen = _challenged(arena, chosen, none, tried)
         else:
-            _rivalled(arena, chosen, none, tried)
+            _rivalled(arena, chosen, tried)
     return Selection(none, chosen, tuple(sorted(tried, key=lambda one: one.cost)), screening, least)
 
 
@@ -206,15 +206,23 @@ def lacks(one: Hypothesis, chosen: Hypothesis, k: int) -> bool:
     return all(own.effect != effect or (own.effect, own.fixed) in beside for own in one.candidates)
 
 
-def _rivalled(arena: Arena, chosen: Hypothesis, none: Hypothesis, tried: list[Hypothesis]) -> None:
-    """Try the likeliest other effect in the place of each one that nothing has been tried for yet."""
+def _rivalled(arena: Arena, chosen: Hypothesis, tried: list[Hypothesis]) -> None:
+    """Try in the place of each effect, for which nothing of as many effects was tried, what did best without it."""
     size = len(chosen.candidates)
-    for k, candidate in enumerate(chosen.candidates):
-        if any(len(one.candidates) == size and lacks(one, chosen, k) for one in tried):
-            continue
-        others = replace(arena, library=tuple(one for one in arena.library if one.effect != candidate.effect))
-        if others.library:
-            tried += others.successors(_without(arena, chosen, k) if size > 1 else none, 1)[0]
+    for k in range(size):
+        without = [one for one in sorted(tried, key=lambda one: one.cost) if lacks(one, chosen, k)]
+        others = [
+            (candidate, values)
+            for one in without
+            for candidate, values in zip(one.candidates, one.parameters, strict=True)
+            if (candidate.effect, candidate.scope) not in chosen.places
+        ]
+        if others and not any(len(one.candidates) == size for one in without):
+            candidate, values = others[0]
+            rest = [index for index in range(size) if index != k]
+            candidates = (*(chosen.candidates[index] for index in rest), candidate)
+            start = np.concatenate([*(chosen.parameters[index] for index in rest), values])
+            tried.append(arena.fitted(candidates, start, chosen.fit.nuisances))
 
 
 def _challenged(arena: Arena, chosen: Hypothesis, none: Hypothesis, tried: list[Hypothesis]) -> Hypothesis:
