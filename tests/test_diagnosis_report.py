@@ -95,6 +95,9 @@ def test_long_records_of_many_joints_stay_small() -> None:
 def test_a_cause_that_is_not_sure_is_called_probable() -> None:
     found = {**made.document(causes=1), "sure": False}
     assert "Probable cause: servo gain of LKneePitch" in words(report_html(found)).split("Caveats")[0]
+    (cause,) = found["causes"]
+    unlikely = {**found, "causes": [{**cause, "probability": 0.46}]}
+    assert "Possible cause: servo gain of LKneePitch" in words(report_html(unlikely)).split("Caveats")[0]
 
 
 def test_the_first_screen_answers_everything() -> None:

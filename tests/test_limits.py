@@ -54,7 +54,7 @@ def test_where_a_gap_is_unexplained_nothing_is_ruled_out() -> None:
     assert limits(found({"command_latency": {"delay": 0.03}}, without=lagging), lambda _: None) == []
 
 
-def test_what_shakes_walks_or_is_explained_in_part_has_no_limits() -> None:
+def test_what_shakes_walks_or_is_explained_in_part_has_no_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     result = found({})
     assert limits(result, lambda _: None)
     shaking = replace(result.experiment.comparison, shaking=np.array([True, False]))
@@ -64,6 +64,8 @@ def test_what_shakes_walks_or_is_explained_in_part_has_no_limits() -> None:
         replace(result, experiment=replace(result.experiment, comparison=shaking)),
     ):
         assert limits(other, lambda _: None) == []
+    monkeypatch.setattr("gsl.diagnosis.limits.unexplained", lambda _: ["reversal (6.7 to 7.3 x)"])
+    assert limits(result, lambda _: None) == []
 
 
 def test_a_sentence_tells_the_tightest() -> None:
@@ -90,4 +92,7 @@ def test_a_part_of_the_log_that_is_as_far_off_as_before_is_not_explained() -> No
     regimes = [{"regime": "all", "before": 4.0, "after": 4.0}, {"regime": "high_load", "before": 11.0, "after": 12.0}]
     joints = [{"joint": "Jaw", "before": 2.5, "after": 2.4}, {"joint": "Elbow", "before": 5.0, "after": 3.0},
               {"joint": "Wrist", "before": 1.5, "after": 1.6}]  # fmt: skip
-    assert unexplained({"by_regime": regimes, "by_joint": joints}) == ["high load (12.0 x)", "Jaw (2.4 x)"]
+    assert unexplained({"by_regime": regimes, "by_joint": joints}) == [
+        "high load (11.0 to 12.0 x)",
+        "Jaw (2.5 to 2.4 x)",
+    ]

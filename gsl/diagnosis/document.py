@@ -228,7 +228,8 @@ def _caveats(found: Findings, unsure: Sequence[Droop]) -> list[str]:
 
 def _unexplained(shrunk: Mapping[str, Any], causes: Sequence[Any]) -> list[str]:
     far = unexplained(shrunk) if causes else []
-    return [f"Not explained, no nearer to the robot than before, in noise floors: {', '.join(far)}."] if far else []
+    told = "Not explained, no nearer to the robot than before or farther, in noise floors"
+    return [f"{told}: {', '.join(far)}."] if far else []
 
 
 def _stuck(found: Findings, k: int) -> bool:
@@ -249,11 +250,13 @@ def _summary(found: Findings, causes: Sequence[Mapping[str, Any]], shrunk: Mappi
         groups = "; ".join(" or ".join(group) for group in verdict.inseparable).replace("_", " ")
         return f"The gap looks like {named}, but this log cannot tell apart: {groups}."
     probably = "" if _sure(causes) else "probably "
-    told = f"The gap is {probably}caused by {named}"
     if shrunk["fraction"] is None:
-        return f"{told}."
+        return f"The gap is {probably}caused by {named}."
     gone, alone = (f"{100.0 * share:.0f} %" for share in (shrunk["fraction"], shrunk["calibration_fraction"]))
-    return f"{told}; with the calibration {gone} of it is gone on held-out data, {alone} with the calibration alone."
+    return (
+        f"A calibration of each joint takes {alone} of the gap on held-out data; what it leaves is {probably}caused by "
+        f"{named}, and with both {gone} is gone."
+    )
 
 
 def _sure(causes: Sequence[Mapping[str, Any]]) -> bool:

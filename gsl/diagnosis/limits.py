@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gsl.core.setting import settings_of
+from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Hypothesis, gain
 from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.select import FLAW
 from gsl.diagnosis.shared import ROWS
+from gsl.diagnosis.shrinkage import by_part, unexplained
 from gsl.diagnosis.verdict import FOREIGN
 from gsl.effects.effect import effect_class
 
@@ -47,13 +49,15 @@ def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
 
     Every effect that all joints may have none of is held at a value, all else fitted anew, until that is surely worse
     on held-out windows, by more than a simulator's own flaws may make of it. Left out is what a calibration does as
-    well, whose prior would be the limit. Where much is left unexplained, joints shake or a robot walks there is no
-    answer to compare with; one motion alone is too little.
+    well, whose prior would be the limit. Where much is left unexplained (in turning round, say, where play would show),
+    joints shake or a robot walks there is no answer to compare with; one motion alone is too little.
     """
     exp, answer = found.experiment, found.answer
     verdict = found.verdict
-    unexplained = verdict.word == "unknown" or (verdict.in_part and verdict.remaining > FOREIGN)
-    if unexplained or not exp.by_record or exp.walking or exp.comparison.shaking.any():
+    strange = verdict.word == "unknown" or (verdict.in_part and verdict.remaining > FOREIGN)
+    if strange or not exp.by_record or exp.walking or exp.comparison.shaking.any():
+        return []
+    if unexplained(by_part(found, _residuals(found))):
         return []
     left_out = {*answer.names, *found.selection.screening.invisible, *found.refuted}
     asked = [one for one in found.arena.library if one.effect not in left_out and _none_or_some(one)]
@@ -61,6 +65,14 @@ def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
         tick("what the log leaves room for")
     told = [limit for one in asked if (limit := _limit(found, one))]
     return sorted(told, key=lambda one: one.most / one.documented)
+
+
+def _residuals(found: Findings) -> dict[str, np.ndarray]:
+    """Return the residuals of all windows before and after, in units of the floor."""
+    exp, answer = found.experiment, found.answer
+    bench = exp.bench(found.simulator, "all")
+    pairs = {"before": ({}, nuisance.none(len(exp.channels))), "after": (answer.effects, answer.fit.nuisances)}
+    return {key: bench.residual(*pair) for key, pair in pairs.items()}
 
 
 def _none_or_some(one: Candidate) -> bool:

@@ -31,6 +31,7 @@ def shrinkage(found: Findings, before: np.ndarray, after: np.ndarray) -> dict[st
     z = {key: exp.comparison.residual(values, exp.pieces) for key, values in told.items()}
     used = exp.comparison.used(z["before"].shape[1])
     mean = {key: _mean_square(values[held], used) for key, values in z.items()}
+    parts = by_part(found, {key: z[key] for key in ("before", "after")})
     fraction, low, high = removed(exp, z["before"], z["after"])
     return {
         "floor": 1.0,
@@ -40,23 +41,33 @@ def shrinkage(found: Findings, before: np.ndarray, after: np.ndarray) -> dict[st
         "low": low,
         "high": high,
         "ceiling_fraction": ceiling(exp, before, seed=found.seed),
-        "by_joint": [
-            {"joint": joint, "before": float(np.sqrt(mean["before"][k])), "after": float(np.sqrt(mean["after"][k]))}
-            for k, joint in enumerate(exp.channels)
-        ],
-        "by_regime": _by_regime(found, z),
+        **parts,
     }
+
+
+def by_part(found: Findings, z: Mapping[str, np.ndarray]) -> dict[str, list[dict[str, Any]]]:
+    """Return the held-out gap by joint and by regime, in floors.
+
+    Args:
+        found: The diagnosis.
+        z: Residuals of all windows `before` and `after`, in units of the floor, each of shape (W, scored, n_channels).
+    """
+    exp, held = found.experiment, found.experiment.held_out
+    used = exp.comparison.used(z["before"].shape[1])
+    root = {key: np.sqrt(_mean_square(values[held], used)).tolist() for key, values in z.items()}
+    joints = [{"joint": joint} | {key: root[key][k] for key in root} for k, joint in enumerate(exp.channels)]
+    return {"by_joint": joints, "by_regime": _by_regime(found, z)}
 
 
 def unexplained(told: Mapping[str, Any]) -> list[str]:
     """Return the joints and regimes that are far off and no nearer than before, each with its floors.
 
     Args:
-        told: From `shrinkage`.
+        told: From `shrinkage` or `by_part`.
     """
     parts = [(one.get("joint") or one["regime"], one) for one in (*told["by_regime"], *told["by_joint"])]
     return [
-        f"{name.replace('_', ' ')} ({one['after']:.1f} x)"
+        f"{name.replace('_', ' ')} ({one['before']:.1f} to {one['after']:.1f} x)"
         for name, one in parts
         if name != "all" and one["after"] > max(FAR, ALIKE * one["before"])
     ]
@@ -109,7 +120,7 @@ def ceiling(exp: Experiment, before: np.ndarray, *, seed: int = 0) -> float | No
     return 1.0 - max(0.0, _excess(learned, used)) / _excess(np.clip(z, -CLIP, CLIP), used)
 
 
-def _by_regime(found: Findings, z: dict[str, np.ndarray]) -> list[dict[str, Any]]:
+def _by_regime(found: Findings, z: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
     exp, rows = found.experiment, []
     for name, mask in regimes(exp, found.corrected).items():
         part = mask[exp.held_out]

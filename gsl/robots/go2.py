@@ -17,11 +17,11 @@ import numpy as np
 from gsl.core.body import Joint, Link, Robot, Shape
 
 KP, KD = 20.0, 1.5  # [N·m/rad], [N·m·s/rad], B
-ARMATURE = 0.01  # [kg·m²], C
 LEGS = ("FL", "FR", "RL", "RR")  # F front, L left
 HIP_X, HIP_Y, THIGH_Y, SHANK = 0.1934, 0.0465, 0.0955, 0.213  # [m], A
 EFFORT = {"hip": 23.7, "thigh": 23.7, "calf": 45.43}  # [N·m], B; A's 35.55 is the Go1's calf
 SPEED = {"hip": 30.1, "thigh": 30.1, "calf": 15.7}  # [rad/s], B
+ARMATURE = {"hip": 0.01, "thigh": 0.01, "calf": 0.01 * 1.917**2}  # [kg·m²], C for the hip; by B one motor and its gear
 LIMITS = {  # [rad], A
     "hip": (-1.0472, 1.0472),
     "calf": (-2.7227, -0.83776),
@@ -81,7 +81,15 @@ def _joints(leg: str) -> list[Joint]:
     )
     driven = [
         Joint(
-            f"{leg}_{part}_joint", parent, f"{leg}_{part}", origin, axis, *limits, SPEED[part], EFFORT[part], ARMATURE
+            f"{leg}_{part}_joint",
+            parent,
+            f"{leg}_{part}",
+            origin,
+            axis,
+            *limits,
+            SPEED[part],
+            EFFORT[part],
+            ARMATURE[part],
         )
         for part, parent, origin, axis, limits in rows
     ]
