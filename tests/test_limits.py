@@ -64,7 +64,8 @@ def test_what_shakes_walks_or_is_explained_in_part_has_no_limits(monkeypatch: py
         replace(result, experiment=replace(result.experiment, comparison=shaking)),
     ):
         assert limits(other, lambda _: None) == []
-    monkeypatch.setattr("gsl.diagnosis.limits.unexplained", lambda _: ["reversal (6.7 to 7.3 x)"])
+    turning = {"by_joint": [], "by_regime": [{"regime": "reversal", "before": 10.4, "after": 7.1}]}
+    monkeypatch.setattr("gsl.diagnosis.limits.by_part", lambda *_: turning)
     assert limits(result, lambda _: None) == []
 
 

@@ -14,7 +14,7 @@ from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.select import FLAW
 from gsl.diagnosis.shared import ROWS
-from gsl.diagnosis.shrinkage import by_part, unexplained
+from gsl.diagnosis.shrinkage import FAR, by_part
 from gsl.diagnosis.verdict import FOREIGN
 from gsl.effects.effect import effect_class
 
@@ -49,15 +49,15 @@ def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
 
     Every effect that all joints may have none of is held at a value, all else fitted anew, until that is surely worse
     on held-out windows, by more than a simulator's own flaws may make of it. Left out is what a calibration does as
-    well, whose prior would be the limit. Where much is left unexplained (in turning round, say, where play would show),
-    joints shake or a robot walks there is no answer to compare with; one motion alone is too little.
+    well, whose prior would be the limit. Where much is left unexplained, be it in one regime (in turning round, say, where
+    play would show), joints shake or a robot walks there is no answer to compare with; one motion alone is too little.
     """
     exp, answer = found.experiment, found.answer
     verdict = found.verdict
     strange = verdict.word == "unknown" or (verdict.in_part and verdict.remaining > FOREIGN)
     if strange or not exp.by_record or exp.walking or exp.comparison.shaking.any():
         return []
-    if unexplained(by_part(found, _residuals(found))):
+    if max(one["after"] for parts in by_part(found, _residuals(found)).values() for one in parts) > FAR:
         return []
     left_out = {*answer.names, *found.selection.screening.invisible, *found.refuted}
     asked = [one for one in found.arena.library if one.effect not in left_out and _none_or_some(one)]
