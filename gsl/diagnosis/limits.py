@@ -49,8 +49,8 @@ def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
 
     Every effect that all joints may have none of is held at a value, all else fitted anew, until that is surely worse
     on held-out windows, by more than a simulator's own flaws may make of it. Left out is what a calibration does as
-    well, whose prior would be the limit. Where much is left unexplained, be it in one regime (in turning round, say, where
-    play would show), joints shake or a robot walks there is no answer to compare with; one motion alone is too little.
+    well, whose prior would be the limit. Where much is left unexplained, be it in one regime (in turning round, say,
+    where play would show), joints shake or a robot walks there is no answer to compare with; one motion is too little.
     """
     exp, answer = found.experiment, found.answer
     verdict = found.verdict
