@@ -85,7 +85,7 @@ def test_a_rotor_that_is_as_light_as_it_can_be_is_far_off() -> None:
     light = bounded(np.where(np.arange(7)[:, None] == INERTIA, -99.0, 0.0) * np.array([1.0, 0.0]))
     answer = replace(result.selection.none, fit=replace(fit, nuisances=light))
     selection = replace(result.selection, none=answer, chosen=answer)
-    assert far_off(replace(result, selection=selection)) == ["shoulder (inertia)"]
+    assert far_off(replace(result, selection=selection)) == ["shoulder (inertia -6.2 g·m², at its limit)"]
     assert far_off(result) == []
 
 

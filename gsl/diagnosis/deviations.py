@@ -15,20 +15,22 @@ def far_off(found: Findings) -> list[str]:
     exp, sizes = found.experiment, found.simulator.spread * nuisance.SIZES[:, None]
     fitted = found.answer.fit.nuisances[:, : len(exp.joints)]
     off = np.abs(fitted / sizes)
+    inertias = nuisance.inertia_unit(found.simulator.plant.servo)
     return [
-        f"{joint} ({_shift(row, fitted[row, k], exp.robot.torque_unit)})"
+        f"{joint} ({_shift(row, fitted[row, k], exp.robot.torque_unit, inertias[k])})"
         for k, (joint, row) in enumerate(zip(exp.joints, off.argmax(axis=0), strict=True))
         if off[row, k] >= FAR_OFF
     ]
 
 
-def _shift(row: int, value: float, torque_unit: float) -> str:
+def _shift(row: int, value: float, torque_unit: float, inertia_unit: float) -> str:
     name = nuisance.NAMES[row]
     if row in (nuisance.KP, nuisance.KD):
         return f"{name} x {np.exp(value):.2f}"
     if row in (nuisance.ZERO, nuisance.OFFSET):
         return f"{name} {1e3 * value:+.0f} mrad"
     if row == nuisance.INERTIA:
-        return "inertia"
+        end = ", at its limit" if value in nuisance.INERTIAS else ""
+        return f"inertia {1e3 * inertia_unit * value:+.2g} g·m²{end}"
     unit = "N·m" if row == nuisance.COULOMB else "N·m·s/rad"
     return f"{name} {torque_unit * value:+.2g} {unit}"

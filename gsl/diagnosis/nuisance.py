@@ -21,6 +21,7 @@ PROBES = np.array([0.05, 0.10, 0.02, 0.002, 0.002, 0.5, 0.02])  # of the finite 
 KP, KD, COULOMB, ZERO, OFFSET, INERTIA, VISCOUS = range(7)
 HALF_STEP = 1e-3  # of a simulator at 2 ms [s]
 FACTORS = (0.1, 10.0)  # of the gains, at most
+INERTIAS = (-5.0, 20.0)  # units of the inertia, at most
 LEAST = 0.2  # share of the nominal inertia that is left
 SPREAD = 0.05  # of the rotors' inertia
 
@@ -57,7 +58,7 @@ def cost(nuisances: np.ndarray, spread: float = 1.0) -> float:
 def bounded(nuisances: np.ndarray) -> np.ndarray:
     """Return the nearest nuisances that are possible, shape (7, n_joints)."""
     result = nuisances.copy()
-    result[INERTIA] = np.clip(result[INERTIA], -5.0, 20.0)
+    result[INERTIA] = np.clip(result[INERTIA], *INERTIAS)
     result[: KD + 1] = np.clip(result[: KD + 1], *np.log(FACTORS))
     return result
 
