@@ -106,7 +106,7 @@ def test_the_first_screen_answers_everything() -> None:
     assert "In 3 of 14 joints: LKneePitch 60 % of the excess (most when fast, " in first
     assert " ×), LHipRoll 22 % and LHipPitch 8 %. The others are not surely beyond the noise." in first
     assert "kp 0.57 (0.55 to 0.60)" in first and "delay 31.2 ms (29.0 to 33.5 ms)" in first
-    assert "97 % sure, 81 % of the gap comes back without it (70 to 90 %)" in first
+    assert "97 % sure, 81 % of what a calibration leaves comes back without it (70 to 90 %)" in first
     assert "From 3.20 × to 1.05 × the noise floor on held-out records: 98 % of the excess is gone (95 to 99 %)" in first
     assert "gsl collect task=excite policy.file=runs/worn/diagnose/next.json name=next" in first
 

@@ -20,18 +20,14 @@ from gsl.diagnosis.localise import cells, horizon, regimes, sides
 from gsl.diagnosis.records import FEW
 from gsl.diagnosis.select import passed_over
 from gsl.diagnosis.shrinkage import shrinkage, unexplained
+from gsl.diagnosis.summary import doubt, summary
 from gsl.diagnosis.verdict import Cause
 from gsl.effects.effect import effect_class
 
 RANKED = 12  # hypotheses that are listed
 ASKED, STUCK = 0.05, 0.1  # command [rad], and share of it, below which a joint that moves less does not move
 ROUGH = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
-SURE = 0.9  # probability of every cause from which on they are said to be the causes
 REPLAYS, SHOWN = 6, 400  # pictures of replays, and their ticks at most
-WORDS = {
-    "no_gap": "The simulator and the robot agree as far as noise and a per-joint calibration can tell.",
-    "unknown": "There is a gap that no effect of the library explains.",
-}
 
 
 def document(found: Findings, **about: Any) -> dict[str, Any]:
@@ -48,9 +44,9 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
     places = [asdict(cell) for cell in cells(exp, z, regimes(exp, found.corrected))]
     return {
         "verdict": found.verdict.word,
-        "summary": _summary(found, causes, shrunk),
+        "summary": summary(found.verdict, causes, shrunk),
         "causes": causes,
-        "sure": _sure(causes),
+        "sure": not doubt(causes),
         "suspects": [_cause(found, one) for one in found.verdict.causes] if found.verdict.word == "unknown" else [],
         "inseparable": [list(group) for group in found.verdict.inseparable if causes],
         "droops": [asdict(one) for one in unsure],
@@ -238,33 +234,6 @@ def _stuck(found: Findings, k: int) -> bool:
     asked = max(float(np.ptp(one.targets[:, k])) for one in records)
     moved = max(float(np.ptp(one.position[:, k])) for one in records)
     return asked > ASKED and moved < STUCK * asked
-
-
-def _summary(found: Findings, causes: Sequence[Mapping[str, Any]], shrunk: Mapping[str, Any]) -> str:
-    verdict = found.verdict
-    if verdict.word in WORDS and not causes:
-        return WORDS[verdict.word]
-    *most, last = [f"{one['effect'].replace('_', ' ')}{_of(one['scope'])}" for one in causes]
-    named = f"{', '.join(most)} and {last}" if most else last
-    if verdict.word == "inseparable":
-        groups = "; ".join(" or ".join(group) for group in verdict.inseparable).replace("_", " ")
-        return f"The gap looks like {named}, but this log cannot tell apart: {groups}."
-    probably = "" if _sure(causes) else "probably "
-    if shrunk["fraction"] is None:
-        return f"The gap is {probably}caused by {named}."
-    gone, alone = (f"{100.0 * share:.0f} %" for share in (shrunk["fraction"], shrunk["calibration_fraction"]))
-    return (
-        f"A calibration of each joint takes {alone} of the gap on held-out data; what it leaves is {probably}caused by "
-        f"{named}, and with both {gone} is gone."
-    )
-
-
-def _sure(causes: Sequence[Mapping[str, Any]]) -> bool:
-    return min((one["probability"] for one in causes), default=1.0) >= SURE
-
-
-def _of(scope: str) -> str:
-    return "" if not scope else f" of {'all joints' if scope == 'all' else scope}"
 
 
 def _replays(found: Findings, before: np.ndarray, after: np.ndarray) -> list[dict[str, Any]]:

@@ -31,7 +31,8 @@ class Cause:
         index: Its place there.
         probability: That it is this effect.
         rival: The effect that comes nearest in its place, if any.
-        value, low, high: Share of the excess that comes back without it, with 95 % interval.
+        value, low, high: Share of the cost that a calibration leaves above the noise, which comes back without it, with
+            95 % interval.
     """
 
     index: int

@@ -31,6 +31,7 @@ from gsl.report.diagnosis_words import (
 )
 
 CAUSES, JOINTS, CAVEATS = 8, 5, 3  # rows at most
+BACK = "Back without it: of what a calibration of each joint leaves, how much is there again without this cause."
 
 
 class Told(NamedTuple):
@@ -58,8 +59,8 @@ def _causes(document: Document) -> Told:
     columns = ("cause", "parameter", "value", "95 % interval", "probability", "back without it")
     caption = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
     more = [f"and {len(rows) - CAUSES} more, in the report"] if len(rows) > CAUSES else []
-    told = "\n".join([*more, *filter(None, [summary]), *caption])
-    return Told(headline(document), columns, rows[:CAUSES], told or None)
+    told = "\n".join([*more, BACK, *filter(None, [summary]), *caption])
+    return Told(headline(document), columns, rows[:CAUSES], told)
 
 
 def _found(document: Document) -> Iterator[tuple[str, ...]]:

@@ -88,14 +88,15 @@ def alternatives(group: Sequence[str]) -> str:
 
 
 def sureness(cause: Document) -> str:
-    """Return how sure a cause is and how much of the gap comes back without it."""
+    """Return how sure a cause is and how much of what a calibration leaves comes back without it."""
     gain = part(cause, "gain")
     told = []
     if finite(cause.get("probability")) is not None:
         told.append(f"{probability(cause['probability'])} sure")
     if finite(gain.get("value")) is not None:
         bounds = between(gain, share)
-        told.append(f"{share(gain['value'])} of the gap comes back without it" + (f" ({bounds})" if bounds else ""))
+        back = f"{share(gain['value'])} of what a calibration leaves comes back without it"
+        told.append(back + (f" ({bounds})" if bounds else ""))
     return ", ".join(told)
 
 
