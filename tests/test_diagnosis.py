@@ -159,7 +159,7 @@ def test_one_motion_alone_makes_nobody_sure() -> None:
     found = document(diagnosed(lone, arm(), nominal(arm()), 0.002, QUICK, lambda _: None))
     assert [cause["effect"] for cause in found["causes"]] == ["command_latency"]
     assert found["causes"][0]["probability"] <= 0.8 and not found["sure"]
-    assert found["summary"].partition("what it leaves is ")[2].startswith("probably caused by command latency")
+    assert found["summary"].partition("it leaves is ")[2].startswith("probably caused by command latency")
     assert any(one.startswith("There is one motion only") for one in found["caveats"])
     (told,) = [one for one in summary_lines(found) if one.title == "what next"]
     assert "Mind: There is one motion only" in str(told.caption)
