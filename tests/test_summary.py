@@ -27,8 +27,8 @@ def test_the_least_sure_cause_makes_the_doubt(least: float, word: str) -> None:
 
 def test_causes_that_take_little_of_what_a_calibration_leaves_are_a_part_of_it() -> None:
     assert summary(FOUND, [cause(0.99)], shrunk(0.63, 0.54)) == (
-        "A calibration of each joint removes 54 % of the gap on held-out data; a part of what it leaves is caused by load "
-        "friction of all joints; together they remove 63 %."
+        "A calibration of each joint removes 54 % of the gap on held-out data; a part of what it leaves is caused by "
+        "load friction of all joints; together they remove 63 %."
     )
     assert "; what it leaves is possibly caused" in summary(FOUND, [cause(0.46)], shrunk(0.9, 0.5))
 
