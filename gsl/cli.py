@@ -18,16 +18,23 @@ from gsl.commandline.failure import INTERRUPTED, leave_quietly, report
 from gsl.console import Console
 from gsl.core.interruption import ignore, listen
 
+TYPED = "gsl.typed"
+
 
 class StageCommand(TyperCommand):
-    """A command whose help ends with the groups and settings of its configuration."""
+    """A command whose help ends with the groups and settings of its configuration, as it is typed."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Keep what is typed for the help, which is asked for before arguments are read."""
+        ctx.meta[TYPED] = [one for one in args if "=" in one and not one.startswith("-")]
+        return super().parse_args(ctx, args)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write usage and options, then what can be set."""
         from gsl.commandline.help import write_help
 
         super().format_help(ctx, formatter)
-        formatter.write(write_help(name_of(ctx), config_dir=user_folder(ctx)))
+        formatter.write(write_help(name_of(ctx), ctx.meta.get(TYPED, []), config_dir=user_folder(ctx)))
 
 
 class Shown(StrEnum):

@@ -27,7 +27,7 @@ from gsl.models.states import NearestChoice, StateForward, StateInverse
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.mlp import Mlp
 from gsl.policies.policy import sized
-from gsl.stages.grounding_states import value_report
+from gsl.stages.grounding_states import ValueReport, value_report
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.simulator import GroundedSimulator
 from gsl.stages.train_states import forward_of_states, inverse_of_states
@@ -434,3 +434,37 @@ def test_without_mujoco_a_line_says_what_to_install(monkeypatch: pytest.MonkeyPa
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(ConfigError, match=r"gsl\[mujoco\]"):
         GymnasiumWorld(env_id="InvertedPendulum-v5").make()
+
+
+def test_what_is_wrong_in_one_of_two_worlds_is_told_by_its_name(tmp_path: Path) -> None:
+    worlds = ("experiment=gymnasium", "sim.env_id=CartPole-v1")
+    line = refused("iterate", *worlds, "real.env_id=MyOwn-v0", folder=tmp_path)
+    assert line.startswith("real.env_id = MyOwn-v0: there is no such environment")
+    assert line.endswith("one that a module of yours registers is module:id")
+    alike = (*worlds, "real.env_id=CartPole-v1")
+    assert refused("iterate", *alike, "real.masss=3", folder=tmp_path).endswith(
+        "did you mean real.mass or real.kwargs?"
+    )
+    variables = refused("iterate", *alike, "forward_model.variables=[0,7]", folder=tmp_path)
+    assert variables == "forward_model.variables = 7: the state has entries 0 to 3"  # before anything is collected
+
+
+def test_help_is_of_the_world_that_is_typed(tmp_path: Path) -> None:
+    told = done("iterate", "experiment=gymnasium", "--help", folder=tmp_path).out
+    assert "env_id" in told and "gymnasium*" in told
+    assert "env_id" not in done("iterate", "--help", "real.no_such=1", folder=tmp_path).out
+
+
+@pytest.mark.parametrize(
+    ("real", "grounded", "line"),
+    [
+        ([-50.0, -51.0, -52.0], -50.5, "surely nearer"),
+        ([-20.0, -21.0, -22.0], -50.5, "surely farther"),
+        ([-50.0, -20.0, -30.0], -35.0, "does not tell"),
+        ([-50.0], -50.5, "is no measure"),
+    ],
+)
+def test_a_check_says_whether_a_grounding_is_nearer(real: list[float], grounded: float, line: str) -> None:
+    around = np.linspace(-1.0, 1.0, 5)
+    values = {"real": np.array(real), "grounded": grounded + around, "ungrounded": around - 20.0}
+    assert line in ValueReport(values, values).told

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -92,13 +92,23 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
         _check_grammar(overrides)
         composition = _added_where_declared(command, overrides, multirun)
     except (CompactHydraException, OmegaConfBaseException, YAMLError) as error:
-        raise unfit(command, arguments, unknown_key(error)) or translated(error, vocabulary) from error
+        words = _with_choices(command, arguments, vocabulary)
+        raise unfit(command, arguments, unknown_key(error)) or translated(error, words) from error
     _check_effects(composition)
     config = plain(composition.config)
     strangers = config.keys() - declared(config).keys() - plain(base).keys() - {*COMMAND_KEYS}
     if misfit := unfit(command, arguments, min(strangers, default=None)):
         raise misfit
     return composition
+
+
+def _with_choices(command: str, arguments: Sequence[str], words: Vocabulary) -> Vocabulary:
+    """Return the words of a command with what is typed of choices, the same ones if these are what is wrong."""
+    try:
+        chosen = _composed(command, _of_choices(_first_values(rewrite(arguments, words.chosen))[0]))
+    except (ConfigError, CompactHydraException, OmegaConfBaseException, YAMLError):
+        return words
+    return replace(words, keys=known_keys(_without_hydra(chosen)))
 
 
 def options(group: str) -> list[str]:
@@ -161,9 +171,12 @@ def _added_where_declared(command: str, overrides: list[str], multirun: bool) ->
 
 def _declares(command: str, overrides: list[str], key: str) -> bool:
     parent, _, name = key.rpartition(".")
-    chosen = [one for one in overrides if "=" in one and key_of(one).partition("@")[0] in groups()]
-    config = _composed(command, _first_values(chosen)[0])
+    config = _composed(command, _first_values(_of_choices(overrides))[0])
     return name in declared(plain(OmegaConf.select(config, parent) if parent else config))
+
+
+def _of_choices(overrides: Sequence[str]) -> list[str]:
+    return [one for one in overrides if "=" in one and key_of(one).partition("@")[0] in groups()]
 
 
 def _first_values(overrides: Sequence[str]) -> tuple[list[str], tuple[str, ...]]:

@@ -13,7 +13,7 @@ from gsl.commandline.known_settings import declared, plain
 from gsl.commandline.overrides import OPTIONAL_GROUPS
 from gsl.config import CommandSettings, resolved
 from gsl.core.setting import REQUIRED, Setting, settings_of
-from gsl.errors import ConfigError
+from gsl.errors import ConfigError, GslError
 
 WIDEST = 34
 
@@ -42,10 +42,13 @@ class Explanation:
         }
 
 
-def explained(command: str, *, config_dir: Path | None = None) -> Explanation:
-    """Return what the yaml files and classes of a command say about themselves."""
+def explained(command: str, typed: Sequence[str] = (), *, config_dir: Path | None = None) -> Explanation:
+    """Return what the yaml files and classes of a command say about themselves, with what is typed if it is right."""
     with opened(config_dir):
-        composition = compose(command, [])
+        try:
+            composition = compose(command, typed)
+        except GslError:
+            composition = compose(command, [])
         keys = {choice.partition("@")[2] or choice: choice for choice in composition.chosen}
         found = {key: options(choice.partition("@")[0]) for key, choice in keys.items()}
         found |= {group: options(group) for group in OPTIONAL_GROUPS if group in groups()}
@@ -57,9 +60,9 @@ def explained(command: str, *, config_dir: Path | None = None) -> Explanation:
         return Explanation(found, chosen, dict(_sections(values, found)))
 
 
-def write_help(command: str, *, config_dir: Path | None = None) -> str:
-    """Return the part of a command's help that comes from its configuration."""
-    explanation = explained(command, config_dir=config_dir)
+def write_help(command: str, typed: Sequence[str] = (), *, config_dir: Path | None = None) -> str:
+    """Return the part of a command's help that comes from its configuration, with what is typed of it."""
+    explanation = explained(command, typed, config_dir=config_dir)
     parts = [_table("Groups (KEY=NAME, * is the default):", list(_group_lines(explanation)))]
     for path, settings in explanation.sections.items():
         chosen = explanation.chosen.get(path)

@@ -50,7 +50,7 @@ class StateTransformation:
         """
         sizes = self.forward.states, self.forward.actions
         if sizes != (layout.states, layout.choices or len(layout.joints)):
-            problem = f"the models are of {sizes[0]} states and {sizes[1]} actions, the world is not"
+            problem = f"the models are of {sizes[0]} states and {sizes[1]} actions, world= is not"
             raise ConfigError("grounding", problem)
         return StateTransformationRun(self, rng)
 

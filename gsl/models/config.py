@@ -42,7 +42,9 @@ class ModelConfig:
     ] = "point"
     components: Annotated[int, setting("Gaussians of a mixture", ge=2, le=10)] = 3
     members: Annotated[int, setting("forward models of an ensemble, each of its own draw of trajectories", ge=1)] = 1
-    hidden: Annotated[tuple[int, ...], setting("widths of the MLP's hidden layers", min_length=1)] = (200, 180)
+    hidden: Annotated[
+        tuple[Annotated[int, setting("", ge=1)], ...], setting("widths of the MLP's hidden layers", min_length=1)
+    ] = (200, 180)
     epochs: Annotated[int, setting("most epochs of a fit", ge=1)] = 60
     patience: Annotated[int, setting("epochs without a better validation error before it ends", ge=1)] = 8
     rate: Annotated[float, setting("step of Adam", gt=0)] = 1e-3
@@ -53,6 +55,21 @@ class ModelConfig:
         """Refuse what no family can be."""
         if self.likelihood == "mixture" and self.family == "linear":
             raise ConfigError("family", "a linear model has no mixture; take mlp or auto", given=self.family)
+
+    def of_interest(self, states: int) -> tuple[int, ...]:
+        """Return the state variables of interest, by index.
+
+        Raises:
+            ConfigError: They are none, or not among so many states.
+        """
+        if self.variables == "all":
+            return tuple(range(states))
+        if not self.variables or len(set(self.variables)) < len(self.variables):
+            raise ConfigError("variables", "names at least one entry of the state, each once")
+        for variable in self.variables:
+            if not 0 <= variable < states:
+                raise ConfigError("variables", f"the state has entries 0 to {states - 1}", given=str(variable))
+        return self.variables
 
     @property
     def variants(self) -> Mapping[str, ModelConfig]:

@@ -20,7 +20,9 @@ class Mlp:
     π0 has random hidden layers, of one size for all states, and a last layer of 0: it acts with 0.
     """
 
-    hidden: Annotated[tuple[int, ...], setting("units of the hidden layers; none for a linear policy")] = (64, 64)
+    hidden: Annotated[
+        tuple[Annotated[int, setting("", ge=1)], ...], setting("units of the hidden layers; none for a linear policy")
+    ] = (64, 64)
     seed: Annotated[int, setting("of the first weights", ge=0)] = 0
     sizes: Annotated[tuple[int, int, int], setting("states, actions, choices; the world tells")] = (1, 1, 0)
 

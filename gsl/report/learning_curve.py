@@ -85,7 +85,8 @@ def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str |
     Args:
         searches: Panels from left to right.
         unit: Of all values.
-        title: By default how many of the generations' best stay on their feet in real, and beat their start.
+        title: By default how many of the generations' best stay on their feet in real, if some fall, and beat their
+            start.
     """
     with look():
         whole = figure(4.6)
@@ -95,7 +96,7 @@ def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str |
         for axes, one in zip(panels, searches, strict=True):
             _draw(axes, one)
             axes.tick_params(labelleft=True)
-        panels[0].set_ylabel(in_unit("value", unit))
+        panels[0].set_ylabel(in_unit("value", unit) if unit else "return of an episode")
         headline(whole, title or _finding(searches))
     return whole
 
@@ -200,4 +201,6 @@ def _finding(searches: Sequence[Search]) -> str:
     winners = [(point, one.points[0]) for one in searches for point in one.points[1:]]
     stable = sum(not point.falls for point, _ in winners)
     better = sum(not point.falls and point.real > start.real for point, start in winners)
+    if stable == len(winners):
+        return f"{better} of {len(winners)} generation winners beat their start in real"
     return f"Of {len(winners)} generation winners {stable} stay on their feet in real, {better} beat their start"

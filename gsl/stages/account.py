@@ -55,7 +55,20 @@ def _import(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     return Told("imported trajectories", tuple(row), [tuple(map(str, row.values()))], caption)
 
 
+def _of_states(metrics: Mapping[str, Any], what: str) -> Told | None:
+    """Return how a model of states does on held-out steps; none for one of joints."""
+    found = metrics["heldout"]
+    if "space" not in metrics or not {"r2", "action_r2"} & found.keys():
+        return None
+    each = [(f"state.{name}", value) for name, value in found.get("r2_by_variable", {}).items()]
+    rows = [*each, ("all", found["r2"])] if "r2" in found else [("actions", found["action_r2"])]
+    shown = [(name, f"{100.0 * value:.1f} %") for name, value in rows]
+    return Told(f"{what} ({metrics['family']}) on held-out trajectories", ("of", "variance explained"), shown)
+
+
 def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    if told := _of_states(metrics, "forward model"):
+        return told
     names = {
         "one_step_deg": "one tick [°]",
         "one_step_no_change_deg": "no change, one tick [°]",
@@ -77,6 +90,8 @@ def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told
 
 
 def _train_inverse(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    if told := _of_states(metrics, "inverse model"):
+        return told
     measured = metrics["heldout"]
     title = f"inverse model ({metrics['method']}, {metrics['family']}) on held-out simulated trajectories"
     row = (_number(measured["recovered_action_deg"]), _worst(measured["recovered_action_by_joint_deg"]))
@@ -108,22 +123,26 @@ def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
         for one in document[phase]
     ]
     titles = tuple(columns(document["policies"][0], unit.name))
-    return Told("policies in the real world", titles, rows, _returned(metrics, unit))
+    return Told("policies in the real world", titles, rows, returned(metrics, unit))
 
 
 def _bounds(interval: list[float | None]) -> list[float]:
     return [math.inf if bound is None else bound for bound in interval]
 
 
-def _returned(metrics: Mapping[str, Any], unit: Unit) -> str:
+def returned(metrics: Mapping[str, Any], unit: Unit) -> str:
+    """Return in a line what an evaluation chose, what that is worth beside π0, and what it cost."""
     spent = f"{metrics['real_episodes']} real episodes"
     if not metrics["best_generation"]:
         return f"no stable policy was faster: {metrics['best']} is returned; {spent}"
-    gain, after = metrics["gain"], metrics["returned"]
+    gain, after, before = metrics["gain"], metrics["returned"], metrics["baseline"]
     bounds = unit.interval(gain["interval"], sign=True)
-    fallen = falls(after["falls"], after["episodes"])
-    told = f"{unit.shown(gain['value'], sign=True)} on fresh episodes, 95 % interval {bounds}, {fallen}"
-    return f"{metrics['best']} is returned: {told}; {spent}"
+    values = (
+        f"{unit.shown(after['value'])}, {falls(after['falls'], after['episodes'])}; π0 {unit.shown(before['value'])}"
+    )
+    told = f"on fresh episodes {values}; gain {unit.shown(gain['value'], sign=True)}, 95 % interval {bounds}"
+    doubt = "" if gain["interval"][0] > 0.0 else ", not surely a gain" if gain["value"] > 0.0 else ": worse than π0"
+    return f"{metrics['best']} is returned: {told}{doubt}; {spent}"
 
 
 def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
@@ -131,11 +150,13 @@ def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     spent, learned, flight = metrics["real_episodes"], metrics["learned_from"], metrics.get("excitation")
     air = f"{flight['episodes']} motions in the air ({flight['real_seconds']:.0f} s) to diagnose, " if flight else ""
     measured = spent - learned - (flight["episodes"] if flight else 0)
+    beside = metrics.get("ungrounded")
+    more = f"; {beside['real_episodes']} more to measure the search without grounding" if beside else ""
     plots = ", ".join(sorted(path.name for path in folder.glob("*.png")))
     below = [
         *([metrics["diagnosis"]["told"]] if metrics.get("diagnosis") else []),
         metrics["verdict"],
-        f"real data: {air}{learned} episodes to learn from, {measured} to measure, {spent} in all",
+        f"real data: {air}{learned} episodes to learn from, {measured} to measure, {spent} in all{more}",
         f"plots: {folder.as_posix()}/ ({plots})",
     ]
     return Told(in_unit("grounded simulation learning", unit.name), titles, rows, "\n".join(below))

@@ -155,12 +155,15 @@ class Gate:
         """Compare what π0 is worth with held-out real episodes."""
         if uncharged(ready):
             problem = "the reward may charge for the grounded action instead of the agent's"
-            self.console.status(f"warning: {problem}; say what it charges with control_cost of the simulator")
+            advice = (
+                "sim.control_cost='{_target_: gsl.worlds.control_cost.Quadratic, weight: 0.1}' says what it charges"
+            )
+            self.console.status(f"warning: {problem}; {advice} (world.control_cost in optimize)")
         real = of_policy(heldout, pi0=True) or heldout.episodes
         noise = exploration(heldout.metadata.get("action_noise", 0.0), ready.world.layout)
         report = value_report(ready, self.parameters, real, noise, derived_seed(self.seed, "check"))
         write_json(self.folder / REPORT, report.metrics())
-        self.console.table("π0 in the grounded simulator", VALUE_TITLES, report.rows())
+        self.console.table("π0 in the grounded simulator", VALUE_TITLES, report.rows(), report.told)
         self._judge(report.problems, "Collect more data")
         return ready, {"grounding_acceptable": not report.problems}
 

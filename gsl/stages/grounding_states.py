@@ -40,6 +40,20 @@ class ValueReport:
         told = {name: f"{self.values[name].mean():.1f}" for name in self.values}
         return (f"π0 is worth {told['grounded']}, {told['ungrounded']} without grounding, {told['real']} in real",)
 
+    @property
+    def told(self) -> str:
+        """What π0 tells of the grounding, in words."""
+        if len(self.values["real"]) < 2:
+            return "one held-out real episode is no measure: nothing is known of this grounding"
+        if self.problems:
+            return "with the grounding π0 is surely farther from what it is worth in real"
+        real = self.values["real"]
+        off = {name: difference_interval(self.values[name], real) for name in ("grounded", "ungrounded")}
+        most = max(abs(off["grounded"].lower), abs(off["grounded"].upper))
+        if most < max(0.0, off["ungrounded"].lower, -off["ungrounded"].upper):
+            return "with the grounding π0 is surely nearer to what it is worth in real"
+        return "π0 does not tell whether this grounding is nearer to real: the search goes on with it"
+
     def rows(self) -> list[tuple[str, ...]]:
         """Return a table for people; its titles are `TITLES`."""
         return [self._row(name) for name in self.values]

@@ -76,6 +76,11 @@ class Iterate:
             raise ConfigError("sim", "is a real robot, which cannot play the simulator's part")
         object.__setattr__(self, "policy", sized(self.policy, self.sim))
         check_alike(self.sim.layout, self.real.layout)
+        for name, model in {"forward_model": self.forward_model, "inverse_model": self.inverse_model}.items():
+            try:
+                model.of_interest(self.sim.layout.states)
+            except ConfigError as error:
+                raise error.under(name) from error
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""

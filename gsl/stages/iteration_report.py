@@ -98,7 +98,13 @@ class Rounds:
         low, high = (factor * bound for bound in self.best.metrics["gain"]["interval"])
         last = " ".join(filter(None, [f"gain of the last step {low:+.0f} to {high:+.0f}", unit, "(95 %)"]))
         returned = f"{values[1]:.1f} {self._task.unit}".rstrip()
-        return f"In real: π0 {values[0]:.1f}, returned {returned}, {last}, {falls}. {cost}"
+        of = f" by iteration {1 + self._done.index(self.best)}" if len(self._done) > 1 else ""
+        return f"In real: π0 {values[0]:.1f}, returned{of} {returned}, {last}, {falls}. {self._ended}{cost}"
+
+    @property
+    def _ended(self) -> str:
+        """Why no iteration followed, where the last one's gain is not sure."""
+        return "" if self.rising else f"The gain of iteration {len(self._done)} is not sure: no other follows. "
 
     def metrics(self) -> Mapping[str, Any]:
         """Return the figures of all rounds."""

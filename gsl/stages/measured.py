@@ -43,10 +43,11 @@ def gain(after: Sequence[Episode], before: Sequence[Episode]) -> dict[str, Any]:
     Where the latter's own interval holds 0 there is no share: None.
     """
     values = [np.array([episode.value for episode in done]) for done in (after, before)]
+    shared = mean_interval(values[1]).lower > 0.0
     if after is before:
-        return {"value": 0.0, "interval": [0.0, 0.0], "share": 0.0}
+        return {"value": 0.0, "interval": [0.0, 0.0], "share": 0.0 if shared else None}
     difference = difference_interval(*values)
-    share = difference.mean / mean(before) if mean_interval(values[1]).lower > 0.0 else None
+    share = difference.mean / mean(before) if shared else None
     return {"value": difference.mean, "interval": [difference.lower, difference.upper], "share": share}
 
 

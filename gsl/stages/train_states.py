@@ -104,15 +104,10 @@ def _choices(data: Parts) -> int:
 
 
 def _variables(config: ModelConfig, batch: Batch) -> tuple[int, ...]:
-    if config.variables == "all":
-        return tuple(range(batch.states))
-    if not config.variables or len(set(config.variables)) < len(config.variables):
-        raise ConfigError("model.variables", "names at least one entry of the state, each once")
-    for variable in config.variables:
-        if not 0 <= variable < batch.states:
-            problem = f"the state has entries 0 to {batch.states - 1}"
-            raise ConfigError("model.variables", problem, given=str(variable))
-    return config.variables
+    try:
+        return config.of_interest(batch.states)
+    except ConfigError as error:
+        raise error.under("model") from error
 
 
 def _steps(batch: Batch, variables: tuple[int, ...]) -> Steps:

@@ -45,6 +45,10 @@ class GymnasiumWorld:
         setting("what the reward charges for an action; none for what the environment's info tells"),
     ] = None
 
+    def __post_init__(self) -> None:
+        """Build it once, so that what is wrong is told by the name of the setting that it is wrong in."""
+        _ = self.layout
+
     @cached_property
     def layout(self) -> Layout:
         """What an observation holds; building the environment tells."""
@@ -181,7 +185,8 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
     except gymnasium.error.DependencyNotInstalled as error:
         raise ConfigError("env_id", f"{_line(error)}; MuJoCo's are in gsl[mujoco]", given=name) from error
     except gymnasium.error.Error as error:
-        raise ConfigError("env_id", f"there is no such environment: {_line(error)}", given=name) from error
+        hint = "" if ":" in name else "; one that a module of yours registers is module:id"
+        raise ConfigError("env_id", f"there is no such environment: {_line(error)}{hint}", given=name) from error
     except Exception as error:
         told = f"{name} cannot be made with them: {type(error).__name__}: {_line(error)}"
         raise ConfigError("kwargs", told, given=str(dict(kwargs))) from error

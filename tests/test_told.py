@@ -1,0 +1,65 @@
+"""What is said of measured policies: which is returned, what it is worth beside π0, and why the iterations ended."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from gsl.stages.account import returned
+from gsl.stages.headline import Unit
+from gsl.stages.iteration_report import Rounds
+from gsl.stages.measured import gain
+from gsl.storage.artifact import Artifact
+from gsl.tasks.own_reward import OwnReward
+
+
+def measured(value: float) -> dict[str, Any]:
+    return {"value": value, "interval": [value - 1.0, value + 1.0], "falls": 0, "episodes": 10}
+
+
+def metrics(before: float, after: float, low: float, high: float) -> dict[str, Any]:
+    return {
+        "best": "generation_01",
+        "best_generation": 1,
+        "returned_value_sim": after,
+        "baseline": measured(before),
+        "returned": measured(after),
+        "gain": {"value": after - before, "interval": [low, high], "share": None},
+        "real_episodes": 30,
+    }
+
+
+def evaluation(*figures: float) -> Artifact:
+    return cast(Artifact, SimpleNamespace(metrics=metrics(*figures), folder="runs/x"))
+
+
+@pytest.mark.parametrize(
+    ("figures", "end"),
+    [
+        ((-6.0, -23.3, -35.0, 0.3), "95 % interval -35.0 to +0.3: worse than π0; 30 real episodes"),
+        ((-6.0, -4.0, -1.0, 5.0), "95 % interval -1.0 to +5.0, not surely a gain; 30 real episodes"),
+        ((-6.0, -4.0, 1.0, 3.0), "95 % interval +1.0 to +3.0; 30 real episodes"),
+    ],
+)
+def test_a_value_is_never_its_gain(figures: tuple[float, ...], end: str) -> None:
+    told = returned(metrics(*figures), Unit())
+    assert told.startswith(
+        f"generation_01 is returned: on fresh episodes {figures[1]:.1f}, no falls in 10; π0 -6.0; gain "
+    )
+    assert told.endswith(end)
+
+
+def test_the_verdict_says_which_iteration_is_returned_and_why_there_are_no_more() -> None:
+    rounds = Rounds(OwnReward())
+    rounds.add(evaluation(-20.0, -14.6, 3.0, 8.0), 10)
+    assert "no other follows" not in rounds.verdict
+    rounds.add(evaluation(-14.2, -13.4, -2.0, 4.0), 10)
+    assert "returned by iteration 1 -14.6" in rounds.verdict
+    assert "The gain of iteration 2 is not sure: no other follows." in rounds.verdict
+
+
+def test_a_gain_over_nothing_has_no_share() -> None:
+    around = [cast(Any, SimpleNamespace(value=value, fell=False)) for value in (-1.0, 0.5, 1.0)]
+    assert gain(around, around)["share"] is None
