@@ -34,6 +34,7 @@ COLUMNS = (
     "gain over the last",
     "real episodes",
 )
+BEGUN = {"pi0": "π0", "start": "where it began"}  # what a search without a better policy returns
 TAKEN_OVER, SHOWN = 2.0, 0.8  # when the simulators take over from the real robot, and for how long [s]
 
 
@@ -159,7 +160,8 @@ class Rounds:
         gained = absolute if gain["share"] is None else f"{100 * gain['share']:+.1f} %"
         zero: tuple[str, ...] = ("0", "π0", "", *self._measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
-        rows.append((label, metrics["best"], expected, *self._measured(metrics["returned"]), gained, cost))
+        name = BEGUN.get(metrics["best"], metrics["best"])
+        rows.append((label, name, expected, *self._measured(metrics["returned"]), gained, cost))
         self.rows += rows
         return rows
 
