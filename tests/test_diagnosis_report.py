@@ -324,13 +324,13 @@ def test_where_speaks_of_regimes_if_no_joint_stands_out_as_a_whole() -> None:
     hip = {"joint": "Hip", "regime": "all", "share": 0.01, "named": False}
     told = where_sentence({"where": [cell, whole, hip]})
     assert told == (
-        "No joint stands out as a whole. Surely beyond the noise only at times: Knee when under high load, 5.20 ×. "
-        "The others are not surely beyond the noise."
+        "No joint stands out as a whole. Surely beyond the noise only at times: Knee when asked for much torque, "
+        "5.20 ×. The others are not surely beyond the noise."
     )
     beside = where_sentence({"where": [cell, whole, {**hip, "share": 0.6, "rms": 3.0, "named": True}]})
     assert beside == (
-        "In 1 of 2 joints: Hip 60 % of the excess. Surely beyond the noise only at times: Knee when under high load, "
-        "5.20 ×."
+        "In 1 of 2 joints: Hip 60 % of the excess. Surely beyond the noise only at times: Knee when asked for much "
+        "torque, 5.20 ×."
     )
 
 
@@ -411,3 +411,20 @@ def test_a_terminal_shows_names_as_they_are(capsys: pytest.CaptureFixture[str]) 
     for told in summary_lines(made.document(("[red]Knee",), causes=1)):
         Console().table(*told)
     assert "servo gain of [red]Knee" in capsys.readouterr().out
+
+
+def test_a_corrected_simulator_is_not_for_what_it_does_not_explain() -> None:
+    found = {**made.document(causes=1), "unexplained": ["fast (5.1 → 5.3 ×)", "Jaw (2.2 → 2.5 ×)"]}
+    assert steps(found)[0].why.endswith("not where it is no nearer to the robot than before: fast, Jaw.")
+
+
+def test_an_unsure_cause_comes_with_what_would_tell() -> None:
+    found = made.document(causes=1)
+    (cause,) = found["causes"]
+    confused = {**cause, "probability": 0.46, "confused": "kp; two weights tell them apart"}
+    unsure = {**found, "causes": [confused], "sure": False, "next_experiment": None}
+    told = steps(unsure)[-1].why
+    assert told.startswith("To be surer of ") and told.endswith(
+        "which is confused with kp; two weights tell them apart."
+    )
+    assert [one.why for one in steps({**unsure, "sure": True})] == [steps(unsure)[0].why]

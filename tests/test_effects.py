@@ -5,7 +5,7 @@ import pytest
 from bodies import STANCE, followed, held, walked, world
 
 from gsl.core.plant import Plant, nominal
-from gsl.effects.effect import KINDS, applied, built, effect_class, names
+from gsl.effects.effect import KINDS, applied, built, confused_with, effect_class, names
 from gsl.errors import ConfigError
 from gsl.robots.nao import CONTROLLED, nao
 
@@ -174,3 +174,9 @@ def test_a_users_own_effect_stands_beside_ours() -> None:
 
     both = built({"mine": Stiff(), "servo_gain": {"kp": 0.5}})
     np.testing.assert_array_equal(applied(nominal(nao()), both).servo.kp, nominal(nao()).servo.kp)
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_effect_says_what_tells_it_from_others(name: str) -> None:
+    told = confused_with(name)
+    assert len(told) > 40 and not told.endswith(".")

@@ -94,6 +94,6 @@ def test_a_part_of_the_log_that_is_as_far_off_as_before_is_not_explained() -> No
     joints = [{"joint": "Jaw", "before": 2.5, "after": 2.4}, {"joint": "Elbow", "before": 5.0, "after": 3.0},
               {"joint": "Wrist", "before": 1.5, "after": 1.6}]  # fmt: skip
     assert unexplained({"by_regime": regimes, "by_joint": joints}) == [
-        "high load (11.0 to 12.0 x)",
-        "Jaw (2.5 to 2.4 x)",
+        "much torque asked for (11.0 → 12.0 ×)",
+        "Jaw (2.5 → 2.4 ×)",
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -13,20 +12,17 @@ from gsl.core.setting import settings_of
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import NOISE_COST, Hypothesis, share
 from gsl.diagnosis.candidates import Candidate
-from gsl.diagnosis.deviations import far_off
+from gsl.diagnosis.caveats import caveats
 from gsl.diagnosis.diagnose import Findings
-from gsl.diagnosis.droop import Droop, droops
+from gsl.diagnosis.droop import droops
 from gsl.diagnosis.localise import cells, horizon, regimes, sides
-from gsl.diagnosis.records import FEW
 from gsl.diagnosis.select import passed_over
 from gsl.diagnosis.shrinkage import shrinkage, unexplained
 from gsl.diagnosis.summary import doubt, summary
 from gsl.diagnosis.verdict import Cause
-from gsl.effects.effect import effect_class
+from gsl.effects.effect import confused_with, effect_class
 
 RANKED = 12  # hypotheses that are listed
-ASKED, STUCK = 0.05, 0.1  # command [rad], and share of it, below which a joint that moves less does not move
-ROUGH = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
 REPLAYS, SHOWN = 6, 400  # pictures of replays, and their ticks at most
 
 
@@ -41,6 +37,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
     causes = [] if found.verdict.word in ("no_gap", "unknown") else [_cause(found, one) for one in found.verdict.causes]
     after = everything.simulator.told(answer.effects, answer.fit.nuisances, exp.pieces)
     shrunk = shrinkage(found, told, after)
+    far = unexplained(shrunk) if causes else []
     places = [asdict(cell) for cell in cells(exp, z, regimes(exp, found.corrected))]
     return {
         "verdict": found.verdict.word,
@@ -63,7 +60,8 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
             "sd": dict(zip(exp.channels, exp.comparison.floor.tolist(), strict=True)),
         },
         "invisible": list(found.selection.screening.invisible),
-        "caveats": [*_caveats(found, unsure), *_unexplained(shrunk, causes)],
+        "unexplained": far,
+        "caveats": caveats(found, unsure, shrunk, far),
         "limits": [],
         "next_experiment": None,
         "policy_gap": None,
@@ -87,6 +85,7 @@ def _cause(found: Findings, one: Cause) -> dict[str, Any]:
         "probability": one.probability,
         "gain": {"value": one.value, "low": one.low, "high": one.high},
         "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
+        "confused": confused_with(candidate.effect),
     }
 
 
@@ -105,9 +104,11 @@ def _parameters(candidate: Candidate, values: np.ndarray, sd: np.ndarray) -> dic
             "value": float(value),
             "low": float(max(low, value - 1.96 * spread)),
             "high": float(min(high, value + 1.96 * spread)),
-            "unit": known[name].unit,
+            "unit": known[name].unit or ("×" if neutral == 1.0 else ""),
         }
-        for name, value, spread, low, high in zip(candidate.free, values, sd, *candidate.bounds, strict=True)
+        for name, value, spread, neutral, low, high in zip(
+            candidate.free, values, sd, candidate.neutral, *candidate.bounds, strict=True
+        )
     }
 
 
@@ -156,84 +157,6 @@ def _calibration(found: Findings) -> list[dict[str, Any]]:
         }
         for joint, (kp, kd, coulomb, zero, offset, inertia, viscous), rotor in columns
     ]
-
-
-def _caveats(found: Findings, unsure: Sequence[Droop]) -> list[str]:
-    exp, said = found.experiment, []
-    if unsure:
-        zeros = ", ".join(f"{one.joint} {1e3 * one.zero:+.0f} mrad" for one in unsure)
-        said.append(
-            "Inseparable in this log, in which gravity hardly changes: a shifted zero and another droop under gravity, "
-            f"by a load or a gain that is off. The fit calls it a zero: {zeros}."
-        )
-    if held := ", ".join(one.joint for one in unsure if not one.told):
-        said.append(f"No poses of one joint change gravity enough there to tell; turn the base round: {held}.")
-    if found.shift:
-        said.append(
-            f"The clocks are apart: {1e3 * found.shift:.1f} ms were taken out first, so that no latency can show."
-        )
-    if found.baseline is not None and found.baseline.effects:
-        names = ", ".join(found.baseline.effects)
-        said.append(f"The reference shows it already, so it is no cause but a part of the simulator now: {names}.")
-    if exp.noise.source != "repeats":
-        said.append("No command was played twice: the noise floor is estimated from the roughness of the log.")
-    if exp.noise.unsteady.any():
-        names = ", ".join(name for name, is_so in zip(exp.channels, exp.noise.unsteady, strict=True) if is_so)
-        said.append(
-            f"Repeats of the same commands differ here by far more than elsewhere, which counts as gap: {names}."
-        )
-    if not exp.by_record:
-        said.append("There is one motion only: every second part of it was held out, which is weak evidence.")
-    elif len(np.unique(exp.pieces.record[exp.held_out])) < FEW:
-        said.append("Few trajectories are held out: intervals are over parts of them and may be too narrow.")
-    if not found.trials and found.verdict.causes and not exp.walking:
-        said.append("No self-test was made (duels=0): probabilities are those of the fit alone, and too sure.")
-    if found.tolerance:
-        said.append(
-            f"Differences of {1e3 * found.tolerance:.0f} mrad count as noise (tolerance): smaller causes cannot show."
-        )
-    elif found.verdict.word == "unknown" and found.verdict.remaining > ROUGH:
-        said.append(
-            "What is left is far above the noise, and everything counts as an outlier: say with tolerance=0.02 [rad] "
-            "what does not matter, and the larger causes come out."
-        )
-    if exp.comparison.shaking.any():
-        names = ", ".join(name for name, shakes in zip(exp.channels, exp.comparison.shaking, strict=True) if shakes)
-        said.append(f"These joints shake while their commands rest and are judged by the spectrum: {names}.")
-    still = [name for k, name in enumerate(exp.joints) if max(np.ptp(r.targets[:, k]) for r in exp.records) < 1e-6]
-    if still:
-        said.append(
-            f"These joints are never commanded to move, so hardly anything can be said of them: {', '.join(still)}."
-        )
-    stuck = [name for k, name in enumerate(exp.joints) if _stuck(found, k)]
-    if stuck:
-        said.append(f"These joints are commanded to move and do not: {', '.join(stuck)}. Look at them first.")
-    far = far_off(found)
-    if far:
-        said.append(
-            f"The calibration of these joints is far from what robots of one make differ by, so that it may hide a "
-            f"cause: {', '.join(far)}."
-        )
-    said += [f"{effect} would explain much, but {reason}." for effect, reason in found.refuted.items()]
-    if found.verdict.in_part:
-        said.append(
-            f"{100.0 * (1.0 - found.verdict.explained):.0f} % of the excess remains: something else is at work as well."
-        )
-    return said
-
-
-def _unexplained(shrunk: Mapping[str, Any], causes: Sequence[Any]) -> list[str]:
-    far = unexplained(shrunk) if causes else []
-    told = "Not explained, no nearer to the robot than before or farther, in noise floors"
-    return [f"{told}: {', '.join(far)}."] if far else []
-
-
-def _stuck(found: Findings, k: int) -> bool:
-    """Whether a joint stays where it is for all that it is commanded."""
-    records = found.experiment.records
-    asked = max(float(np.ptp(one.targets[:, k])) for one in records)
-    moved = max(float(np.ptp(one.position[:, k])) for one in records)
-    return asked > ASKED and moved < STUCK * asked
 
 
 def _replays(found: Findings, before: np.ndarray, after: np.ndarray) -> list[dict[str, Any]]:

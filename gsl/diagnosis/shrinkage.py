@@ -13,6 +13,7 @@ from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.localise import regimes
 
 SAMPLES = 1000
+WORDS = {"high_load": "much torque asked for", "reversal": "turning round"}  # for regimes
 FAR, ALIKE = 2.0, 0.95  # floors, and a share of what they were before: a part of the log above both is not explained
 NOTHING = 0.02  # of an excess in squared floors: below it there is nothing to shrink
 
@@ -67,7 +68,7 @@ def unexplained(told: Mapping[str, Any]) -> list[str]:
     """
     parts = [(one.get("joint") or one["regime"], one) for one in (*told["by_regime"], *told["by_joint"])]
     return [
-        f"{name.replace('_', ' ')} ({one['before']:.1f} to {one['after']:.1f} x)"
+        f"{WORDS.get(name, name)} ({one['before']:.1f} → {one['after']:.1f} ×)"
         for name, one in parts
         if name != "all" and one["after"] > max(FAR, ALIKE * one["before"])
     ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import pkgutil
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
@@ -60,6 +61,12 @@ def effect_class(name: str) -> type:
         raise ConfigError(f"effects.{name}", f"no effect of this name; {hint}")
     module = importlib.import_module(f"gsl.effects.{name}")
     return getattr(module, "".join(word.capitalize() for word in name.split("_")))
+
+
+def confused_with(name: str) -> str:
+    """Return what an effect is confused with and what tells them apart, from its class."""
+    told = " ".join((effect_class(name).__doc__ or "").split()).partition("Confused with ")[2]
+    return re.split(r"\.(?:\s|$)", told, maxsplit=1)[0]
 
 
 def documented(name: str, robot: Robot) -> dict[str, Setting]:

@@ -7,8 +7,9 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from gsl.report.diagnosis_verdict import verdict
-from gsl.report.diagnosis_words import Document, entries, listed, name, part
+from gsl.report.diagnosis_words import Document, entries, finite, listed, name, part
 
+SURE = 0.9  # probability of a cause from which on nothing has to make it surer
 NOTHING = "no effect"  # as a document has it, beside an effect that the log cannot show
 
 
@@ -33,7 +34,9 @@ def steps(document: Document) -> list[Step]:
         return [Step(str(one.get("why") or ""), str(one.get("command") or "")) for one in given]
     first = {"no_gap": _as_it_is, "causes": _corrected, "inseparable": _either, "unknown": _learned}[verdict(document)]
     experiment = _experiment(document)
-    return [*experiment, first(document)] if verdict(document) == "inseparable" else [first(document), *experiment]
+    if verdict(document) == "inseparable":
+        return [*experiment, first(document)]
+    return [first(document), *(experiment or (_surer(document) if verdict(document) == "causes" else []))]
 
 
 def _as_it_is(document: Document) -> Step:
@@ -42,8 +45,20 @@ def _as_it_is(document: Document) -> Step:
 
 
 def _corrected(document: Document) -> Step:
-    told = f"Train in the simulator with the effects switched on{_place(document)}"
-    return Step(f"{told}{_yours(document)}.", _training(document))
+    told = f"Train in the simulator with the effects switched on{_place(document)}{_yours(document)}"
+    far = [str(one).partition(" (")[0] for one in entries(document, "unexplained")]
+    mind = f", not where it is no nearer to the robot than before: {', '.join(far)}" if far else ""
+    return Step(f"{told}{mind}.", _training(document))
+
+
+def _surer(document: Document) -> list[Step]:
+    """What would make unsure causes surer, where no experiment of ours does."""
+    causes = [] if document.get("sure", True) else entries(document, "causes")
+    return [
+        Step(f"To be surer of {name(one['effect'])}, which is confused with {one['confused']}.")
+        for one in causes
+        if one.get("confused") and (finite(one.get("probability")) or 0.0) < SURE
+    ]
 
 
 def _either(document: Document) -> Step:

@@ -32,7 +32,7 @@ SHOWN = 12
 def causes(document: Document) -> Html | None:
     """Return every fitted parameter of the causes as it stands in the corrected simulator."""
     rows = [row for cause in entries(document, "causes") for row in _parameters(cause)]
-    columns = ("cause", "parameter", "value", "95 % interval", "in the file", "sure", "back without it")
+    columns = ("cause", "parameter", "value", "95 % interval", "in the file", "sure", "of the rest, back without it")
     return section("The causes in numbers", table(columns, rows) if rows else None)
 
 
@@ -57,7 +57,8 @@ def ranking(document: Document) -> Html | None:
     form = share if shares else short
     chosen = sorted((str(cause.get("effect")), said(cause, "scope")) for cause in entries(document, "causes"))
     dots = [_dot(one, form, chosen=_what(one) == chosen) for one in found[:SHOWN]]
-    measure = "the share of the gap that it explains" if shares else "the cost that it saves"
+    share_of = "the share of what a calibration of each joint leaves that it explains (outliers count for less)"
+    measure = share_of if shares else "the cost that it saves"
     note = (
         f"Each was fitted on some records and judged on others. Shown: {measure}, with its 95 % interval (left of the "
         "line it makes things worse), and how much more it costs than the verdict, which is in colour. An effect has "

@@ -31,7 +31,6 @@ from gsl.report.diagnosis_words import (
 )
 
 CAUSES, JOINTS, CAVEATS = 8, 5, 3  # rows at most
-BACK = "Back without it: of what a calibration of each joint leaves, how much is there again without this cause."
 
 
 class Told(NamedTuple):
@@ -56,11 +55,11 @@ def _causes(document: Document) -> Told:
         alike = [("either", alternatives(group)) for group in entries(document, "inseparable")]
         alike += [("nearest", nearest(document))] if nearest(document) else []
         return Told(headline(document), ("", ""), [*alike, *_shrinkage(document)], summary)
-    columns = ("cause", "parameter", "value", "95 % interval", "probability", "back without it")
+    columns = ("cause", "parameter", "value", "95 % interval", "probability", "of the rest, back without it")
     caption = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
     more = [f"and {len(rows) - CAUSES} more, in the report"] if len(rows) > CAUSES else []
-    told = "\n".join([*more, BACK, *filter(None, [summary]), *caption])
-    return Told(headline(document), columns, rows[:CAUSES], told)
+    told = "\n".join([*more, *filter(None, [summary]), *caption])
+    return Told(headline(document), columns, rows[:CAUSES], told or None)
 
 
 def _found(document: Document) -> Iterator[tuple[str, ...]]:

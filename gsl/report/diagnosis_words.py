@@ -16,7 +16,7 @@ REGIMES = {
     "slow": "slow",
     "fast": "fast",
     "reversal": "turning round",
-    "high_load": "under high load",
+    "high_load": "asked for much torque",
     "saturated": "saturated",
     "after_contact": "after contact",
     "stance": "in stance",

@@ -1,0 +1,47 @@
+"""What a diagnosis tells to be careful with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+from test_limits import found
+from test_verdict import EMPTY, friction, selection, with_both
+
+from gsl.diagnosis.caveats import caveats
+from gsl.diagnosis.diagnose import Findings
+from gsl.diagnosis.verdict import Verdict
+
+LEFT: dict[str, Any] = {"fraction": 0.63}
+NAMED = Verdict("causes", (), (), 0.97, 1.0, 1.0)
+
+
+def named(result: Findings, **changes: Any) -> Findings:
+    return replace(result, verdict=NAMED, **changes)
+
+
+def test_what_remains_is_told_of_held_out_squares() -> None:
+    told = caveats(named(found({})), (), LEFT, ["fast (5.1 → 5.3 ×)"])
+    assert "37 % of the held-out excess remains: something else is at work as well." in told
+    assert told[-1].endswith("fast (5.1 → 5.3 ×). What is not named is not excluded there.")
+    assert not any("remains" in one for one in caveats(named(found({})), (), {"fraction": 0.98}, []))
+
+
+def test_a_value_that_hangs_on_another_effect_is_told() -> None:
+    one = friction("all", 300.0)
+    other = replace(EMPTY.candidates[0].on("elbow"), effect="backlash")
+    both = with_both(one, replace(one, candidates=(other,)), 290.0)
+    both = replace(both, parameters=(np.array([0.04]), np.array([0.02])), costs=np.array([260.0, 320.0] * 4))
+    result = found({})
+    chosen = cast(Any, selection(one, both))
+    (told,) = [line for line in caveats(named(result, selection=chosen), (), {"fraction": 1.0}, []) if "beside" in line]
+    assert told.startswith("coulomb friction's torque is 0.1 here and 0.04 with backlash beside it")
+    assert "not surely better" in told
+
+
+def test_a_value_beyond_its_documented_range_is_told() -> None:
+    one = friction("all", 300.0)
+    beyond = replace(one, parameters=(np.array([99.0]),))
+    told = caveats(named(found({}), selection=cast(Any, selection(beyond))), (), {"fraction": 1.0}, [])
+    assert any(line.startswith("coulomb friction's torque of 99 is beyond what is documented") for line in told)
