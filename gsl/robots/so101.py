@@ -17,8 +17,9 @@ with the stall torque before friction: 11.7 N·m/rad and .94 N·m·s/rad. The lo
 
 The torque's limit, at full duty, is before friction too: friction is the world's, by its effects or as a diagnosis
 calibrates it, and must not be taken off twice. At the output 2.94 N·m arrive of 4.45 (C). The world so101 has .052 of
-the difference; the rest is friction of the gears under load, .29 to .30 of it in B's larger models, which is the effect
-load_friction. Without that the arm is too strong where it stalls, at errors beyond .38 rad.
+the difference; the rest is friction of the gears under load, the effect load_friction, whose coefficient m leaves
+(1 - m) / (1 + m): .20 by these figures, .12 by the 35 kg·cm measured in C, .29 to .30 in B's larger models. Without it
+the arm is too strong where it stalls, at errors beyond .38 rad.
 
 Without the integral term gravity droop stays. D is left out: the register's scale is not published, and kd / kp alone
 is a lag of 80 ms; that of the logs' quick motions is 61 to 134 ms by correlation (`gsl import --check`).
