@@ -24,7 +24,7 @@ def named(result: Findings, **changes: Any) -> Findings:
 def test_what_remains_is_told_of_held_out_squares() -> None:
     told = caveats(named(found({})), (), LEFT, ["fast (5.1 → 5.3 ×)"])
     assert "37 % of the held-out excess remains: something else is at work as well." in told
-    assert told[-1].endswith("fast (5.1 → 5.3 ×). What is not named is not excluded there.")
+    assert told[1].endswith("fast (5.1 → 5.3 ×). What is not named is not excluded there.")
     assert not any("remains" in one for one in caveats(named(found({})), (), {"fraction": 0.98}, []))
 
 
@@ -35,9 +35,11 @@ def test_a_value_that_hangs_on_another_effect_is_told() -> None:
     both = replace(both, parameters=(np.array([0.04]), np.array([0.02])), costs=np.array([260.0, 320.0] * 4))
     result = found({})
     chosen = cast(Any, selection(one, both))
-    (told,) = [line for line in caveats(named(result, selection=chosen), (), {"fraction": 1.0}, []) if "beside" in line]
-    assert told.startswith("coulomb friction's torque is 0.1 here and 0.04 with backlash beside it")
-    assert "not surely better" in told
+    (told,) = [
+        line for line in caveats(named(result, selection=chosen), (), {"fraction": 1.0}, []) if "besides" in line
+    ]
+    assert told.startswith("With backlash besides, which costs less and was passed over (not surely better): ")
+    assert "coulomb friction's torque 0.04 instead of 0.1." in told
 
 
 def test_a_value_beyond_its_documented_range_is_told() -> None:

@@ -21,7 +21,7 @@ MUCH = 0.1  # share of the held-out excess that is left, from which on something
 
 
 def caveats(found: Findings, unsure: Sequence[Droop], shrunk: Mapping[str, Any], far: Sequence[str]) -> list[str]:
-    """Return what a reader should mind, what the log could not give first.
+    """Return what a reader should mind: what cannot be told apart, what remains, what the log could not give, ...
 
     Args:
         found: The diagnosis.
@@ -29,7 +29,7 @@ def caveats(found: Findings, unsure: Sequence[Droop], shrunk: Mapping[str, Any],
         shrunk: From `shrinkage`.
         far: Parts of the log that are not explained.
     """
-    parts = (_droops(unsure), _log(found), _joints(found), _causes(found), _remaining(found, shrunk, far))
+    parts = (_droops(unsure), _remaining(found, shrunk, far), _log(found), _joints(found), _causes(found))
     return [one for part in parts for one in part]
 
 
@@ -105,20 +105,22 @@ def _causes(found: Findings) -> Iterator[str]:
     larger = next((one for one in found.selection.tried if _extends(one.places, chosen.places)), None)
     why = None if larger is None else passed_over(larger, chosen)
     if larger is not None and why is not None:
-        yield from _otherwise(chosen, larger, why)
+        yield _otherwise(chosen, larger, why)
 
 
-def _otherwise(chosen: Hypothesis, larger: Hypothesis, why: str) -> Iterator[str]:
-    """Yield what values would be with further effects, which cost less and were passed over."""
+def _otherwise(chosen: Hypothesis, larger: Hypothesis, why: str) -> str:
+    """Return what values would be with further effects, which cost less and were passed over."""
     values = {(one.effect, one.scope): found for one, found in zip(larger.candidates, larger.parameters, strict=True)}
     further = ", ".join(one.effect.replace("_", " ") for one in larger.candidates if one.effect not in chosen.names)
-    for candidate, here in zip(chosen.candidates, chosen.parameters, strict=True):
-        there = values[candidate.effect, candidate.scope]
-        for free, value, other in zip(candidate.free, here, there, strict=True):
-            yield (
-                f"{_told(candidate, free)} is {value:.3g} here and {other:.3g} with {further} beside it, which costs "
-                f"less and was passed over ({why}): its interval is that of this answer alone."
-            )
+    instead = [
+        f"{_told(candidate, free)} {other:.3g} instead of {value:.3g}"
+        for candidate, here in zip(chosen.candidates, chosen.parameters, strict=True)
+        for free, value, other in zip(candidate.free, here, values[candidate.effect, candidate.scope], strict=True)
+    ]
+    return (
+        f"With {further} besides, which costs less and was passed over ({why}): {', '.join(instead)}. Intervals are "
+        "those of this answer alone."
+    )
 
 
 def _extends(places: frozenset[tuple[str, str]], chosen: frozenset[tuple[str, str]]) -> bool:
