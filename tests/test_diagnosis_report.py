@@ -415,7 +415,7 @@ def test_a_terminal_shows_names_as_they_are(capsys: pytest.CaptureFixture[str]) 
 
 def test_a_corrected_simulator_is_not_for_what_it_does_not_explain() -> None:
     found = {**made.document(causes=1), "unexplained": ["fast (5.1 → 5.3 ×)", "Jaw (2.2 → 2.5 ×)"]}
-    assert steps(found)[0].why.endswith("not where it is no nearer to the robot than before: fast, Jaw.")
+    assert steps(found)[0].why.endswith("not where it is still far from the robot: fast, Jaw.")
 
 
 def test_an_unsure_cause_comes_with_what_would_tell() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.diagnosis.attribute import Hypothesis
+from gsl.diagnosis.attribute import NOISE_COST, Hypothesis, share
 from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.deviations import far_off
 from gsl.diagnosis.diagnose import Findings
@@ -136,15 +136,16 @@ def _remaining(found: Findings, shrunk: Mapping[str, Any], far: Sequence[str]) -
     if verdict.word in ("causes", "inseparable") and gone is not None and 1.0 - gone >= MUCH:
         yield f"{100.0 * (1.0 - gone):.0f} % of the held-out excess remains: something else is at work as well."
     elif verdict.in_part:
-        left = 100.0 * (1.0 - verdict.explained)
+        selection = found.selection
+        left = 100.0 * (1.0 - share(selection.chosen, selection.none, selection.none, NOISE_COST)[0])
         yield (
             f"Of what a calibration leaves {left:.0f} % remains, where outliers count for less: something "
             "else may be at work as well."
         )
     if far:
         yield (
-            f"Not explained, no nearer to the robot than before or farther, in noise floors: {', '.join(far)}. What is "
-            "not named is not excluded there."
+            f"Not explained, still far from the robot, in noise floors: {', '.join(far)}. What is not named is not "
+            "excluded there."
         )
 
 

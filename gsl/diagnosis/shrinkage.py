@@ -15,6 +15,7 @@ from gsl.diagnosis.localise import regimes
 SAMPLES = 1000
 WORDS = {"high_load": "much torque asked for", "reversal": "turning round"}  # for regimes
 FAR, ALIKE = 2.0, 0.95  # floors, and a share of what they were before: a part of the log above both is not explained
+FARTHEST = 5.0  # floors above which no part of a log is, however far it was before
 NOTHING = 0.02  # of an excess in squared floors: below it there is nothing to shrink
 
 
@@ -61,7 +62,7 @@ def by_part(found: Findings, z: Mapping[str, np.ndarray]) -> dict[str, list[dict
 
 
 def unexplained(told: Mapping[str, Any]) -> list[str]:
-    """Return the joints and regimes that are far off and no nearer than before, each with its floors.
+    """Return the joints and regimes that are far off, and no nearer than before or very far, each with its floors.
 
     Args:
         told: From `shrinkage` or `by_part`.
@@ -70,7 +71,7 @@ def unexplained(told: Mapping[str, Any]) -> list[str]:
     return [
         f"{WORDS.get(name, name)} ({one['before']:.1f} → {one['after']:.1f} ×)"
         for name, one in parts
-        if name != "all" and one["after"] > max(FAR, ALIKE * one["before"])
+        if name != "all" and one["after"] > max(FAR, min(FARTHEST, ALIKE * one["before"]))
     ]
 
 

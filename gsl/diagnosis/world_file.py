@@ -34,23 +34,21 @@ def calibration(joints: Sequence[str], nuisances: np.ndarray, plant: Plant) -> E
     """Return nuisances, shape (7, n_joints), as effects of single joints of a plant."""
     rows = {joint: nuisances[:, k] for k, joint in enumerate(joints)}
     unit, torque = nuisance.inertia_unit(plant.servo), plant.robot.torque_unit
+    lightest = (nuisance.LEAST - 1.0) * plant.servo.armature
     return {
         "servo_gain": [
             {"kp": np.exp(row[nuisance.KP]), "kd": np.exp(row[nuisance.KD]), "joints": joint}
             for joint, row in rows.items()
         ],
         "coulomb_friction": [
-            {"torque": torque * row[nuisance.COULOMB], "joints": joint}
-            for joint, row in rows.items()
-            if row[nuisance.COULOMB] > 0.0
+            {"torque": torque * row[nuisance.COULOMB], "joints": joint} for joint, row in rows.items()
         ],
         "viscous_friction": [
-            {"coefficient": torque * row[nuisance.VISCOUS], "joints": joint}
-            for joint, row in rows.items()
-            if row[nuisance.VISCOUS] > 0.0
+            {"coefficient": torque * row[nuisance.VISCOUS], "joints": joint} for joint, row in rows.items()
         ],
         "armature": [
-            {"inertia": row[nuisance.INERTIA] * unit[k], "joints": joint} for k, (joint, row) in enumerate(rows.items())
+            {"inertia": max(row[nuisance.INERTIA] * unit[k], lightest[k]), "joints": joint}
+            for k, (joint, row) in enumerate(rows.items())
         ],
         "sensor_bias": [{"bias": row[nuisance.ZERO], "joints": joint} for joint, row in rows.items()],
         "zero_offset": [{"offset": row[nuisance.OFFSET], "joints": joint} for joint, row in rows.items()],

@@ -23,11 +23,11 @@ class CoulombFriction:
     kind: ClassVar[str] = "servo"
     rank: ClassVar[int] = 2
 
-    torque: Annotated[float, setting("friction torque", unit="N·m", ge=0, lower=0.0, upper=0.3,
+    torque: Annotated[float, setting("friction torque, below 0 less", unit="N·m", lower=0.0, upper=0.3,
                                      source="HULKs .03 on the NAO; Rhoban/bam .013-.104 on Dynamixels")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:
-        """Return the plant with more friction."""
+        """Return the plant with more friction, or less, but never below none."""
         mask = scope(plant, self.joints)
-        return plant.with_servo(coulomb=plant.servo.coulomb + np.where(mask, self.torque, 0.0))
+        return plant.with_servo(coulomb=np.maximum(0.0, plant.servo.coulomb + np.where(mask, self.torque, 0.0)))

@@ -17,7 +17,8 @@ class LoadFriction:
 
     Signature: lifting a weight takes more torque than lowering it, and the difference grows with the weight; a joint
     holding a load stays within 2 coefficient load / kp of where it came from. Confused with Coulomb friction, a torque
-    limit and kp; the same motion with two or three weights tells them apart, one weight alone does not.
+    limit and kp; poses of different load, each come to from above and from below, tell them apart: their middle tells
+    kp, and only here does the width between them grow with the load.
     """
 
     kind: ClassVar[str] = "servo"

@@ -23,12 +23,12 @@ class ViscousFriction:
     kind: ClassVar[str] = "servo"
     rank: ClassVar[int] = 3
 
-    coefficient: Annotated[float, setting("torque per speed", unit="N·m·s/rad", ge=0, lower=0.0, upper=1.1,
+    coefficient: Annotated[float, setting("torque per speed, below 0 less", unit="N·m·s/rad", lower=0.0, upper=1.1,
                                           source="HULKs' NAO model 1.08; Rhoban/bam .004-.08 without back-EMF",
                                           )]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:
-        """Return the plant with more drag."""
+        """Return the plant with more drag, or less, but never below none."""
         mask = scope(plant, self.joints)
-        return plant.with_servo(viscous=plant.servo.viscous + np.where(mask, self.coefficient, 0.0))
+        return plant.with_servo(viscous=np.maximum(0.0, plant.servo.viscous + np.where(mask, self.coefficient, 0.0)))

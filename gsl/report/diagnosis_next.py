@@ -47,7 +47,7 @@ def _as_it_is(document: Document) -> Step:
 def _corrected(document: Document) -> Step:
     told = f"Train in the simulator with the effects switched on{_place(document)}{_yours(document)}"
     far = [str(one).partition(" (")[0] for one in entries(document, "unexplained")]
-    mind = f", not where it is no nearer to the robot than before: {', '.join(far)}" if far else ""
+    mind = f", not where it is still far from the robot: {', '.join(far)}" if far else ""
     return Step(f"{told}{mind}.", _training(document))
 
 
