@@ -140,7 +140,11 @@ def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr
     assert rows[0][1] == "π0"
     assert said.out.count("grounded simulation learning") == 1
     spent, learned = metrics["real_episodes"], metrics["learned_from"]
-    assert f"real data: {learned} episodes to learn from, {spent - learned} to measure, {spent} in all\n" in table
+    beside = f"{metrics['ungrounded']['real_episodes']} more to measure the search without grounding"
+    assert (
+        f"real data: {learned} episodes to learn from, {spent - learned} to measure, {spent} in all; {beside}\n"
+        in table
+    )
     assert metrics["verdict"] in table
     assert "plots: runs/whole/iterate/ (joint_trace.png, learning_curve.png, walk.png)\n" in table
     assert table.splitlines()[-1] == "runs/whole/iterate"
