@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from test_limits import found
+from test_refuted import claim
 
 from gsl.diagnosis import nuisance
+from gsl.diagnosis.attribute import Hypothesis
 from gsl.diagnosis.world_file import diagnosed_effects
 from gsl.effects.effect import applied, built
 
@@ -16,13 +19,19 @@ PARTS = ("kp", "kd", "coulomb", "viscous", "armature", "offset", "load_friction"
 
 
 @pytest.mark.parametrize("size", [-3.0, 2.0])
-def test_a_calibration_of_either_sign_is_in_the_file(size: float) -> None:
-    result = found({"coulomb_friction": {"torque": 0.15}})
+@pytest.mark.parametrize(
+    "cause",
+    [claim("coulomb_friction", [0.15], ("torque",)), claim("servo_gain", [0.6, 0.2], ("kp", "kd"))],
+    ids=["friction", "gains"],
+)
+def test_a_calibration_of_either_sign_is_in_the_file(cause: Hypothesis, size: float) -> None:
+    result = found({})
     fit = result.answer.fit
     shifted = nuisance.bounded(size * nuisance.SIZES[:, None] * np.ones_like(fit.nuisances))
-    answer = replace(result.answer, fit=replace(fit, nuisances=shifted))
+    parts = {"candidates": cause.candidates, "parameters": cause.parameters}
+    answer = replace(result.answer, fit=replace(fit, nuisances=shifted), **cast(Any, parts))
     changed = replace(result, selection=replace(result.selection, chosen=answer, none=answer))
-    assert changed.answer is answer and "coulomb_friction" in answer.names
+    assert changed.answer is answer
     written = applied(result.simulator.plant, built(diagnosed_effects(changed)))
     for part in PARTS:
         scored = getattr(changed.corrected.servo, part)

@@ -15,7 +15,7 @@ def far_off(found: Findings) -> list[str]:
     exp, sizes = found.experiment, found.simulator.spread * nuisance.SIZES[:, None]
     fitted = found.answer.fit.nuisances[:, : len(exp.joints)]
     off = np.abs(fitted / sizes)
-    inertias = nuisance.inertia_unit(found.simulator.plant.servo)
+    inertias = nuisance.inertia_unit(found.uncalibrated.servo)
     told = []
     for k, joint in enumerate(exp.joints):
         rows = [row for row in np.argsort(-off[:, k]) if off[row, k] >= FAR_OFF]

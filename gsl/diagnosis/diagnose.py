@@ -71,10 +71,14 @@ class Findings:
     tolerance: float = 0.0
 
     @property
+    def uncalibrated(self) -> Plant:
+        """The simulator's robot with the answer's effects."""
+        return applied(self.simulator.plant, built(self.answer.effects))
+
+    @property
     def corrected(self) -> Plant:
         """The simulator's robot with the answer's effects and calibration."""
-        own = self.answer.fit.nuisances[:, : len(self.experiment.joints)]
-        return nuisance.calibrated(applied(self.simulator.plant, built(self.answer.effects)), own)
+        return nuisance.calibrated(self.uncalibrated, self.answer.fit.nuisances[:, : len(self.experiment.joints)])
 
     @property
     def widening(self) -> float:

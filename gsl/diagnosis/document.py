@@ -143,7 +143,7 @@ def _written(one: Hypothesis) -> str:
 
 def _calibration(found: Findings) -> list[dict[str, Any]]:
     joints, unit = found.experiment.joints, found.experiment.robot.torque_unit
-    rotors = nuisance.inertia_unit(found.simulator.plant.servo)
+    rotors = nuisance.inertia_unit(found.uncalibrated.servo)
     columns = zip(joints, found.answer.fit.nuisances.T, rotors, strict=False)  # coupled motors and a base follow
     return [
         {

@@ -23,15 +23,14 @@ def diagnosed_effects(found: Findings) -> dict[str, Any]:
     all there is.
     """
     joints, chosen = found.experiment.joints, found.answer
-    plant = found.simulator.plant
-    parts = [chosen.effects, calibration(joints, chosen.fit.nuisances[:, : len(joints)], plant)]
+    parts = [chosen.effects, calibration(joints, chosen.fit.nuisances[:, : len(joints)], found.uncalibrated)]
     if found.baseline is not None:
-        parts = [found.baseline.effects, calibration(joints, found.baseline.nuisances, plant), *parts]
+        parts = [found.baseline.effects, calibration(joints, found.baseline.nuisances, found.simulator.plant), *parts]
     return joined(parts)
 
 
 def calibration(joints: Sequence[str], nuisances: np.ndarray, plant: Plant) -> Effects:
-    """Return nuisances, shape (7, n_joints), as effects of single joints of a plant."""
+    """Return nuisances, shape (7, n_joints), as effects of single joints of a plant, other effects in it already."""
     rows = {joint: nuisances[:, k] for k, joint in enumerate(joints)}
     unit, torque = nuisance.inertia_unit(plant.servo), plant.robot.torque_unit
     lightest = (nuisance.LEAST - 1.0) * plant.servo.armature
