@@ -22,7 +22,7 @@ def named(result: Findings, **changes: Any) -> Findings:
 
 
 def test_what_remains_is_told_of_held_out_squares() -> None:
-    told = caveats(named(found({})), (), LEFT, ["fast (5.1 → 5.3 ×)"])
+    told = caveats(named(found({})), (), LEFT, [{"part": "fast", "before": 5.1, "after": 5.3}])
     assert "37 % of the held-out excess remains: something else is at work as well." in told
     assert told[1].endswith("fast (5.1 → 5.3 ×). What is not named is not excluded there.")
     assert not any("remains" in one for one in caveats(named(found({})), (), {"fraction": 0.98}, []))

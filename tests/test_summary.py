@@ -20,7 +20,7 @@ def shrunk(whole: float | None, calibrated: float | None) -> dict[str, Any]:
     return {"fraction": whole, "calibration_fraction": calibrated}
 
 
-@pytest.mark.parametrize(("least", "word"), [(0.95, ""), (0.9, ""), (0.6, "probably "), (0.46, "possibly ")])
+@pytest.mark.parametrize(("least", "word"), [(0.95, ""), (0.9, ""), (0.6, "probably"), (0.46, "possibly")])
 def test_the_least_sure_cause_makes_the_doubt(least: float, word: str) -> None:
     assert doubt([cause(0.99), cause(least)]) == word
 

@@ -20,14 +20,16 @@ ROUGH = 20.0  # remaining cost of a residual, in that of noise, from which on a 
 MUCH = 0.1  # share of the held-out excess that is left, from which on something else is at work
 
 
-def caveats(found: Findings, unsure: Sequence[Droop], shrunk: Mapping[str, Any], far: Sequence[str]) -> list[str]:
+def caveats(
+    found: Findings, unsure: Sequence[Droop], shrunk: Mapping[str, Any], far: Sequence[Mapping[str, Any]]
+) -> list[str]:
     """Return what a reader should mind: what cannot be told apart, what remains, what the log could not give, ...
 
     Args:
         found: The diagnosis.
         unsure: Joints whose zero may be a droop.
         shrunk: From `shrinkage`.
-        far: Parts of the log that are not explained.
+        far: Parts of the log that are not explained, from `unexplained`.
     """
     parts = (_droops(unsure), _remaining(found, shrunk, far), _log(found), _joints(found), _causes(found))
     return [one for part in parts for one in part]
@@ -131,7 +133,7 @@ def _told(candidate: Candidate, free: str) -> str:
     return f"{candidate.effect.replace('_', ' ')}'s {free.replace('_', ' ')}"
 
 
-def _remaining(found: Findings, shrunk: Mapping[str, Any], far: Sequence[str]) -> Iterator[str]:
+def _remaining(found: Findings, shrunk: Mapping[str, Any], far: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     verdict, gone = found.verdict, shrunk["fraction"]
     if verdict.word in ("causes", "inseparable") and gone is not None and 1.0 - gone >= MUCH:
         yield f"{100.0 * (1.0 - gone):.0f} % of the held-out excess remains: something else is at work as well."
@@ -143,9 +145,10 @@ def _remaining(found: Findings, shrunk: Mapping[str, Any], far: Sequence[str]) -
             "else may be at work as well."
         )
     if far:
+        parts = ", ".join(f"{one['part']} ({one['before']:.1f} → {one['after']:.1f} ×)" for one in far)
         yield (
-            f"Not explained, still far from the robot, in noise floors: {', '.join(far)}. What is not named is not "
-            "excluded there."
+            f"Not explained, still far from the robot, in noise floors: {parts}. What is not named is not excluded "
+            "there."
         )
 
 

@@ -18,7 +18,7 @@ from gsl.diagnosis.droop import droops
 from gsl.diagnosis.localise import cells, horizon, regimes, sides
 from gsl.diagnosis.select import passed_over
 from gsl.diagnosis.shrinkage import shrinkage, unexplained
-from gsl.diagnosis.summary import doubt, summary
+from gsl.diagnosis.summary import SURE, doubt, summary
 from gsl.diagnosis.verdict import Cause
 from gsl.effects.effect import confused_with, effect_class
 
@@ -44,6 +44,7 @@ def document(found: Findings, **about: Any) -> dict[str, Any]:
         "summary": summary(found.verdict, causes, shrunk),
         "causes": causes,
         "sure": not doubt(causes),
+        "doubt": doubt(causes),
         "suspects": [_cause(found, one) for one in found.verdict.causes] if found.verdict.word == "unknown" else [],
         "inseparable": [list(group) for group in found.verdict.inseparable if causes],
         "droops": [asdict(one) for one in unsure],
@@ -85,7 +86,7 @@ def _cause(found: Findings, one: Cause) -> dict[str, Any]:
         "probability": one.probability,
         "gain": {"value": one.value, "low": one.low, "high": one.high},
         "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
-        "confused": confused_with(candidate.effect),
+        "confused": None if one.probability >= SURE else confused_with(candidate.effect),
     }
 
 

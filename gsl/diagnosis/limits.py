@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from gsl.core.setting import settings_of
-from gsl.diagnosis import nuisance
 from gsl.diagnosis.attribute import Hypothesis, gain
 from gsl.diagnosis.candidates import Candidate
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.select import FLAW
 from gsl.diagnosis.shared import ROWS
-from gsl.diagnosis.shrinkage import FAR, by_part
+from gsl.diagnosis.shrinkage import FAR
 from gsl.diagnosis.verdict import FOREIGN
 from gsl.effects.effect import effect_class
 
@@ -44,20 +44,25 @@ class Limit:
     documented: float
 
 
-def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
+def limits(found: Findings, shrunk: Mapping[str, Any], tick: Callable[[str], None]) -> list[Limit]:
     """Return what is below half of its documented range, the tightest first.
 
     Every effect that all joints may have none of is held at a value, all else fitted anew, until that is surely worse
     on held-out windows, by more than a simulator's own flaws may make of it. Left out is what a calibration does as
     well, whose prior would be the limit. Where much is left unexplained, be it in one regime (in turning round, say,
     where play would show), joints shake or a robot walks there is no answer to compare with; one motion is too little.
+
+    Args:
+        found: The diagnosis.
+        shrunk: From `shrinkage`.
+        tick: Called with what is going on.
     """
     exp, answer = found.experiment, found.answer
     verdict = found.verdict
     strange = verdict.word == "unknown" or (verdict.in_part and verdict.remaining > FOREIGN)
     if strange or not exp.by_record or exp.walking or exp.comparison.shaking.any():
         return []
-    if max(one["after"] for parts in by_part(found, _residuals(found)).values() for one in parts) > FAR:
+    if any(one["after"] > FAR for one in (*shrunk["by_joint"], *shrunk["by_regime"])):
         return []
     left_out = {*answer.names, *found.selection.screening.invisible, *found.refuted}
     asked = [one for one in found.arena.library if one.effect not in left_out and _none_or_some(one)]
@@ -65,14 +70,6 @@ def limits(found: Findings, tick: Callable[[str], None]) -> list[Limit]:
         tick("what the log leaves room for")
     told = [limit for one in asked if (limit := _limit(found, one))]
     return sorted(told, key=lambda one: one.most / one.documented)
-
-
-def _residuals(found: Findings) -> dict[str, np.ndarray]:
-    """Return the residuals of all windows before and after, in units of the floor."""
-    exp, answer = found.experiment, found.answer
-    bench = exp.bench(found.simulator, "all")
-    pairs = {"before": ({}, nuisance.none(len(exp.channels))), "after": (answer.effects, answer.fit.nuisances)}
-    return {key: bench.residual(*pair) for key, pair in pairs.items()}
 
 
 def _none_or_some(one: Candidate) -> bool:

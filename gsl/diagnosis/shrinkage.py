@@ -13,7 +13,7 @@ from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.localise import regimes
 
 SAMPLES = 1000
-WORDS = {"high_load": "much torque asked for", "reversal": "turning round"}  # for regimes
+WORDS = {"high_load": "asked for much torque", "reversal": "turning round"}  # for regimes
 FAR, ALIKE = 2.0, 0.95  # floors, and a share of what they were before: a part of the log above both is not explained
 FARTHEST = 5.0  # floors above which no part of a log is, however far it was before
 NOTHING = 0.02  # of an excess in squared floors: below it there is nothing to shrink
@@ -33,7 +33,6 @@ def shrinkage(found: Findings, before: np.ndarray, after: np.ndarray) -> dict[st
     z = {key: exp.comparison.residual(values, exp.pieces) for key, values in told.items()}
     used = exp.comparison.used(z["before"].shape[1])
     mean = {key: _mean_square(values[held], used) for key, values in z.items()}
-    parts = by_part(found, {key: z[key] for key in ("before", "after")})
     fraction, low, high = removed(exp, z["before"], z["after"])
     return {
         "floor": 1.0,
@@ -43,33 +42,23 @@ def shrinkage(found: Findings, before: np.ndarray, after: np.ndarray) -> dict[st
         "low": low,
         "high": high,
         "ceiling_fraction": ceiling(exp, before, seed=found.seed),
-        **parts,
+        "by_joint": [
+            {"joint": joint, "before": float(np.sqrt(mean["before"][k])), "after": float(np.sqrt(mean["after"][k]))}
+            for k, joint in enumerate(exp.channels)
+        ],
+        "by_regime": _by_regime(found, z),
     }
 
 
-def by_part(found: Findings, z: Mapping[str, np.ndarray]) -> dict[str, list[dict[str, Any]]]:
-    """Return the held-out gap by joint and by regime, in floors.
+def unexplained(told: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the joints and regimes that are far off, and no nearer than before or very far: part, before and after.
 
     Args:
-        found: The diagnosis.
-        z: Residuals of all windows `before` and `after`, in units of the floor, each of shape (W, scored, n_channels).
-    """
-    exp, held = found.experiment, found.experiment.held_out
-    used = exp.comparison.used(z["before"].shape[1])
-    root = {key: np.sqrt(_mean_square(values[held], used)).tolist() for key, values in z.items()}
-    joints = [{"joint": joint} | {key: root[key][k] for key in root} for k, joint in enumerate(exp.channels)]
-    return {"by_joint": joints, "by_regime": _by_regime(found, z)}
-
-
-def unexplained(told: Mapping[str, Any]) -> list[str]:
-    """Return the joints and regimes that are far off, and no nearer than before or very far, each with its floors.
-
-    Args:
-        told: From `shrinkage` or `by_part`.
+        told: From `shrinkage`.
     """
     parts = [(one.get("joint") or one["regime"], one) for one in (*told["by_regime"], *told["by_joint"])]
     return [
-        f"{WORDS.get(name, name)} ({one['before']:.1f} → {one['after']:.1f} ×)"
+        {"part": WORDS.get(name, name), "before": one["before"], "after": one["after"]}
         for name, one in parts
         if name != "all" and one["after"] > max(FAR, min(FARTHEST, ALIKE * one["before"]))
     ]

@@ -29,21 +29,21 @@ def summary(verdict: Verdict, causes: Sequence[Mapping[str, Any]], shrunk: Mappi
     if verdict.word == "inseparable":
         groups = "; ".join(" or ".join(group) for group in verdict.inseparable).replace("_", " ")
         return f"The gap looks like {named}, but this log cannot tell apart: {groups}."
-    how = doubt(causes)
+    caused = f"{doubt(causes)} caused".lstrip()
     if shrunk["fraction"] is None:
-        return f"The gap is {how}caused by {named}."
+        return f"The gap is {caused} by {named}."
     gone, alone = shrunk["fraction"], max(0.0, shrunk["calibration_fraction"])
     share = "what" if gone - alone >= 0.5 * (1.0 - alone) else "a part of what"
     return (
         f"A calibration of each joint removes {100.0 * alone:.0f} % of the gap on held-out data; {share} it leaves is "
-        f"{how}caused by {named}; together they remove {100.0 * gone:.0f} %."
+        f"{caused} by {named}; together they remove {100.0 * gone:.0f} %."
     )
 
 
 def doubt(causes: Sequence[Mapping[str, Any]]) -> str:
-    """Return how sure the least sure cause is: nothing to add, probably or possibly."""
+    """Return what the least sure cause needs said: nothing, probably or possibly."""
     least = min((one["probability"] for one in causes), default=1.0)
-    return "" if least >= SURE else "probably " if least >= EVEN else "possibly "
+    return "" if least >= SURE else "probably" if least >= EVEN else "possibly"
 
 
 def _of(scope: str) -> str:

@@ -56,8 +56,12 @@ class ModelConfig:
         if self.likelihood == "mixture" and self.family == "linear":
             raise ConfigError("family", "a linear model has no mixture; take mlp or auto", given=self.family)
 
-    def of_interest(self, states: int) -> tuple[int, ...]:
+    def of_interest(self, states: int, where: str) -> tuple[int, ...]:
         """Return the state variables of interest, by index.
+
+        Args:
+            states: Number of state variables.
+            where: Name of the setting that this configuration is.
 
         Raises:
             ConfigError: They are none, or not among so many states.
@@ -65,10 +69,10 @@ class ModelConfig:
         if self.variables == "all":
             return tuple(range(states))
         if not self.variables or len(set(self.variables)) < len(self.variables):
-            raise ConfigError("variables", "names at least one entry of the state, each once")
+            raise ConfigError(f"{where}.variables", "names at least one entry of the state, each once")
         for variable in self.variables:
             if not 0 <= variable < states:
-                raise ConfigError("variables", f"the state has entries 0 to {states - 1}", given=str(variable))
+                raise ConfigError(f"{where}.variables", f"the state has entries 0 to {states - 1}", given=str(variable))
         return self.variables
 
     @property

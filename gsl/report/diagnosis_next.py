@@ -7,9 +7,8 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from gsl.report.diagnosis_verdict import verdict
-from gsl.report.diagnosis_words import Document, entries, finite, listed, name, part
+from gsl.report.diagnosis_words import Document, entries, listed, name, part, said
 
-SURE = 0.9  # probability of a cause from which on nothing has to make it surer
 NOTHING = "no effect"  # as a document has it, beside an effect that the log cannot show
 
 
@@ -46,18 +45,17 @@ def _as_it_is(document: Document) -> Step:
 
 def _corrected(document: Document) -> Step:
     told = f"Train in the simulator with the effects switched on{_place(document)}{_yours(document)}"
-    far = [str(one).partition(" (")[0] for one in entries(document, "unexplained")]
+    far = [said(one, "part") for one in entries(document, "unexplained")]
     mind = f", not where it is still far from the robot: {', '.join(far)}" if far else ""
     return Step(f"{told}{mind}.", _training(document))
 
 
 def _surer(document: Document) -> list[Step]:
     """What would make unsure causes surer, where no experiment of ours does."""
-    causes = [] if document.get("sure", True) else entries(document, "causes")
     return [
         Step(f"To be surer of {name(one['effect'])}, which is confused with {one['confused']}.")
-        for one in causes
-        if one.get("confused") and (finite(one.get("probability")) or 0.0) < SURE
+        for one in entries(document, "causes")
+        if one.get("confused")
     ]
 
 

@@ -22,7 +22,6 @@ from gsl.report.diagnosis_words import (
     share,
 )
 
-EVEN = 0.5  # probability below which a cause is no more than possible
 VERDICTS = ("no_gap", "causes", "inseparable", "unknown")
 
 
@@ -49,8 +48,7 @@ def _causes(document: Document) -> str:
         return "There is a gap, and its cause was found"
     if document.get("sure", True):
         return f"{'Cause' if len(found) == 1 else f'{len(found)} causes'} found: {listed(found)}"
-    least = min(finite(cause.get("probability")) or 0.0 for cause in entries(document, "causes"))
-    how = "probable" if least >= EVEN else "possible"
+    how = "possible" if document.get("doubt") == "possibly" else "probable"
     return f"{f'{how.capitalize()} cause' if len(found) == 1 else f'{len(found)} {how} causes'}: {listed(found)}"
 
 

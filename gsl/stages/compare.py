@@ -60,7 +60,7 @@ class Compare:
         found, made = self.carried_out(folder, console)
         summary = summaries(found)
         (folder / TABLE).write_text(f"{markdown(summary, found)}\n{made}\n", encoding="utf-8")
-        return {"trials": len(found), "summaries": [one._asdict() for one in summary]}
+        return {"trials": self.trials, "summaries": [one._asdict() for one in summary]}
 
     def carried_out(self, folder: Path, console: Any) -> tuple[list[Trial], str]:
         """Return all trials, built beside `folder` and told as they end, and who made them; write them down."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, ClassVar
@@ -17,7 +17,7 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import Findings, diagnosed
 from gsl.diagnosis.document import document
-from gsl.diagnosis.limits import Limit, limits
+from gsl.diagnosis.limits import limits
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.verify import in_bullet
 from gsl.diagnosis.world_file import diagnosed_effects, joined
@@ -94,8 +94,7 @@ class Diagnose:
             walking=on_ground(logs["real"]),
         )
         gap = self._policy_gap(measured, found, console) if measured else None
-        room = limits(found, telling) if self.limits else []
-        return self._written(found, logs["real"], gap, room, folder, time.perf_counter() - begin)
+        return self._written(found, logs["real"], gap, folder, telling, begin)
 
     def document(self, folder: Path) -> dict[str, Any]:
         """Return what --json shows of an artifact: the report without its curves."""
@@ -131,9 +130,9 @@ class Diagnose:
         found: Findings,
         batch: Batch,
         gap: Mapping[str, Any] | None,
-        room: Sequence[Limit],
         folder: Path,
-        seconds: float,
+        telling: Telling,
+        begin: float,
     ) -> Mapping[str, Any]:
         checked = found.verdict.word in ("causes", "inseparable") and not found.experiment.walking
         told = document(
@@ -142,14 +141,15 @@ class Diagnose:
             next_experiment=write_next_experiment(found, self.sim.robot, folder),
             effects=diagnosed_effects(found),
             policy_gap=gap,
-            limits=[asdict(one) for one in room],
             world_file=WORLD,
             report=PAGE,
             data=self._data(found, batch),
-            seconds=seconds,
             command=self._command(),
             own=self._own(found),
         )
+        if self.limits:
+            told["limits"] = [asdict(one) for one in limits(found, told["shrinkage"], telling)]
+        told["seconds"] = time.perf_counter() - begin
         told["caveats"] += filter(None, [self._stranger(batch), other_clocks(batch, self.clocks)])
         documents.write_json(folder / REPORT, told)
         (folder / PAGE).write_text(report_html(told), encoding="utf-8")

@@ -31,11 +31,7 @@ class ValueReport:
     @property
     def problems(self) -> tuple[str, ...]:
         """Why nothing should be optimised in this grounding, in words: π0 is surely farther from real than without."""
-        real = self.values["real"]
-        off = {name: difference_interval(self.values[name], real) for name in ("grounded", "ungrounded")}
-        least = max(0.0, off["grounded"].lower, -off["grounded"].upper)
-        most = max(abs(off["ungrounded"].lower), abs(off["ungrounded"].upper))
-        if len(real) < 2 or least <= most:
+        if not self._surely_nearer("ungrounded", "grounded"):
             return ()
         told = {name: f"{self.values[name].mean():.1f}" for name in self.values}
         return (f"π0 is worth {told['grounded']}, {told['ungrounded']} without grounding, {told['real']} in real",)
@@ -47,12 +43,15 @@ class ValueReport:
             return "one held-out real episode is no measure: nothing is known of this grounding"
         if self.problems:
             return "with the grounding π0 is surely farther from what it is worth in real"
-        real = self.values["real"]
-        off = {name: difference_interval(self.values[name], real) for name in ("grounded", "ungrounded")}
-        most = max(abs(off["grounded"].lower), abs(off["grounded"].upper))
-        if most < max(0.0, off["ungrounded"].lower, -off["ungrounded"].upper):
+        if self._surely_nearer("grounded", "ungrounded"):
             return "with the grounding π0 is surely nearer to what it is worth in real"
         return "π0 does not tell whether this grounding is nearer to real: the search goes on with it"
+
+    def _surely_nearer(self, one: str, other: str) -> bool:
+        """Whether π0 is nearer in one simulator to what it is worth in real than in another, by both intervals."""
+        real = self.values["real"]
+        near, far = (difference_interval(self.values[name], real) for name in (one, other))
+        return len(real) > 1 and max(abs(near.lower), abs(near.upper)) < max(0.0, far.lower, -far.upper)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return a table for people; its titles are `TITLES`."""

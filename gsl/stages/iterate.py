@@ -77,10 +77,7 @@ class Iterate:
         object.__setattr__(self, "policy", sized(self.policy, self.sim))
         check_alike(self.sim.layout, self.real.layout)
         for name, model in {"forward_model": self.forward_model, "inverse_model": self.inverse_model}.items():
-            try:
-                model.of_interest(self.sim.layout.states)
-            except ConfigError as error:
-                raise error.under(name) from error
+            model.of_interest(self.sim.layout.states, name)
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""

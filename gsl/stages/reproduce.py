@@ -52,7 +52,7 @@ class Reproduce:
         task = self.study.iterate.task
         (folder / TABLE).write_text(f"{self.table.markdown(trials, task)}\n{made}\n", encoding="utf-8")
         _draw(folder / FIGURE, trials, self.study.methods, *self.table.drawn(trials, task))
-        return {"trials": len(trials), "summaries": [one._asdict() for one in summaries(trials)]}
+        return {"trials": self.study.trials, "summaries": [one._asdict() for one in summaries(trials)]}
 
 
 def _draw(

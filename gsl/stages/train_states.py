@@ -103,13 +103,6 @@ def _choices(data: Parts) -> int:
     return int(data.training.metadata.get("choices", 0))
 
 
-def _variables(config: ModelConfig, batch: Batch) -> tuple[int, ...]:
-    try:
-        return config.of_interest(batch.states)
-    except ConfigError as error:
-        raise error.under("model") from error
-
-
 def _steps(batch: Batch, variables: tuple[int, ...]) -> Steps:
     states = [one.state for one in batch.episodes if one.state is not None]
     sent = [one.action if one.grounded_action is None else one.grounded_action for one in batch.episodes]
@@ -120,7 +113,7 @@ def _steps(batch: Batch, variables: tuple[int, ...]) -> Steps:
 
 
 def _forward(config: ModelConfig, data: Parts, seed: int, head: Head | None = None) -> StateForward:
-    choices, variables = _choices(data), _variables(config, data.training)
+    choices, variables = _choices(data), config.of_interest(data.training.states, "model")
     known, unseen = (_steps(part, variables) for part in (data.training, data.validation))
     head = config.head if head is None else head
     training, validation = (
@@ -133,7 +126,7 @@ def _forward(config: ModelConfig, data: Parts, seed: int, head: Head | None = No
 
 
 def _inverse(config: ModelConfig, data: Parts, seed: int) -> StateInverse:
-    variables = _variables(config, data.training)
+    variables = config.of_interest(data.training.states, "model")
     known, unseen = (_turned(_steps(part, variables)) for part in (data.training, data.validation))
     network = _fitted(known, unseen, config, seed)
     return StateInverse(network, data.training.states, known[1].shape[1], variables)
