@@ -257,7 +257,9 @@ def test_trpo_learns_and_goes_on_from_what_it_learned() -> None:
     policy = a_policy(CART, (16,))
     simulator = GroundedSimulator(Scenario(CART, OwnReward(), policy, "sim", NoGrounding()), policy.initial)
     trpo = Trpo(steps=8192, generations=2, rollout=1024)
-    first, second = trpo.learn(simulator, policy, policy.initial, 1, bold=True)
+    steps: list[int] = []
+    first, second = trpo.learn(simulator, policy, policy.initial, 1, bold=True, advance=steps.append)
+    assert sum(steps) == trpo.taken == 8192
     scenario = Scenario(CART, OwnReward(), policy, "sim", NoGrounding())
 
     def value(parameters: np.ndarray) -> float:
@@ -265,9 +267,10 @@ def test_trpo_learns_and_goes_on_from_what_it_learned() -> None:
         return float(np.mean([rollout(scenario, env, parameters, k).value for k in range(10)]))
 
     assert value(second) > value(policy.initial) + 3.0
-    (again,) = Trpo(steps=1024, rollout=1024).learn(simulator, policy, second, 2, bold=False)
+    (again,) = Trpo(steps=1024, rollout=1024).learn(simulator, policy, second, 2, bold=False, advance=steps.append)
     assert value(again) > value(policy.initial) + 3.0
-    np.testing.assert_array_equal(first, next(iter(trpo.learn(simulator, policy, policy.initial, 1, bold=True))))
+    once_more = trpo.learn(simulator, policy, policy.initial, 1, bold=True, advance=steps.append)
+    np.testing.assert_array_equal(first, next(iter(once_more)))
 
 
 def test_the_example_of_the_docs_wins_by_its_grounding(tmp_path: Path) -> None:
@@ -420,12 +423,25 @@ def test_figure_12_is_one_command(tmp_path: Path) -> None:
     assert not list((tmp_path / "runs/again").rglob("trial_01"))
 
 
+def test_figure_12_goes_on_with_a_search_instead(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    pytest.importorskip("sb3_contrib")
+    few = ("trials=1", "noises=[0.3]", "workers=1", "iterate.budget.real_episodes=6", "iterate.budget.sim_episodes=8")
+    search = ("optimizer@further=cma_es", "further.candidates=4", "further.generations=1", "iterate.budget.rollouts=2")
+    one = ("~methods.ane", "~methods.gat", "iterate.policy.hidden=[]", "iterate.budget.episodes=3")
+    said = done("reproduce", "fig12", "preset=toy", *few, *search, *one, folder=tmp_path)
+    points = json.loads((tmp_path / "runs/fig12/reproduce/points.json").read_text())
+    assert [one["real_steps"] is None for one in points] == [False, False, True]
+    assert "the reference learned from 8 episodes" in (tmp_path / "runs/fig12/reproduce/table.md").read_text()
+    assert "trained on real" in said.out
+
+
 def test_without_the_extra_a_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sb3_contrib", None)
     policy = a_policy(CART)
     simulator = GroundedSimulator(Scenario(CART, OwnReward(), policy, "sim", NoGrounding()), policy.initial)
     with pytest.raises(ConfigError, match=r"TRPO needs gsl\[rl\]: pip install 'gsl\[rl\]'"):
-        next(iter(Trpo(steps=10).learn(simulator, policy, policy.initial, 1, bold=True)))
+        next(iter(Trpo(steps=10).learn(simulator, policy, policy.initial, 1, bold=True, advance=print)))
 
 
 def test_without_mujoco_a_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Protocol, runtime_checkable
 
 import gymnasium
@@ -30,8 +30,19 @@ class Learner(Protocol):
     def generations(self) -> int:
         """How often parameters are kept."""
 
+    @property
+    def taken(self) -> int:
+        """Steps that it takes in the simulator, none of one that asks for its table."""
+
     def learn(
-        self, simulator: Simulator, policy: Policy, parameters: np.ndarray, seed: int, *, bold: bool
+        self,
+        simulator: Simulator,
+        policy: Policy,
+        parameters: np.ndarray,
+        seed: int,
+        *,
+        bold: bool,
+        advance: Callable[[int], None],
     ) -> Iterator[np.ndarray]:
         """Yield the parameters after each generation.
 
@@ -41,4 +52,5 @@ class Learner(Protocol):
             parameters: Where to begin, shape (n_parameters,).
             seed: Of all randomness.
             bold: Whether they are π0's own start values, from which nothing has been learned yet.
+            advance: Is told how many steps more are taken.
         """

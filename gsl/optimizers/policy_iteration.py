@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -22,8 +22,20 @@ class PolicyIteration:
         """One."""
         return 1
 
+    @property
+    def taken(self) -> int:
+        """None."""
+        return 0
+
     def learn(
-        self, simulator: Simulator, policy: Policy, parameters: np.ndarray, seed: int, *, bold: bool
+        self,
+        simulator: Simulator,
+        policy: Policy,
+        parameters: np.ndarray,
+        seed: int,
+        *,
+        bold: bool,
+        advance: Callable[[int], None],
     ) -> Iterator[np.ndarray]:
         """Yield the optimal actions, see `Learner`."""
         if not isinstance(policy, ActionTable):

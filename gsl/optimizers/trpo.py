@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Annotated, Any
 
 import numpy as np
@@ -49,7 +49,14 @@ class Trpo:
         return self.generations * -(-each // self.rollout) * self.rollout
 
     def learn(
-        self, simulator: Simulator, policy: Policy, parameters: np.ndarray, seed: int, *, bold: bool
+        self,
+        simulator: Simulator,
+        policy: Policy,
+        parameters: np.ndarray,
+        seed: int,
+        *,
+        bold: bool,
+        advance: Callable[[int], None],
     ) -> Iterator[np.ndarray]:
         """Yield the policy after each generation, see `Learner`.
 
@@ -67,6 +74,11 @@ class Trpo:
         threads = torch.get_num_threads()
         torch.set_num_threads(1)
         env = VecNormalize(DummyVecEnv([simulator.env] * self.envs), norm_obs=bold, gamma=self.discount)
+
+        def stepped(*_: Any) -> bool:
+            advance(self.envs)
+            return True  # goes on
+
         try:
             model = sb3_contrib.TRPO(
                 "MlpPolicy",
@@ -90,7 +102,7 @@ class Trpo:
             if not bold:
                 _put(model, policy.layers(parameters))
             for _ in range(self.generations):
-                model.learn(max(self.steps // self.generations, 1), reset_num_timesteps=False)
+                model.learn(max(self.steps // self.generations, 1), stepped, reset_num_timesteps=False)
                 yield vector_of(_folded(_taken(model), env.obs_rms if bold else None, float(env.epsilon)))
         finally:
             env.close()

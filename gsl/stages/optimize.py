@@ -102,8 +102,10 @@ class Optimize:
     ) -> Iterator[PolicyRecord]:
         """Yield what a learner has come to after each generation."""
         seed, simulator = derived_seed(self.seed, self.kind), GroundedSimulator(scenario, first)
-        steps = optimizer.learn(simulator, self.policy, first, seed, bold=self.initial is None)
-        with console.progress(optimizer.generations * self.rollouts, "learning in simulation") as progress:
+        total = optimizer.taken + optimizer.generations * self.rollouts
+        with console.progress(total, "learning in simulation") as progress:
+            start = self.initial is None
+            steps = optimizer.learn(simulator, self.policy, first, seed, bold=start, advance=progress.advance)
             for index, parameters in enumerate(steps):
                 value = self._evaluated(scenario, [parameters], index, progress).values[0]
                 yield self._record(index, parameters, value)

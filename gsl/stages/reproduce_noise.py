@@ -1,4 +1,4 @@
-"""The paper's figures 12 and 13, and GARAT's suite: real worlds that are noisy or heavier, with TRPO as optimiser."""
+"""The paper's figures 12 and 13, and GARAT's suite: real worlds that are noisy or heavier."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
+from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.policy import sized
 from gsl.report.markdown import table as markdown
@@ -41,7 +42,7 @@ class Point(NamedTuple):
 
     Attributes:
         value: Mean return of its policy in the real world.
-        real_steps: In the real world, that it learned from.
+        real_steps: In the real world, that it learned from; None of a search there, whose steps nobody counts.
     """
 
     world: str
@@ -49,15 +50,15 @@ class Point(NamedTuple):
     method: str
     trial: int
     value: float
-    real_steps: int
+    real_steps: int | None
 
 
 @component
 class NoiseStudy:
-    """Every trial begins with a policy that TRPO learned in the plain simulator, and goes on from it with each method.
+    """Every trial begins with a policy from the plain simulator, and goes on from it with each method.
 
-    The same number of further steps for each; without grounding and with action noise they are the same search for all
-    real worlds. The reference learns in the real world itself.
+    The same effort for each; without grounding and with action noise it is the same search for all real worlds. The
+    reference learns in the real world itself.
     """
 
     kind: ClassVar[str] = "reproduce"
@@ -66,7 +67,7 @@ class NoiseStudy:
     worlds: Annotated[Mapping[str, GymnasiumWorld], setting("the real worlds, by name; their noise is replaced")]
     noises: Annotated[tuple[float, ...], setting("standard deviations of the real worlds' noise", min_length=1)]
     methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name")]
-    further: Annotated[Trpo, setting("how it goes on from π0")]
+    further: Annotated[CmaEs | Trpo, setting("how it goes on from π0")]
     trials: Annotated[int, setting("trials of each method", ge=1)]
     sims: Annotated[Mapping[str, GymnasiumWorld], setting("simulators of worlds that have one of their own")] = field(
         default_factory=dict
@@ -129,8 +130,15 @@ class NoiseStudy:
                 below / "real" / name / "optimize", NoGrounding(), start, seed, console
             )
             value = self._value(at, below / "real" / name / "evaluate", on_real, seed, console)
-            points.append(Point(world, noise, REAL, number, value, self.further.taken))
+            points.append(Point(world, noise, REAL, number, value, getattr(self.further, "taken", None)))
         return points
+
+    @property
+    def _reference(self) -> str:
+        """How much of the real world the reference learned from."""
+        if isinstance(self.further, Trpo):
+            return f"{self.further.taken:,} steps"
+        return f"{self.further.generations * self.further.candidates * self.iterate.budget.rollouts:,} episodes"
 
     def _chain(self, sim: World) -> Chain:
         """Return the links in a simulator, for whose sizes the policy is made anew."""
@@ -156,10 +164,10 @@ class NoiseStudy:
             apart = mean_interval(np.subtract(values["sgat"], values["gat"])) if known else None
             between = f"{apart.mean:+.0f} ({apart.lower:+.0f} to {apart.upper:+.0f})" if apart else "-"
             rows.append((world, f"{noise:g}", *(f"{mean:.0f} ± {error:.0f}" for mean, error in means), between))
-        spent = max(one.real_steps for one in points if one.method != REAL)
+        spent = max(one.real_steps or 0 for one in points if one.method != REAL)
         below = [
             f"Mean ± standard error over {self.trials} trials; learned groundings saw at most {spent:,} real steps,",
-            f"the reference learned from {self.further.taken:,}.",
+            f"the reference learned from {self._reference}.",
         ]
         return (
             markdown(("real world", "noise", *self._shown, "sgat - gat (95 %)"), rows) + "\n" + "\n".join(below) + "\n"

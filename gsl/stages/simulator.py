@@ -50,7 +50,7 @@ class GroundedSimulator:
 
 
 class RewardedEnv(gymnasium.Env):
-    """A scenario as an environment that any library for reinforcement learning can act in."""
+    """A scenario as an environment that any library for reinforcement learning can act in; it tells no `info`."""
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  gymnasium's own name and type
 
@@ -67,19 +67,19 @@ class RewardedEnv(gymnasium.Env):
         """Begin an episode; without a seed, one that an earlier seed leads to."""
         super().reset(seed=seed)
         drawn = int(self.np_random.integers(2**31))
-        self._seen, info = self._env.reset(seed=drawn, options={"posture": self._posture})
+        self._seen, _ = self._env.reset(seed=drawn, options={"posture": self._posture})
         self._task = self._scenario.task.start(self._layout, self._seen, self._scenario.role)
         self._left = self._scenario.ticks
-        return self._seen, info
+        return self._seen, {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Act; the reward is the task's."""
         before, given = self._seen, np.atleast_1d(np.asarray(action, dtype=float))
-        self._seen, own, ended, cut, info = self._env.step(given)
+        self._seen, own, ended, cut, _ = self._env.step(given)
         judged = self._task.step(before, self._seen, ended)
         self._left -= 1
         reward = own if judged.reward is None else judged.reward
-        return self._seen, float(reward), ended or judged.ended, cut or self._left == 0, info
+        return self._seen, float(reward), ended or judged.ended, cut or self._left == 0, {}
 
     def close(self) -> None:
         """Free the world."""
