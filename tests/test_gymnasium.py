@@ -444,6 +444,18 @@ def test_without_the_extra_a_line_says_what_to_install(monkeypatch: pytest.Monke
         next(iter(Trpo(steps=10).learn(simulator, policy, policy.initial, 1, bold=True, advance=print)))
 
 
+def test_remarks_on_a_model_are_neither_on_the_terminal_nor_in_a_file_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    before = mujoco.get_mju_user_warning()
+    assert GymnasiumWorld("HalfCheetah-v5").layout.states == 17
+    assert capfd.readouterr() == ("", "")
+    assert not list(tmp_path.iterdir())
+    assert mujoco.get_mju_user_warning() is before
+
+
 def test_without_mujoco_a_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [name for name in sys.modules if name.startswith(("mujoco", "gymnasium.envs.mujoco"))]:
         monkeypatch.delitem(sys.modules, name)

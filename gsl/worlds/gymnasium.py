@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import field
 from functools import cached_property, partial
 from typing import Annotated, Any
@@ -22,7 +22,7 @@ from gsl.core.setting import component, setting
 from gsl.core.table import Table
 from gsl.errors import ConfigError, GslError
 from gsl.worlds.control_cost import Charged, ControlCost
-from gsl.worlds.mujoco import change_masses
+from gsl.worlds.mujoco import change_masses, without_remarks
 
 _STREAM = 11  # sets the noise on actions apart from the environment's own randomness, whose seed is the same
 
@@ -181,7 +181,8 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
     """
     make = _maker(name)
     try:
-        env = make(**kwargs)
+        with without_remarks():
+            env = make(**kwargs)
     except gymnasium.error.DependencyNotInstalled as error:
         raise ConfigError("env_id", f"{_line(error)}; MuJoCo's are in gsl[mujoco]", given=name) from error
     except gymnasium.error.Error as error:
@@ -198,6 +199,8 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
 def _maker(name: str) -> Callable[..., Any]:
     place, separator, attribute = name.partition(":")
     if not separator or not attribute.isidentifier():
+        with suppress(Exception):  # what is wrong with it, gymnasium will tell
+            importlib.import_module(str(gymnasium.spec(name).entry_point).partition(":")[0])
         return partial(gymnasium.make, name, disable_env_checker=True)
     try:
         found = getattr(importlib.import_module(place), attribute)

@@ -1,14 +1,36 @@
-"""Heavier and lighter bodies of a MuJoCo environment: what the paper's section 8.2 calls the real one."""
+"""MuJoCo's environments: heavier and lighter bodies, which the paper's section 8.2 calls real; remarks on models."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import logging
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
 
 ALL = "all"
+_log = logging.getLogger("gsl")
+
+
+@contextmanager
+def without_remarks() -> Iterator[None]:
+    """Have MuJoCo's remarks on a model that is loaded in the log, not on the terminal and in a file of its own.
+
+    Those of gymnasium's own models are nothing that a user could mend. Without MuJoCo in the process it does nothing.
+    """
+    mujoco = sys.modules.get("mujoco")
+    if mujoco is None:
+        yield
+        return
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda remark: _log.info("MuJoCo: %s", remark))
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def change_masses(env: Any, factors: Mapping[str, float]) -> None:
