@@ -14,7 +14,7 @@ from gsl.core.layout import Layout
 from gsl.core.scaling import scaling
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
-from gsl.models.calibration import calibrated
+from gsl.models.calibration import calibrated, mixing
 from gsl.models.choice import fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Ensemble, ensemble
@@ -198,3 +198,18 @@ def test_what_a_model_cannot_do_is_refused() -> None:
         settings.load(lambda _: a_model(Head()), lambda _: SOLVER)
     with pytest.raises(ConfigError, match="needs an ensemble"):
         replace(settings, predicts="point", gate=1.0).load(lambda _: a_model(Head()), lambda _: SOLVER)
+
+
+def test_variables_that_one_noise_moves_are_drawn_together() -> None:
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=(5000, 1))
+    outputs = np.hstack([noise, -2.0 * noise, 0.5 * rng.normal(size=(5000, 1))])
+    head = Head("gaussian")
+    raw = np.concatenate([np.zeros(3), np.log([1.0, 2.0, 0.5])])
+    network = Network([(np.zeros((6, 1)), raw)])
+    factor = mixing(network, head, (np.zeros((5000, 1)), outputs))
+    draws = Draws(np.random.default_rng(1))
+    drawn = np.array([head.drawn(raw, draws, factor) for _ in range(5000)])
+    np.testing.assert_allclose(drawn.std(axis=0), [1.0, 2.0, 0.5], rtol=0.05)
+    np.testing.assert_allclose(drawn[:, 1], -2.0 * drawn[:, 0], atol=0.05)
+    assert abs(np.corrcoef(drawn[:, 0], drawn[:, 2])[0, 1]) < 0.05

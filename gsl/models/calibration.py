@@ -16,6 +16,7 @@ from gsl.models.network import Network, Samples
 
 SCALE = 0.5, 3.0  # least and largest factor of a standard deviation
 MEMORY = 0.9  # largest
+ROUNDING = 1e-6  # of a correlation matrix that is singular, as that of one source of noise is
 
 
 def calibrated(network: Network, head: Head, episodes: Sequence[Samples]) -> tuple[Network, np.ndarray]:
@@ -36,6 +37,23 @@ def calibrated(network: Network, head: Head, episodes: Sequence[Samples]) -> tup
     wider = np.tile(np.log(scale), head.components)  # the last outputs are logarithms of standard deviations
     added = np.concatenate([np.zeros(len(bias) - len(wider)), wider])
     return Network([*hidden, (weight, bias + added)]), np.clip(memory, 0.0, MEMORY)
+
+
+def mixing(network: Network, head: Head, samples: Samples) -> np.ndarray:
+    """Return the factor L of the correlation L Lᵀ of errors, shape (m, m): L times standard normal draws errs alike.
+
+    Noise on an action moves all variables at once; drawn one by one, an inverse model averages it away.
+
+    Args:
+        network: Of a head that draws.
+        head: How its outputs are read.
+        samples: Inputs, shape (N, n), and outputs, shape (N, m), that it was not fitted to.
+    """
+    errors = _standardised(network, head, *samples)
+    moving = errors.std(axis=0) > 0.0
+    together = np.eye(errors.shape[1])
+    together[np.ix_(moving, moving)] = np.atleast_2d(np.corrcoef(errors[:, moving], rowvar=False))
+    return np.linalg.cholesky((1.0 - ROUNDING) * together + ROUNDING * np.eye(len(together)))
 
 
 def _standardised(network: Network, head: Head, inputs: np.ndarray, outputs: np.ndarray) -> np.ndarray:

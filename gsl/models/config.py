@@ -40,6 +40,10 @@ class ModelConfig:
     likelihood: Annotated[
         Likelihood, setting("what a forward model says of the next state: a point, a Gaussian, a mixture of Gaussians")
     ] = "point"
+    covariance: Annotated[
+        Literal["diagonal", "full"],
+        setting("of a Gaussian: variables drawn each alone, or as they err together (of environments)"),
+    ] = "diagonal"
     components: Annotated[int, setting("Gaussians of a mixture", ge=2, le=10)] = 3
     members: Annotated[int, setting("forward models of an ensemble, each of its own draw of trajectories", ge=1)] = 1
     hidden: Annotated[

@@ -88,13 +88,20 @@ class Head:
         found: np.ndarray = -highest - np.log(np.exp(each - highest[:, None]).sum(axis=-1))
         return found
 
-    def drawn(self, raw: np.ndarray, draws: Draws) -> np.ndarray:
-        """Return one draw, shape (m,), of raw outputs of shape (width,)."""
+    def drawn(self, raw: np.ndarray, draws: Draws, mixing: np.ndarray | None = None) -> np.ndarray:
+        """Return one draw, shape (m,).
+
+        Args:
+            raw: Outputs, shape (width,).
+            draws: Where it comes from.
+            mixing: What standard normal draws are multiplied by, shape (m, m), so that outputs err together.
+        """
         if self.likelihood == "point":
             return raw
         weights, means, sds = self.parts(raw)
         chosen = int(np.searchsorted(np.cumsum(weights)[:-1], draws.uniform())) if self.components > 1 else 0
-        drawn: np.ndarray = means[chosen] + sds[chosen] * draws.normal(means.shape[1])
+        normal = draws.normal(means.shape[1])
+        drawn: np.ndarray = means[chosen] + sds[chosen] * (normal if mixing is None else mixing @ normal)
         return drawn.astype(raw.dtype)
 
 

@@ -29,6 +29,7 @@ class StateForward:
         choices: Number of choices, 0 where actions are numbers.
         variables: Indices of the variables of interest, in order.
         scale: Size of usual changes, shape (n_variables,).
+        mixing: What makes the variables' draws err together, shape (n_variables, n_variables), None if they do not.
     """
 
     kind: ClassVar[str] = "forward_model"
@@ -41,11 +42,12 @@ class StateForward:
     choices: int
     variables: tuple[int, ...]
     scale: np.ndarray
+    mixing: np.ndarray | None = None
 
     def change(self, state: np.ndarray, action: np.ndarray, draws: Draws | None = None) -> np.ndarray:
         """Return the expected change of the variables, shape (n_variables,); with `draws`, one that may happen."""
         raw = self.network.predict(np.concatenate([state, self.encoded(action[None])[0]]))
-        return self.head.expected(raw) if draws is None else self.head.drawn(raw, draws)
+        return self.head.expected(raw) if draws is None else self.head.drawn(raw, draws, self.mixing)
 
     def changes(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """Return the expected changes, shape (N, n_variables), for many states and actions."""
@@ -57,7 +59,8 @@ class StateForward:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint stores."""
-        return {**self.network.arrays(), "scale": self.scale}
+        together = {} if self.mixing is None else {"mixing": self.mixing}
+        return {**self.network.arrays(), "scale": self.scale, **together}
 
     def description(self) -> dict[str, Any]:
         """Return what a checkpoint says of the arrays."""
@@ -70,7 +73,7 @@ class StateForward:
         """Return the model that a checkpoint holds."""
         sizes = about["states"], about["actions"], about["choices"], tuple(about["variables"])
         head = Head(about["likelihood"], about["components"])
-        return cls(Network.from_arrays(arrays), head, *sizes, arrays["scale"])
+        return cls(Network.from_arrays(arrays), head, *sizes, arrays["scale"], arrays.get("mixing"))
 
 
 @dataclass(frozen=True)

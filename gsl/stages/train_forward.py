@@ -82,6 +82,8 @@ class TrainForward:
         if data.training.states:
             write(folder / HELDOUT, data.heldout)
             return forward_of_states(folder, data, self.model, self.seed)
+        if self.model.covariance == "full":
+            raise ConfigError("model.covariance", "full is for a gymnasium environment; robots' joints are drawn alone")
         self._check(path, data)
         model, choice = fitted(self.model, data, self.seed, base)
         write_model(folder, model)

@@ -12,6 +12,7 @@ import numpy as np
 from gsl.core.scaling import Scaling
 from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError
+from gsl.models.calibration import mixing
 from gsl.models.choice import best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.counts import Counts, counted
@@ -122,7 +123,9 @@ def _forward(config: ModelConfig, data: Parts, seed: int, head: Head | None = No
     network = _fitted(training, validation, config, seed, head)
     scale = np.maximum(known.changes.std(axis=0), 1e-12)
     actions = choices or known.actions.shape[1]
-    return StateForward(network, head, data.training.states, actions, choices, variables, scale)
+    full = head.likelihood == "gaussian" and config.covariance == "full"
+    together = mixing(network, head, validation) if full else None
+    return StateForward(network, head, data.training.states, actions, choices, variables, scale, together)
 
 
 def _inverse(config: ModelConfig, data: Parts, seed: int) -> StateInverse:
