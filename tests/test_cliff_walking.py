@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +24,12 @@ EDGE = {0.0: 98.70, 0.1: 73.62, 0.5: 23.05, 0.8: -3.83, 1.0: -10.90}  # the path
 BEST = {0.0: 98.70, 0.1: 95.00, 0.5: 63.71, 0.8: 2.19, 1.0: -10.90}  # of the real world's own optimum
 
 
+def the_cliff_world(noise: float) -> GymnasiumWorld:
+    return GymnasiumWorld(env_id="gsl.worlds.cliff_walking:CliffWalking", kwargs={"noise": noise})
+
+
 def the_cliff(noise: float = 0.0) -> Table:
-    return GymnasiumWorld(env_id="gsl.worlds.cliff_walking:CliffWalking", kwargs={"noise": noise}).table
+    return the_cliff_world(noise).table
 
 
 @pytest.mark.parametrize("noise", EDGE)
@@ -58,6 +63,12 @@ def test_episodes_of_a_table_return_what_it_is_worth() -> None:
     found = played(real, policy, 20_000, np.random.default_rng(1))
     assert found.returns.mean() == pytest.approx(real.value(policy), abs=0.6)
     assert not found.seen[real.terminal].any()
+
+
+def test_noise_of_the_world_is_in_its_table() -> None:
+    real, disturbed = the_cliff(0.3), replace(the_cliff_world(0.0), action_noise=0.3).table
+    np.testing.assert_allclose(disturbed.chances, real.chances)
+    np.testing.assert_allclose(disturbed.rewards, real.rewards)
 
 
 def test_policy_iteration_keeps_its_action_among_equals() -> None:

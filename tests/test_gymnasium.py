@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ import numpy as np
 import pytest
 from commands import done, refused
 
+from gsl.commandline.composer import compose, opened
+from gsl.config import prepared, resolved
 from gsl.core.layout import check_alike
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
@@ -58,6 +61,34 @@ class Strange(gymnasium.Env):
         state = np.zeros(self.observation_space.shape)  # type: ignore[arg-type]
         state[1] = self.value
         return state, self.reward, False, False, {}
+
+
+class Nothing(gymnasium.Env):
+    """Has no spaces."""
+
+
+class Priced(Strange):
+    """Tells what an action costs, to a power."""
+
+    def __init__(self, power: float = 2.0) -> None:
+        super().__init__()
+        self.power = power
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        price = -0.1 * float(np.abs(action[0])) ** self.power
+        return np.zeros(2), price, False, False, {"reward_ctrl": price}
+
+
+class Ends(Strange):
+    """Insists on its range, which is uneven."""
+
+    def __init__(self, low: float = -0.01, high: float = 0.43) -> None:
+        super().__init__()
+        self.action_space = gymnasium.spaces.Box(np.float32(low), np.float32(high), (1,))
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        assert self.action_space.contains(action)
+        return super().step(action)
 
 
 class InPlace(Strange):
@@ -188,9 +219,34 @@ def test_a_price_in_the_actuators_own_units_is_charged_in_them() -> None:
     sent, agent = ((2.0 * one - high - low) / (high - low) for one in raw.values())
     price = {name: -0.3 * float(one @ one) for name, one in raw.items()}
     told = Charged(None, low, high).corrected(
-        7.0 + price["sent"], agent, {"carried_out": sent, "reward_ctrl": price["sent"]}
+        7.0 + price["sent"], agent, sent, {"carried_out": sent, "reward_ctrl": price["sent"]}
     )
     assert told == pytest.approx(7.0 + price["agent"])
+
+
+def test_noise_of_the_world_is_not_charged() -> None:
+    env = GymnasiumWorld(env_id="test_gymnasium:Priced", action_noise=0.5).make()
+    env.reset(seed=0)
+    steps = [env.step(np.array([0.4])) for _ in range(20)]
+    assert np.std([info["carried_out"][0] for *_, info in steps]) > 0.2
+    np.testing.assert_allclose([reward for _, reward, *_ in steps], -0.1 * 0.4**2, rtol=1e-5)
+
+
+def test_a_price_that_is_not_quadratic_is_one_line() -> None:
+    env = GymnasiumWorld(env_id="test_gymnasium:Priced", kwargs={"power": 1.0}, action_noise=0.5).make()
+    env.reset(seed=0)
+    with pytest.raises(GslError, match=r"info\['reward_ctrl'\] is no -w \|u\|².*control_cost="):
+        for _ in range(5):
+            env.step(np.array([0.4]))
+
+
+def test_the_ends_of_a_range_are_within_it() -> None:
+    rng = np.random.default_rng(0)
+    for low, high in [(-0.01, 0.43), *np.sort(rng.uniform(-5.0, 5.0, (50, 2)), axis=1).tolist()]:
+        env = GymnasiumWorld(env_id="test_gymnasium:Ends", kwargs={"low": low, "high": high}).make()
+        env.reset(seed=0)
+        for end in (-1.0, 1.0):
+            env.step(np.array([end]))
 
 
 def models(tmp_path: Path, sim: GymnasiumWorld, real: GymnasiumWorld, likelihood: Any = "point") -> tuple[Any, Any]:
@@ -252,14 +308,16 @@ def test_choices_are_grounded_by_the_nearest_effect(tmp_path: Path) -> None:
     assert (found == actions).mean() > 0.95
 
 
-def test_trpo_learns_and_goes_on_from_what_it_learned() -> None:
+def test_trpo_learns_and_goes_on_from_what_it_learned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("sb3_contrib")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     policy = a_policy(CART, (16,))
     simulator = GroundedSimulator(Scenario(CART, OwnReward(), policy, "sim", NoGrounding()), policy.initial)
     trpo = Trpo(steps=8192, generations=2, rollout=1024)
     steps: list[int] = []
     first, second = trpo.learn(simulator, policy, policy.initial, 1, bold=True, advance=steps.append)
     assert sum(steps) == trpo.taken == 8192
+    assert not list(tmp_path.iterdir())
     scenario = Scenario(CART, OwnReward(), policy, "sim", NoGrounding())
 
     def value(parameters: np.ndarray) -> float:
@@ -311,21 +369,40 @@ def test_heavier_bodies() -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "body", "mass"),
+    [("inverted_pendulum_heavy", "pole", 100.0), ("hopper_heavy", "torso", 6.0), ("walker2d_heavy", "torso", 10.0)],
+)
+def test_garat_s_worlds_weigh_what_they_say(name: str, body: str, mass: float) -> None:
+    pytest.importorskip("mujoco")
+    line = [f"world={name}", "task=own_reward", "policy=mlp"]
+    with opened(None):
+        stage, *_ = prepared(resolved(compose("collect", line)))
+    assert stage.world.make().unwrapped_env.model.body(body).mass[0] == pytest.approx(mass, rel=1e-3)
+
+
+@pytest.mark.parametrize(
     ("changes", "line"),
     [
         ({"env_id": "CartPol-v1"}, "there is no such environment: Environment `CartPol` doesn't exist"),
         ({"env_id": "examples.cart:Carriage"}, "there is no such environment"),
         ({"env_id": "nowhere.at:All"}, "No module named 'nowhere'"),
+        ({"env_id": "nowhere:All-v0"}, "env_id = nowhere:All-v0: cannot be made: ModuleNotFoundError"),
+        ({"env_id": "test_gymnasium:Nothing"}, "env_id = test_gymnasium:Nothing: has no observation_space"),
+        ({"env_id": "a_broken_module:Any"}, "its module cannot be imported: NameError"),
         ({"env_id": "test_gymnasium:Strange", "kwargs": {"observes": [8, 8, 3]}}, "observes a Box of shape (8, 8, 3)"),
         ({"env_id": "test_gymnasium:Strange", "kwargs": {"acts": float("inf")}}, "its actions have no bounds"),
         (
             {"env_id": "examples.cart:Cart", "kwargs": {"slop": 1.0}},
-            "examples.cart:Cart cannot be made with them: TypeError",
+            "examples.cart:Cart cannot be made: TypeError",
         ),
         ({"env_id": "examples.cart:Cart", "mass": {"all": 2.0}}, "mass: is for MuJoCo environments"),
     ],
 )
-def test_an_environment_that_does_not_fit_is_one_line(changes: dict[str, Any], line: str) -> None:
+def test_an_environment_that_does_not_fit_is_one_line(
+    changes: dict[str, Any], line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a_broken_module.py").write_text("nothing_of_this_name\n")
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ConfigError) as caught:
         GymnasiumWorld(**changes).make()
     assert line in str(caught.value)

@@ -49,6 +49,15 @@ class Table:
         rewards = np.divide(paid, chances, out=np.zeros_like(paid), where=chances > 0.0)
         return cls(chances, rewards, terminal, start)
 
+    def disturbed(self, noise: float) -> Table:
+        """Return the table of a world that replaces an action, with chance `noise`, by one drawn from all."""
+        if not noise:
+            return self
+        paid = self.chances * self.rewards
+        chances, paid = ((1.0 - noise) * one + noise * one.mean(axis=1, keepdims=True) for one in (self.chances, paid))
+        rewards = np.divide(paid, chances, out=np.zeros_like(paid), where=chances > 0.0)
+        return Table(chances, rewards, self.terminal, self.start)
+
     def values(self, policy: np.ndarray) -> np.ndarray:
         """Return the expected return from every state, shape (S,), of a policy: an action a state, shape (S,)."""
         rows = np.arange(len(policy))

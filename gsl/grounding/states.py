@@ -65,6 +65,8 @@ class StateTransformationRun:
     def transform(self, observation: np.ndarray, action: np.ndarray) -> np.ndarray:
         """Return the grounded action, shape (n_actions,)."""
         grounding = self._grounding
+        if not grounding.forward.choices:
+            action = np.minimum(np.maximum(action, -1.0), 1.0)  # as f has seen them
         wanted = grounding.forward.change(observation, action, self._draws)
         found = grounding.inverse.action(observation, action, wanted)
         if grounding.forward.choices:

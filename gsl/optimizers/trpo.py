@@ -68,6 +68,7 @@ class Trpo:
         try:
             import sb3_contrib
             import torch
+            from stable_baselines3.common.logger import Logger
             from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
         except ImportError as error:
             raise ConfigError("optimizer", f"TRPO needs gsl[rl]: pip install 'gsl[rl]' ({error})") from error
@@ -99,6 +100,7 @@ class Trpo:
                     **({} if policy.sizes[2] else {"log_std_init": float(np.log(self.exploration))}),
                 },
             )
+            model.set_logger(Logger(None, []))  # the library's own would leave a folder behind
             if not bold:
                 _put(model, policy.layers(parameters))
             for _ in range(self.generations):

@@ -94,6 +94,8 @@ class Gate:
             return self._transformed(scenario, scenario.grounding)
         if isinstance(scenario.grounding, RandomisedEffects):
             return self._randomised(scenario, scenario.grounding)
+        if scenario.world.layout.states and not isinstance(scenario.grounding, NoGrounding):
+            self._charged(scenario)
         return scenario, {}
 
     def _randomised(self, scenario: Scenario, settings: RandomisedEffects) -> tuple[Scenario, Mapping[str, Any]]:
@@ -153,12 +155,7 @@ class Gate:
 
     def _of_states(self, ready: Scenario, heldout: Batch) -> tuple[Scenario, Mapping[str, Any]]:
         """Compare what π0 is worth with held-out real episodes."""
-        if uncharged(ready):
-            problem = "the reward may charge for the grounded action instead of the agent's"
-            advice = (
-                "sim.control_cost='{_target_: gsl.worlds.control_cost.Quadratic, weight: 0.1}' says what it charges"
-            )
-            self.console.status(f"warning: {problem}; {advice} (world.control_cost in optimize)")
+        self._charged(ready)
         real = of_policy(heldout, pi0=True) or heldout.episodes
         noise = exploration(heldout.metadata.get("action_noise", 0.0), ready.world.layout)
         report = value_report(ready, self.parameters, real, noise, derived_seed(self.seed, "check"))
@@ -166,6 +163,15 @@ class Gate:
         self.console.table("π0 in the grounded simulator", VALUE_TITLES, report.rows(), report.told)
         self._judge(report.problems, "Collect more data")
         return ready, {"grounding_acceptable": not report.problems}
+
+    def _charged(self, scenario: Scenario) -> None:
+        """Warn where nobody knows whose action the reward charges for."""
+        if uncharged(scenario):
+            problem = "the reward may charge for the grounded action instead of the agent's"
+            advice = (
+                "sim.control_cost='{_target_: gsl.worlds.control_cost.Quadratic, weight: 0.1}' says what it charges"
+            )
+            self.console.status(f"warning: {problem}; {advice} (world.control_cost in optimize)")
 
     def _chosen(self, scenario: Scenario, loaded: LoadedTransformation, validation: Batch) -> tuple[str, ...]:
         """Return the joints to ground, and tell them."""

@@ -32,7 +32,8 @@ class Point(NamedTuple):
     Attributes:
         value: Exact, of the policy it ends with, in the real world.
         estimate: The same from episodes there.
-        rounds: Of grounding and policy improvement until nothing changed.
+        rounds: Of grounding and policy improvement.
+        converged: Whether the last one changed nothing.
         real_episodes: That the forward model learned from.
     """
 
@@ -42,6 +43,7 @@ class Point(NamedTuple):
     value: float
     estimate: float
     rounds: int
+    converged: bool
     real_episodes: int
 
 
@@ -95,17 +97,16 @@ class Figure11:
         real, policy = self._real(noise), start
         rng = np.random.default_rng(derived_seed(self.seed, self.kind, round(1e6 * noise), trial))
         inverse = Counts(played(simulator, start, self.sim_episodes, rng, explore=0.9).seen, "inverse_model")
-        seen, rounds = np.zeros(real.chances.shape), 0
-        while rounds < self.rounds:
+        seen, rounds, converged = np.zeros(real.chances.shape), 0, False
+        while rounds < self.rounds and not converged:
             rounds += 1
             seen += played(real, policy, self.episodes, rng, explore=self.explore).seen
             grounding = TableTransformation(Counts(seen), inverse, draws=METHODS[method])
             better = grounding.grounded(simulator).solved(policy)
-            if np.array_equal(better, policy):
-                break
+            converged = np.array_equal(better, policy)
             policy = better
         estimate = float(played(real, policy, self.evaluations, rng).returns.mean())
-        return Point(method, noise, trial + 1, real.value(policy), estimate, rounds, rounds * self.episodes)
+        return Point(method, noise, trial + 1, real.value(policy), estimate, rounds, converged, rounds * self.episodes)
 
 
 def _of(points: Sequence[Point], method: str, noise: float) -> list[Point]:
@@ -121,13 +122,15 @@ def _table(points: Sequence[Point], bounds: Mapping[float, tuple[float, float]])
         told = [_told(mean_interval(values)) for values in each.values()]
         share = f"{100 * np.mean(each['sgat']) / best:.1f} %" if best > 0.0 else "-"
         rows.append((f"{noise:g}", f"{edge:.2f}", f"{best:.2f}", *told, _told(apart), share))
-    effort = [
-        (method, f"{np.mean([one.rounds for one in points if one.method == method]):.1f}", _episodes(points, method))
-        for method in METHODS
-    ]
+    effort = []
+    for method in METHODS:
+        own = [one for one in points if one.method == method]
+        open_ends = sum(not one.converged for one in own)
+        rounds = f"{np.mean([one.rounds for one in own]):.1f}"
+        effort.append((method, rounds, f"{open_ends} of {len(own)}", _episodes(points, method)))
     off = max(abs(one.estimate - one.value) for one in points)
     below = f"\nEstimates from real episodes are off the exact values by {off:.2f} at most.\n\n"
-    return markdown(titles, rows) + below + markdown(("grounding", "rounds", "real episodes"), effort)
+    return markdown(titles, rows) + below + markdown(("grounding", "rounds", "not converged", "real episodes"), effort)
 
 
 def _episodes(points: Sequence[Point], method: str) -> str:

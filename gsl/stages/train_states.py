@@ -91,13 +91,14 @@ def _refuse_robots(config: ModelConfig) -> None:
 
 
 def _counts(folder: Path, data: Parts, kind: str) -> Mapping[str, Any]:
-    """Count all transitions, those that others hold out too: nothing is fitted."""
+    """Count all transitions but those held out: there is nothing whose fit has to be stopped."""
     sizes = data.training.metadata["cells"], data.training.metadata["choices"]
-    seen = sum(counted(part.episodes, *sizes) for part in data)
+    known = data.training, data.validation
+    seen = sum(counted(part.episodes, *sizes) for part in known)
     assert isinstance(seen, np.ndarray)
     write_model(folder, Counts(seen, kind))
     visited = float((seen.sum(axis=2) > 0).mean())
-    return {"space": Counts.space, "trajectories": sum(map(len, data)), "steps": int(seen.sum()), "visited": visited}
+    return {"space": Counts.space, "trajectories": sum(map(len, known)), "steps": int(seen.sum()), "visited": visited}
 
 
 def _choices(data: Parts) -> int:

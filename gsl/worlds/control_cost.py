@@ -1,8 +1,8 @@
 """Control cost: what a reward charges for an action, which is the agent's, never the one a grounding made of it.
 
-MuJoCo's environments tell it in `info["reward_ctrl"]` as -w |u|², u in the actuators' own units; from one step w is
-known, and so what the agent's own action would have cost. Others can name a function; for the rest nothing can be
-corrected.
+MuJoCo's environments tell it in `info["reward_ctrl"]`, or `reward_quadctrl`, as -w |u|², u in the actuators' own units;
+from one step w is known, and so what another action would have cost. Others can name a function; for the rest nothing
+can be corrected.
 """
 
 from __future__ import annotations
@@ -13,8 +13,11 @@ from typing import Annotated, Any, Protocol, runtime_checkable
 import numpy as np
 
 from gsl.core.setting import component, setting
+from gsl.errors import GslError
 
-KEY = "reward_ctrl"
+KEYS = ("reward_ctrl", "reward_quadctrl")
+SMALL = 1e-6  # share of a full action's square, below which a step tells no price
+SAME = 0.01  # relative difference of two steps' prices that are one
 
 
 @runtime_checkable
@@ -37,7 +40,7 @@ class Quadratic:
 
 
 class Charged:
-    """Takes the price of a transformed action out of rewards, and puts that of the agent's action in.
+    """Takes the price of a transformed or noisy action out of rewards, and puts that of the agent's action in.
 
     Args:
         given: What an action costs, none for what the environment's info tells.
@@ -46,26 +49,39 @@ class Charged:
     """
 
     def __init__(self, given: ControlCost | None, low: np.ndarray, high: np.ndarray) -> None:
-        self._cost, self._weight = given, 0.0
+        self._cost, self._weight = given, np.nan
         self._middle, self._half = (high + low) / 2.0, (high - low) / 2.0
 
-    def corrected(self, reward: float, agent: np.ndarray, info: Mapping[str, Any]) -> float:
+    def corrected(self, reward: float, agent: np.ndarray, charged: np.ndarray, info: Mapping[str, Any]) -> float:
         """Return the reward with the agent's action charged.
 
         Args:
-            reward: Of the environment.
+            reward: With the price of `charged` in it.
             agent: The agent's action, shape (n_actions,).
+            charged: Another one, shape (n_actions,).
             info: Of the environment's step, with what was carried out.
+
+        Raises:
+            GslError: The environment tells a price that is not -w |u|².
         """
-        sent, meant = info["carried_out"], np.clip(agent, -1.0, 1.0)
+        out, into = np.clip(charged, -1.0, 1.0), np.clip(agent, -1.0, 1.0)
         if self._cost is not None:
-            return reward + self._cost.cost(sent) - self._cost.cost(meant)
-        if KEY not in info:
-            return reward
-        squares = self._squares(sent)
-        if squares > 0.0:
-            self._weight = max(0.0, -float(info[KEY]) / squares)
-        return reward + self._weight * (squares - self._squares(meant))
+            return reward + self._cost.cost(out) - self._cost.cost(into)
+        return reward + self._told(info) * (self._squares(out) - self._squares(into))
+
+    def _told(self, info: Mapping[str, Any]) -> float:
+        """Return w, as far as it is known."""
+        key = next((key for key in KEYS if key in info), None)
+        if key is None:
+            return 0.0
+        squares = self._squares(info["carried_out"])
+        if squares > SMALL * self._squares(np.ones_like(self._half)):
+            weight = max(0.0, -float(info[key]) / squares)
+            if abs(weight - self._weight) > SAME * max(weight, self._weight):
+                problem = f"the environment's info['{key}'] is no -w |u|² of its action u"
+                raise GslError(f"{problem}; say what an action costs by control_cost=, weight 0 for nothing")
+            self._weight = weight
+        return 0.0 if np.isnan(self._weight) else self._weight
 
     def _squares(self, action: np.ndarray) -> float:
         return float(np.square(self._middle + self._half * action).sum())

@@ -38,7 +38,7 @@ class GymnasiumWorld:
     )
     action_noise: Annotated[
         float,
-        setting("sd of noise on every action, in halves of its range; of choices, the chance of another one", ge=0),
+        setting("sd of noise on every action, in halves of its range; of choices, the chance of a random one", ge=0),
     ] = 0.0
     control_cost: Annotated[
         ControlCost | None,
@@ -72,7 +72,7 @@ class GymnasiumWorld:
         if start is None:
             start = np.eye(env.layout.cells)[int(env.reset(seed=0)[0][0])]
         env.close()
-        return Table.of(inside.P, np.asarray(start, dtype=float))
+        return Table.of(inside.P, np.asarray(start, dtype=float)).disturbed(self.action_noise)
 
     def make(self) -> StateEnv:
         """Build the environment."""
@@ -96,9 +96,9 @@ class StateEnv(gymnasium.Env):
             self._first = int(env.action_space.start)  # type: ignore[attr-defined]
             self.action_space = Box(0.0, choices - 1.0, (1,), dtype=np.float64)
         else:
-            low, high = env.action_space.low, env.action_space.high  # type: ignore[attr-defined]
-            env = gymnasium.wrappers.RescaleAction(env, np.float32(-1.0), np.float32(1.0))
-            self.charged = Charged(world.control_cost, low, high)
+            ends = env.action_space.low, env.action_space.high  # type: ignore[attr-defined]
+            self._low, self._high = (np.asarray(end, dtype=float) for end in ends)
+            self.charged = Charged(world.control_cost, self._low, self._high)
             self.action_space = Box(-1.0, 1.0, (size,), dtype=np.float64)
         self._lowest = float(env.observation_space.start) if cells else 0.0  # type: ignore[attr-defined]
         self._env = env
@@ -129,6 +129,7 @@ class StateEnv(gymnasium.Env):
             GslError: The action or what comes of it is no finite number.
         """
         sent: Any = np.asarray(action, dtype=float)
+        meant = sent
         if not np.isfinite(sent).all():
             raise GslError(f"{self.world.env_id}: the action {sent.tolist()} is not finite: a policy must give numbers")
         noise = self.world.action_noise
@@ -139,13 +140,17 @@ class StateEnv(gymnasium.Env):
         else:
             shaken = sent + noise * self._rng.standard_normal(len(sent)) if noise else sent
             sent = np.clip(shaken, -1.0, 1.0)
-            given = sent.astype(self._env.action_space.dtype)
+            scaled = (self._low + self._high) / 2.0 + (self._high - self._low) / 2.0 * sent
+            given = np.clip(scaled, self._low, self._high).astype(self._env.action_space.dtype)
         with self._told():
             observation, reward, ended, cut, info = self._env.step(given)
         reward = float(reward)
         if not np.isfinite(reward):
             raise GslError(f"{self.world.env_id}: the reward is {reward}; its dynamics or its reward are broken")
-        return self._state(observation), reward, bool(ended), bool(cut), {**info, "carried_out": sent}
+        info = {**info, "carried_out": sent}
+        if noise and self.charged:
+            reward = self.charged.corrected(reward, meant, sent, info)
+        return self._state(observation), reward, bool(ended), bool(cut), info
 
     def close(self) -> None:
         """Free what the environment holds."""
@@ -189,10 +194,15 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
         hint = "" if ":" in name else "; one that a module of yours registers is module:id"
         raise ConfigError("env_id", f"there is no such environment: {_line(error)}{hint}", given=name) from error
     except Exception as error:
-        told = f"{name} cannot be made with them: {type(error).__name__}: {_line(error)}"
-        raise ConfigError("kwargs", told, given=str(dict(kwargs))) from error
+        told = f"cannot be made: {type(error).__name__}: {_line(error)}"
+        if not kwargs:
+            raise ConfigError("env_id", told, given=name) from error
+        raise ConfigError("kwargs", f"{name} {told}", given=str(dict(kwargs))) from error
     if not isinstance(env, gymnasium.Env):
         raise ConfigError("env_id", "is no gymnasium.Env", given=name)
+    for lacking in ("observation_space", "action_space"):
+        if not isinstance(getattr(env, lacking, None), gymnasium.Space):
+            raise ConfigError("env_id", f"has no {lacking}", given=name)
     return env
 
 
@@ -203,10 +213,12 @@ def _maker(name: str) -> Callable[..., Any]:
             importlib.import_module(str(gymnasium.spec(name).entry_point).partition(":")[0])
         return partial(gymnasium.make, name, disable_env_checker=True)
     try:
-        found = getattr(importlib.import_module(place), attribute)
+        return getattr(importlib.import_module(place), attribute)
     except (ImportError, ValueError, AttributeError) as error:
         raise ConfigError("env_id", f"there is no such environment: {_line(error)}", given=name) from error
-    return found
+    except Exception as error:
+        told = f"its module cannot be imported: {type(error).__name__}: {_line(error)}"
+        raise ConfigError("env_id", told, given=name) from error
 
 
 def _line(error: Exception) -> str:
@@ -247,5 +259,5 @@ def _period(env: gymnasium.Env) -> float:
     for value in (getattr(inside, "dt", None), getattr(inside, "tau", None)):
         if isinstance(value, float) and value > 0.0:
             return value
-    rate = inside.metadata.get("render_fps")
+    rate = (inside.metadata or {}).get("render_fps")
     return 1.0 / rate if rate else 1.0
