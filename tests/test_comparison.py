@@ -74,7 +74,9 @@ def test_an_order_is_claimed_by_a_signed_rank_test_over_trials_with_holms_correc
         for method, stables in counts.items()
         for number, stable in enumerate(stables)
     ]
-    found = {(one.method, one.other): one for one in orders(trials, "", "nao_worn")}
+    found = {
+        (one.method, one.other): one for one in orders(trials, "", "nao_worn", ("gat", "ane"), ("none", "ane", "some"))
+    }
     assert found["gat", "none"].difference == pytest.approx(21 / 6)
     assert found["gat", "none"].p == found["gat", "ane"].p == pytest.approx(3 * 2 / 2**6)  # least of 6 pairs, times 3
     assert found["ane", "none"].p == 1.0

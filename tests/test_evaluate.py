@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from gsl.policies.linear import Linear
 from gsl.policies.walk_engine import WalkEngine
 from gsl.stages.choices import policies, record
 from gsl.stages.evaluate import Evaluate
+from gsl.stages.population import Episode
 from gsl.storage.policies import read_policies, write_policies
 from gsl.tasks.walk import Walk
 
@@ -77,3 +79,39 @@ def test_policies_of_another_family_are_refused(tmp_path: Path) -> None:
     other = Linear(start_at={})
     with pytest.raises(ArtifactError, match="policy="):
         Evaluate(GROUND, TASK, other, str(file), episodes=1, check=1, confirmation=2, workers=1).run(tmp_path, QUIET)
+
+
+def _walks(*values: float) -> list[Episode]:
+    return [Episode(value, fell=value == 0.0, steps=100, outcome={}) for value in values]
+
+
+@pytest.mark.parametrize(
+    ("check", "best", "failed"),
+    [((0.3, 0.2, 0.3), "fast", []), ((0.0, 0.2, 0.1), "pi0", ["fast", "other"])],
+    ids=["ahead", "not ahead"],
+)
+def test_where_falls_are_tolerated_a_check_has_to_be_ahead_of_the_baseline(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: tuple[float, ...], best: str, failed: list[str]
+) -> None:
+    """A high mean in the choice may be luck: the best of many policies on few episodes."""
+    walks = {
+        "choice": {
+            "pi0": (0.1, 0.0, 0.1),
+            "fast": (0.3, 0.3, 0.3),
+            "other": (0.2, 0.2, 0.2),
+            "third": (0.15, 0.2, 0.2),
+        },
+        "check": {"pi0": (0.1, 0.1, 0.0), "fast": check, "other": (0.05, 0.1, 0.1), "third": (0.9, 0.9, 0.9)},
+        "report": {name: (0.2, 0.2, 0.2) for name in ("pi0", "fast")},
+    }
+    asked: list[tuple[str, str]] = []
+
+    def measured(self: Evaluate, thetas: Any, purpose: str, count: int, **_: Any) -> list[list[Episode]]:
+        asked.extend((purpose, one.name) for one in thetas if purpose == "check")
+        return [_walks(*walks[purpose][one.name]) for one in thetas]
+
+    monkeypatch.setattr(Evaluate, "_measured", measured)
+    thetas = {name: WALK.initial for name in ("pi0", "fast", "other", "third")}
+    metrics, _ = _evaluated(tmp_path, thetas, tolerated=1.0)
+    assert (metrics["best"], metrics["failed_check"]) == (best, failed)
+    assert [name for _, name in asked] == ["pi0", "fast", "other"][: 2 + len(failed) // 2]

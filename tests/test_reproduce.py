@@ -148,6 +148,7 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     points = json.loads((folder / "points.json").read_text())
     assert [(one["method"], one["trajectories"]) for one in points] == [("none", 0), ("gat", 4), ("gat", 6)]
     assert all(one["error"] > 0.0 < one["bare"] for one in points[1:])
+    assert points[1]["bare"] == points[2]["bare"]  # measured on the same trajectories
     assert (folder / "budget.png").stat().st_size > 10_000
     assert "real trajectories" in said.out
 
@@ -187,29 +188,35 @@ def test_table_2_marks_the_noise_that_only_real_figures_choose() -> None:
     text = Table2().markdown(trials, Walk())
     assert "ane_01 (best by real)" in text and "ane_02 (best" not in text
     assert "| 18.9 | 5 of 10 | 6.6 |" in next(line for line in text.splitlines() if line.startswith("| w | ane_02"))
-    assert "| w | ane_01 - none |" in text
+    assert "| w | ane_01 - none |" not in text  # their order is not what is tested
+    assert "| w | gat - none |" in Table2().markdown([*trials, a_trial("gat", 1), a_trial("gat", 2)], Walk())
 
 
 def test_table_3_counts_where_chains_stop() -> None:
     trials = [
-        a_trial("gat", k, simulator="s", iteration=i, surely=gained)
+        a_trial("gat", k, simulator="s", iteration=i, surely=gained, value=value)
         for k in (1, 2)
-        for i, gained in ((1, 0.01), (2, 0.01), (3, -0.01))
+        for i, gained, value in ((1, 0.01, 0.25), (2, 0.01, 0.3), (3, -0.01, 0.26))
     ]
     text = Table3().markdown(trials, Walk())
     rows = [line for line in text.splitlines() if line.startswith("| s | gat")]
     assert ["2 of 2" in row for row in rows[:3]] == [False, False, True]
     assert "43.3" in rows[1]
+    assert "| 30.0 |" in rows[1] and "| 26.0 |" in rows[2] and "| 2 of 2 | 30.0 |" in rows[2]
 
 
 def test_table_4_counts_falls_over_episodes() -> None:
-    trials = [a_trial("sgat", k, falls=k) for k in (1, 2)]
-    row = next(line for line in Table4().markdown(trials, Walk()).splitlines() if line.startswith("| sgat"))
-    assert "| 3 of 20 |" in row and "0 of 10" in row
+    gat = [a_trial("gat", k, value=0.2) for k in (1, 2)]
+    trials = [*gat, *(a_trial("sgat", k, falls=k, outcome={"speed [cm/s]": 20.0 + k}) for k in (1, 2))]
+    lines = Table4().markdown(trials, Walk()).splitlines()
+    row = next(line for line in lines if line.startswith("| sgat"))
+    assert "| 21.5 | 3 of 20 | 0 to 79 |" in row and "0 of 10" in row  # shares .1 and .2: over trials, not over walks
+    assert "| w | sgat - gat | 1 | 5.0 | 5.0 to 5.0 |" in lines
 
 
 def test_the_linear_walk_has_distances_where_percentages_mean_nothing() -> None:
     trials = [a_trial("gat", k, start=0.0, value=0.05, improvement=None, surely=0.01 * (k - 1)) for k in (1, 2)]
+    trials += [a_trial("none", k, start=0.0, value=0.02, improvement=None, surely=0.0) for k in (1, 2)]
     row = next(line for line in LinearWalkTable().markdown(trials, Distance()).splitlines() if "gat" in line)
     assert "| 5.0 |" in row and "| 1 of 2 |" in row and "4.95" in row
 

@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
+
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.grounding.none import NoGrounding
@@ -25,6 +27,7 @@ from gsl.worlds.world import World
 
 TABLE = "evaluation.json"
 _CHOICE, _CHECK, _REPORT = "choice", "check", "report"  # their seeds never meet
+CHALLENGERS = 2  # that are checked, at most, where falls are tolerated
 _ERRANDS = {
     _CHOICE: "To choose a policy: {} of them, {} episodes each, of one that falls none after its fall.",
     _CHECK: "To check the fastest policy that did not fall: {1} episodes more, until it falls.",
@@ -37,9 +40,11 @@ class Evaluate:
     """Choice, check, report: each in real episodes of its own, all of them counted.
 
     Choice: `episodes` of each policy; one that falls is unstable, and what would have followed is thrown away. Check:
-    the fastest stable policy walks `check` episodes more; if it falls, the next best one does. Report: the policy that
-    is left, or the baseline (the first of the file) if none is, is measured on `confirmation` fresh episodes beside the
-    baseline, and these figures, falls and all, are what is reported: they took no part in the choice.
+    the fastest stable policy walks `check` episodes more; if it falls, the next best one does. Where falls are
+    tolerated they tell no policy from another: the baseline walks `check` episodes too, and a policy replaces it whose
+    check alone is a standard error above all of the baseline's, of two at most. Report: the policy that is left, or the
+    baseline (the first of the file) if none is, is measured on `confirmation` fresh episodes beside the baseline, and
+    these figures, falls and all, are what is reported: they took no part in the choice.
     """
 
     kind: ClassVar[str] = "evaluate"
@@ -71,7 +76,7 @@ class Evaluate:
             measure = partial(self._measured, progress=progress, console=console)
             tried = measure(found, _CHOICE, self.episodes)
             checked = dict(self._checked(found, tried, measure))
-            best = next((index for index, done in checked.items() if self._stable(done)), 0)
+            best = self._passed(tried, checked)
             reported = sorted({0, best})
             fresh = dict(zip(reported, measure([found[i] for i in reported], _REPORT, self.confirmation), strict=True))
         rows = [row(theta, done) for theta, done in zip(found, tried, strict=True)]
@@ -87,7 +92,7 @@ class Evaluate:
             "returned": summary(fresh[best]),
             "last": summary(tried[-1]),
             "gain": gain(fresh[best], fresh[0]),
-            "failed_check": [found[index].name for index, done in checked.items() if not self._stable(done)],
+            "failed_check": [found[index].name for index in checked if index not in (0, best)],
             "stable_policies": len(stable),
             "improving_policies": sum(mean(done) > mean(tried[0]) for done in stable),
             "policies": len(found) - 1,
@@ -97,16 +102,26 @@ class Evaluate:
     def _checked(
         self, found: Sequence[PolicyRecord], tried: Sequence[list[Episode]], measure: Callable[..., list[list[Episode]]]
     ) -> Iterator[tuple[int, list[Episode]]]:
-        """Yield the checks of stable policies that beat the baseline, up to the first that stays stable.
+        """Yield the checks of stable policies that beat the baseline, up to the first that passes.
 
-        The fastest comes first; where falls are tolerated, of those that fell least.
+        The fastest comes first; where falls are tolerated, of those that fell least, and before all the baseline.
         """
         better = [index for index, done in enumerate(tried) if self._stable(done) and mean(done) > mean(tried[0])]
-        for index in sorted(better, key=lambda index: (falls(tried[index]), -mean(tried[index]))):
-            (done,) = measure([found[index]], _CHECK, self.check)
-            yield index, done
-            if self._stable(done):
+        order = sorted(better, key=lambda index: (falls(tried[index]), -mean(tried[index])))
+        if self.tolerated and order:
+            order = [0, *order[:CHALLENGERS]]
+        checked: dict[int, list[Episode]] = {}
+        for index in order:
+            (checked[index],) = measure([found[index]], _CHECK, self.check)
+            yield index, checked[index]
+            if self._passed(tried, checked):
                 return
+
+    def _passed(self, tried: Sequence[list[Episode]], checked: Mapping[int, list[Episode]]) -> int:
+        """Return the index of the policy that has passed its check, the baseline's if none has."""
+        known = [*tried[0], *checked.get(0, [])]
+        passes = partial(_ahead, known) if self.tolerated else self._stable
+        return next((index for index, done in checked.items() if index and passes(done)), 0)
 
     def _stable(self, done: Sequence[Episode]) -> bool:
         return falls(done) <= self.tolerated * len(done)
@@ -133,6 +148,13 @@ class Evaluate:
             done = episodes(scenario, jobs, workers=self.workers, progress=progress)
         groups = [list(done[first : first + count]) for first in range(0, len(done), count)]
         return [_until_fall(group, to_the_end=to_the_end) for group in groups]
+
+
+def _ahead(known: Sequence[Episode], done: Sequence[Episode]) -> bool:
+    """Whether a policy's mean is a standard error of the difference above another's, on which much is known."""
+    values = [np.array([episode.value for episode in one]) for one in (known, done)]
+    error = np.sqrt(sum(one.var(ddof=1) / len(one) for one in values if len(one) > 1))
+    return bool(values[1].mean() - values[0].mean() > error)
 
 
 def _until_fall(done: Sequence[Episode | None], *, to_the_end: bool) -> list[Episode]:

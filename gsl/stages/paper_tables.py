@@ -6,13 +6,14 @@ Figures of the paper are those of its text and tables; figure 5 has none that ca
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
-from gsl.core.setting import component
-from gsl.core.statistics import Interval, mean_interval, wilson
+from gsl.core.setting import component, setting
+from gsl.core.statistics import Interval, mean_interval
 from gsl.report.markdown import table
-from gsl.stages.comparison import Summary, orders, summaries
+from gsl.stages.comparison import Summary, differences, orders, summaries
 from gsl.stages.comparison_table import told
 from gsl.stages.trial import Trial
 from gsl.tasks.task import Task
@@ -23,6 +24,7 @@ TABLE_4 = {("gat", 1): ("15.7 ± 3.0", "6 of 10"), ("sgat", 1): ("16.9 ± 0.7", 
            ("gat", 2): ("18.5 ± 3.6", "10 of 10"), ("sgat", 2): ("18.0 ± 2.2", "1 of 10")}  # fmt: skip
 LINEAR_WALK = {"none": ("1.3", "3 of 5", "1"), "gat": ("4.95", "5 of 5", "3")}
 NOTHING = ("", "", "")
+SPEED = "speed [cm/s]"
 
 
 AT_THE_END, ON_AVERAGE = "distance [deg]", "mean distance [deg]"  # of the arms
@@ -34,6 +36,9 @@ class Table2:
 
     Action noise is told for every width; the best of them by real figures knows what no user knows beforehand.
     """
+
+    tested: Annotated[tuple[str, ...], setting("methods whose order is tested")] = ("gat", "sgat")
+    against: Annotated[tuple[str, ...], setting("methods that they are tested against")] = ("none", "ane_02")
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table, the test of the order, and the single trials."""
@@ -56,7 +61,7 @@ class Table2:
         tested = [
             (world, f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
             for world in dict.fromkeys(one.world for one in found)
-            for order in orders(trials, found[0].simulator, world)
+            for order in orders(trials, found[0].simulator, world, self.tested, self.against)
         ]
         parts.append(table(("real world", "difference", "stable winners a trial", "p, Holm-corrected"), tested))
         return "\n".join([*parts, _single(trials)])
@@ -68,23 +73,35 @@ class Table2:
 
 @component
 class Table3:
-    """Speed after each iteration, with either simulator; an iteration that gains nothing for sure stops the chain."""
+    """Speed after each iteration, with either simulator; all are run, and told is what an `iterate` would return.
+
+    That stops after an iteration whose gain is not sure, and returns the policy before it, or the first if it gained.
+    """
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
         titles = (
             *("simulator", "grounding", "iteration", f"in real [{task.unit}]", "95 % interval", "improvement [%]"),
-            *("95 % interval", "falls", "trials that stop here", "real episodes"),
+            *("95 % interval", "falls", "stopped by then", f"where they stop [{task.unit}]", "real episodes"),
             *(f"paper [{task.unit}]", "paper: improvement [%]"),
         )
         rows = []
         for one in summaries(trials):
             own = [trial for trial in trials if trial.cell == one[:4]]
-            stops = sum(trial.surely <= 0.0 for trial in own)
+            chains = [[past for past in trials if past.cell[:3] == one[:3] and past.number == k.number] for k in own]
+            so_far = [[past for past in chain if past.iteration <= one.iteration] for chain in chains]
+            stops = sum(any(past.surely <= 0.0 for past in chain) for chain in so_far)
+            stopped = mean_interval([_returned(chain) for chain in so_far])
             paper = TABLE_3.get(one.iteration, NOTHING[:2]) if one.method == "gat" else NOTHING[:2]
             rows.append(
                 (one.simulator, one.method, str(one.iteration), *_value(one.value, task), *_improvement(one))
-                + (str(one.falls), f"{stops} of {one.trials}", f"{one.real_episodes:.0f}", *paper)
+                + (
+                    str(one.falls),
+                    f"{stops} of {one.trials}",
+                    _value(stopped, task)[0],
+                    f"{one.real_episodes:.0f}",
+                    *paper,
+                )
             )
         start = mean_interval([trial.start for trial in trials if trial.iteration == 1])
         below = f"π0 in real: {task.shown * start.mean:.1f} {task.unit} (paper: 19.5)."
@@ -102,25 +119,30 @@ class Table4:
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
         titles = (
-            *("grounding", "step", f"in real, a fall worth 0 [{task.unit}]", "95 % interval", "falls"),
+            *("grounding", "step", f"in real, a fall worth 0 [{task.unit}]", "95 % interval", "speed [cm/s]", "falls"),
             *("95 % interval [%]", "real episodes", "paper: speed [cm/s]", "paper: falls"),
         )
         rows = []
         for one in summaries(trials):
-            episodes = sum(trial.episodes for trial in trials if trial.cell == one[:4])
-            share = wilson(one.falls, episodes)
+            own = [trial for trial in trials if trial.cell == one[:4]]
+            share = mean_interval([trial.falls / trial.episodes for trial in own])
+            low, high = (f"{100 * np.clip(bound, 0.0, 1.0):.0f}" for bound in (share.lower, share.upper))
+            speed = np.mean([trial.outcome.get(SPEED, np.nan) for trial in own])
             rows.append(
-                (one.method, str(one.iteration), *_value(one.value, task), f"{one.falls} of {episodes}")
-                + (f"{100 * share.lower:.0f} to {100 * share.upper:.0f}", f"{one.real_episodes:.0f}")
-                + TABLE_4.get((one.method, one.iteration), NOTHING[:2])
+                (one.method, str(one.iteration), *_value(one.value, task), f"{speed:.1f}")
+                + (f"{one.falls} of {sum(trial.episodes for trial in own)}", f"{low} to {high}")
+                + (f"{one.real_episodes:.0f}", *TABLE_4.get((one.method, one.iteration), NOTHING[:2]))
             )
         start = mean_interval([trial.start for trial in trials if trial.iteration == 1])
-        below = f"π0 in real, a fall worth 0: {task.shown * start.mean:.1f} {task.unit} (paper: 14.7, always falls)."
-        return "\n".join([table(titles, rows), below, ""])
+        below = [
+            f"π0 in real, a fall worth 0: {task.shown * start.mean:.1f} {task.unit} (paper: 14.7, always falls).",
+            "Speed is distance over the planned time, falls and all; intervals are over trials.\n",
+        ]
+        return "\n".join([table(titles, rows), *below, _differences(trials, task)])
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
-        """Return what a trial is worth."""
-        return worth(trials, task)
+        """Return what a trial is worth: of a π0 that falls half of the time shares would be of little."""
+        return f"in real, a fall worth 0 [{task.unit}]", [task.shown * trial.value for trial in trials]
 
 
 @component
@@ -146,7 +168,7 @@ class LinearWalkTable:
             + (f"{one.real_episodes:.0f}", *(LINEAR_WALK.get(one.method, NOTHING) if one.iteration == 1 else NOTHING))
             for one in summaries(trials)
         ]
-        return table(titles, rows)
+        return "\n".join([table(titles, rows), _differences(trials, task)])
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
         """Return what a trial is worth."""
@@ -172,6 +194,28 @@ class Figure5:
     def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
         """Return the mean distances."""
         return "mean distance in real [°]", [trial.last[ON_AVERAGE] for trial in trials]
+
+
+def _differences(trials: Sequence[Trial], task: Task) -> str:
+    """Return the table of values against the first method's, paired by trial."""
+    first, rows = trials[0].method, []
+    for cell in dict.fromkeys(trial.cell for trial in trials if trial.method != first):
+        apart = differences(trials, cell, first, "value")
+        rows.append((cell.world, f"{cell.method} - {first}", str(cell.iteration), *_value(apart, task)))
+    titles = ("real world", "difference", "iteration", f"in real [{task.unit}]", "95 % interval, paired by trial")
+    return table(titles, rows)
+
+
+def _returned(chain: Sequence[Trial]) -> float:
+    """Return the value of what an `iterate` of a trial's iterations, in order, returns."""
+    value = chain[0].start
+    for trial in chain:
+        sure = trial.surely > 0.0
+        if sure or (trial.iteration == 1 and trial.value > trial.start):
+            value = trial.value
+        if not sure:
+            break
+    return value
 
 
 def worth(trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:

@@ -10,6 +10,7 @@ from gsl.core.setting import component, setting
 from gsl.grounding.effects import DiagnosedEffects
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
+from gsl.optimizers.cma_es import CmaEs
 from gsl.report.trial_dots import KNOWS, KNOWS_NOTHING, LEARNS, Dots, trial_dots
 from gsl.stages.compare import DATA, TABLE, Compare
 from gsl.stages.comparison import summaries
@@ -50,24 +51,39 @@ class Reproduce:
         console.status(f"{told(seconds(self.study))} from nothing; a study that was stopped goes on where it was")
         trials, made = self.study.carried_out(folder, console)
         task = self.study.iterate.task
-        (folder / TABLE).write_text(f"{self.table.markdown(trials, task)}\n{made}\n", encoding="utf-8")
-        _draw(folder / FIGURE, trials, self.study.methods, *self.table.drawn(trials, task))
+        parts = [self.table.markdown(trials, task), f"{_sizes(self.study)}\n", made]
+        (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
+        _draw(folder / FIGURE, trials, self.study, *self.table.drawn(trials, task))
         return {"trials": self.study.trials, "summaries": [one._asdict() for one in summaries(trials)]}
 
 
-def _draw(
-    path: Path, trials: Sequence[Trial], methods: Mapping[str, Grounding], axis: str, values: Sequence[float]
-) -> None:
+def _sizes(study: Compare) -> str:
+    """Return the sizes behind a table."""
+    budget, optimizer = study.iterate.budget, study.iterate.optimizer
+    searched = f"{optimizer.generations} generations"
+    if isinstance(optimizer, CmaEs):
+        searched += f" of {optimizer.candidates} candidates, {budget.rollouts} rollouts each"
+    learned = f"{budget.real_episodes} real episodes of a policy and {budget.real_neighbours} around it to learn from"
+    measured = f"{budget.episodes} for the choice, {budget.check} for the check, {budget.confirmation} for the report"
+    return f"{study.trials} trials; {searched}; {learned}; {measured}."
+
+
+def _draw(path: Path, trials: Sequence[Trial], study: Compare, axis: str, values: Sequence[float]) -> None:
     """Draw every trial, hollow where no stable improvement was found, a panel each pair of worlds."""
     panels: dict[str, dict[str, Dots]] = {}
-    several = any(trial.iteration > 1 for trial in trials)
+    several, tolerant = any(trial.iteration > 1 for trial in trials), study.iterate.budget.tolerated > 0.0
     for cell in dict.fromkeys(trial.cell for trial in trials):
-        own = [(value, trial.without) for value, trial in zip(values, trials, strict=True) if trial.cell == cell]
+        own = [
+            (value, trial.surely <= 0.0 if tolerant else trial.without)
+            for value, trial in zip(values, trials, strict=True)
+            if trial.cell == cell
+        ]
         shown, failed = zip(*own, strict=True)
         panel = " ".join(filter(None, (cell.simulator, cell.world)))
         name = f"{cell.method}, iteration {cell.iteration}" if several else cell.method
-        panels.setdefault(panel, {})[name] = Dots(shown, failed, _colour(methods[cell.method]))
-    trial_dots(path, panels, axis=axis, title="Every trial; hollow: no stable improvement")
+        panels.setdefault(panel, {})[name] = Dots(shown, failed, _colour(study.methods[cell.method]))
+    missed = "no sure improvement" if tolerant else "no stable improvement"
+    trial_dots(path, panels, axis=axis, title=f"Every trial; hollow: {missed}")
 
 
 def _colour(grounding: Grounding) -> str:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
+from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import mean_interval
 from gsl.errors import ConfigError
@@ -17,14 +17,21 @@ from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.report.budget_curve import Line, budget_curve
 from gsl.report.markdown import table
+from gsl.stages.collect import FILE as TRAJECTORIES
+from gsl.stages.collect import Collect
 from gsl.stages.comparison_table import told
-from gsl.stages.grounding_check import BARE, GROUNDED, OFF, PI0
-from gsl.stages.grounding_gate import REPORT
+from gsl.stages.grounding_check import BARE, GROUNDED, OFF, check
+from gsl.stages.grounding_gate import settled
 from gsl.stages.iterate import Iterate
 from gsl.stages.ledger import Known, Ledger, known_parent, recipe
+from gsl.stages.link import built
+from gsl.stages.rollout import Scenario
+from gsl.storage.trajectories import read
+from gsl.tasks.task import REAL, SIM
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
 NONE = "none"
+HELD_OUT = 12  # trajectories of neighbours, on which errors are measured
 OWN = 3  # one of so many trajectories is of π0, the others of its neighbours
 
 
@@ -32,9 +39,10 @@ class Point(NamedTuple):
     """One method, once, with one budget.
 
     Attributes:
-        trajectories: Real ones that the models learned from; 0 without grounding.
+        trajectories: Real ones that were collected for the models; 0 without grounding.
         value: Of the returned policy, in the unit of the task.
-        error, bare: Of the grounded and of the plain simulator after 0.2 s, on held-out trajectories [deg].
+        error, bare: Of the grounded and of the plain simulator after 0.2 s, off π0, on trajectories of its own that are
+            the same for all methods and budgets of a trial [deg].
     """
 
     method: str
@@ -95,7 +103,27 @@ class Budget:
         ready = chain.ready(place, grounding, None, seed, console)
         found = chain.search(place / "optimize", ready, None, seed, console)
         measured = chain.measure(place / "evaluate", found, seed, console)
-        return Point(method, count, number, measured.metrics["returned"]["value"], *_errors(found.folder / REPORT))
+        held = read(self._held_out(place.parents[2] / "held_out" / place.name, seed, console) / TRAJECTORIES)
+        bare = Scenario(chain.sim, chain.task, chain.policy, SIM, ready)
+        report = check(settled(bare, found.metrics), chain.policy.initial, held, derived_seed(seed, "held out"))
+        return Point(method, count, number, measured.metrics["returned"]["value"], *_errors(report.metrics()["errors"]))
+
+    def _held_out(self, place: Path, seed: int, console: Any) -> Path:
+        """Return the folder of real trajectories around π0 that no model of a trial learns from."""
+        chain = self.iterate.chain
+        stage = Collect(
+            world=chain.real,
+            task=chain.task,
+            policy=chain.policy,
+            role=REAL,
+            episodes=1,
+            neighbours=HELD_OUT,
+            spread=chain.budget.spread,
+            action_noise=chain.budget.real_action_noise,
+            workers=chain.workers,
+            seed=derived_seed(seed, "held out"),
+        )
+        return built(stage, place, console).folder
 
     def _ungrounded(self, place: Path, number: int, console: Any) -> Point:
         chain, seed = self.iterate.chain, self.iterate.seed + number - 1
@@ -117,7 +145,7 @@ class Budget:
             ]
         none = mean_interval([shown * one.value for one in points if one.method == NONE])
         rows.append((NONE, "0", f"{none.mean:.1f}", told(none), "", ""))
-        titles = ("grounding", "real trajectories", f"in real [{unit}]", "95 % interval")
+        titles = ("grounding", "real trajectories collected", f"in real [{unit}]", "95 % interval")
         titles_of_errors = ("joints after 0.2 s, off π0 [°]", "95 % interval")
         (folder / TABLE).write_text(f"{table((*titles, *titles_of_errors), rows)}\n{made}\n", encoding="utf-8")
         plain = mean_interval([one.bare for one in points if one.bare is not None]).mean
@@ -126,11 +154,9 @@ class Budget:
         budget_curve(folder / FIGURE, panels, bases, "What a grounding makes of more real data")
 
 
-def _errors(report: Path) -> tuple[float | None, float | None]:
-    """Return the errors of the grounded and of the plain simulator [deg], off π0 where there are such trajectories."""
-    errors = json.loads(report.read_text(encoding="utf-8")).get("errors") if report.exists() else None
-    if errors is None:
+def _errors(errors: Mapping[str, Any]) -> tuple[float | None, float | None]:
+    """Return the errors of the grounded and of the plain simulator off π0 [deg], None if all neighbours fell."""
+    if OFF not in errors:
         return None, None
-    held = errors.get(OFF) or errors[PI0]
-    grounded, bare = (held[name]["10_ticks"]["joints_deg"] for name in (GROUNDED, BARE))
+    grounded, bare = (errors[OFF][name]["10_ticks"]["joints_deg"] for name in (GROUNDED, BARE))
     return grounded, bare

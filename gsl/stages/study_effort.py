@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from gsl.errors import ConfigError
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
@@ -20,9 +21,14 @@ APART = 60.0  # of a learned grounding: fits and checks [s]
 
 
 def seconds(study: Compare) -> float:
-    """Return an estimate of a study's duration from nothing [s], good to a factor of two or so."""
+    """Return an estimate of a study's duration from nothing [s], good to a factor of two or so.
+
+    Raises:
+        ConfigError: The optimizer is no search.
+    """
     iterate, budget = study.iterate, study.iterate.budget
-    assert isinstance(iterate.optimizer, CmaEs), "studies of robots search"
+    if not isinstance(iterate.optimizer, CmaEs):
+        raise ConfigError("study.iterate.optimizer", "studies of robots search: take cma_es")
     workers = threads(iterate.workers)
     sims = study.simulators or {"": iterate.sim}
     real = sum(_rollout(study, world, REAL) for world in study.worlds.values()) / len(study.worlds)
