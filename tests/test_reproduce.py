@@ -10,19 +10,22 @@ from typing import Any
 import pytest
 from commands import done, gsl
 
+from gsl.commandline.composer import compose, opened
+from gsl.config import prepared, resolved
 from gsl.errors import ArtifactError
 from gsl.grounding.gat import ActionTransformation
+from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
 from gsl.stages.ledger import Ledger, recipe
 from gsl.stages.paper_tables import Figure5, LinearWalkTable, Table2, Table3, Table4
 from gsl.stages.study_effort import told
-from gsl.stages.trial import Trial
+from gsl.stages.trial import Cell, Trial
 from gsl.tasks.arm import Arm
 from gsl.tasks.distance import Distance
 from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES, RESULTS = (Path(__file__).parents[1] / place for place in ("examples", "docs/results"))
 
 KEPT = {
     "table2": ("none", "ane_02", "gat", "sgat_residual"),
@@ -30,6 +33,7 @@ KEPT = {
     "table4": ("gat", "sgat"),
     "linear-walk": ("none", "gat"),
     "fig5": ("none", "gat"),
+    "worlds": ("none",),
 }
 ALL = (
     *("none", "ane_005", "ane_01", "ane_02", "ane_04", "randomised", "gat", "gat_005", "gat_gated"),
@@ -45,7 +49,8 @@ ALL = (
     ),
 )
 OFFERED = {"table2": ALL, "table3": ("gat", "effects"), "table4": ("none", "ane_02", "gat", "sgat"),
-           "linear-walk": ("none", "ane_02", "gat", "gat_residual"), "fig5": ("none", "ane_02", "gat")}  # fmt: skip
+           "linear-walk": ("none", "ane_02", "gat", "gat_residual"), "fig5": ("none", "ane_02", "gat"),
+           "worlds": ("none", "ane_02", "gat", "effects")}  # fmt: skip
 FEW = ("preset=toy", "study.iterate.workers=1", "study.iterate.optimizer.candidates=4")
 
 
@@ -53,9 +58,10 @@ FEW = ("preset=toy", "study.iterate.workers=1", "study.iterate.optimizer.candida
 def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     left_out = [f"~study.methods.{name}" for name in OFFERED[what] if name not in KEPT[what]]
     left_out += ["~study.worlds.nao_weak"] if what == "table2" else []
+    left_out += ["~study.worlds.nao_harsh", "~study.worlds.nao_drawn_b"] if what == "worlds" else []
     left_out += ["~study.simulators.nao_weak", "study.iterate.iterations=2"] if what == "table3" else []
     short = ["study.iterate.budget.episodes=2", "study.iterate.optimizer.generations=1"]
-    left_out += short if what in ("table4", "linear-walk") else []
+    left_out += short if what in ("table4", "linear-walk", "worlds") else []
     said = done("reproduce", what, *FEW, "study.iterate.task.duration=1.2", *left_out, folder=tmp_path)
     assert "minutes from nothing" in said.err
     folder = next((tmp_path / "runs").glob("*/reproduce"))
@@ -65,7 +71,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     assert {one["iteration"] for one in trials} == set(range(1, iterations + 1))
     table = (folder / "table.md").read_text()
     assert all(f"| {name} " in table for name in KEPT[what])
-    assert all((one["rank"] is not None) == (what == "table2") for one in trials)
+    assert all((one["rank"] is not None) == (what in ("table2", "worlds")) for one in trials)
 
 
 def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) -> None:
@@ -127,8 +133,19 @@ def test_a_recipe_is_of_what_a_trial_comes_from(tmp_path: Path) -> None:
     assert first != recipe(world, gat, 2) and first != recipe(replace(world, step=0.001), gat, 1)
     search = CmaEs(candidates=4, generations=2)
     assert recipe(search, {"workers": 1}) == recipe(search, {"workers": 2}) != recipe(replace(search, sigma=0.1), {})
+    assert recipe(ModelConfig()) != recipe(ModelConfig(covariance="full"))
     (tmp_path / "arm.urdf").write_text(text.replace('<mass value="', '<mass value="1'))
     assert recipe(world, gat, 1) != first
+
+
+def test_the_committed_trials_are_still_known() -> None:
+    """A setting that comes later, at what changes nothing, makes no trial another one."""
+    with opened(None):
+        stage, *_ = prepared(resolved(compose("reproduce_linear_walk", ["preset=study"])))
+    study, rows = stage.study, json.loads((RESULTS / "linear_walk/trials.json").read_text())
+    cell = Cell("", "nao_worn", "none", 1)
+    key = recipe(study.iterate, 1, cell, study.iterate.sim, study.worlds["nao_worn"], study.methods["none"], study.rank)
+    assert key in {row["recipe"] for row in rows if (row["number"], row["method"]) == (1, "none")}
 
 
 @pytest.mark.parametrize(

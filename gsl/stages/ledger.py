@@ -22,6 +22,7 @@ RECIPE, MADE_BY = "recipe", "made_by"
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
 MADE = ("forward_model", "inverse_model", "diagnosis")  # of a grounding: names of what a trial makes itself
 NUMBER = ("number", "trial")  # what rows call their trial
+LATER = {"covariance": "diagonal"}  # settings that came after trials were written down, at what changes nothing
 
 Known = Annotated[str | None, setting("figures of trials that the same study has made before, not to be run again")]
 
@@ -113,7 +114,8 @@ class Ledger:
 
 def _effective(told: Any) -> Any:
     if isinstance(told, dict):
-        counts = {key: value for key, value in told.items() if key not in WITHOUT_EFFECT}
+        later = [key for key, value in LATER.items() if told.get(key) == value]
+        counts = {key: value for key, value in told.items() if key not in {*WITHOUT_EFFECT, *later}}
         return {key: _effective(value) for key, value in counts.items() if not (key in MADE and isinstance(value, str))}
     return [_effective(value) for value in told] if isinstance(told, list) else told
 
