@@ -203,7 +203,7 @@ def test_help_shows_groups_settings_and_effects(capsys: pytest.CaptureFixture[st
 
 OF_ENVIRONMENTS = {  # what is for gymnasium environments, and goes with no robot
     "policy": ("mlp", "action_table"),
-    "optimizer": ("policy_iteration", "trpo", "trpo_pendulum", "trpo_cheetah"),
+    "optimizer": ("policy_iteration", "trpo", "trpo_pendulum", "trpo_long"),
     "grounding": ("random_choice",),
     "trial": ("gymnasium",),
 }

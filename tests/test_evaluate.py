@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scenarios import GROUND, QUIET
 
-from gsl.errors import ArtifactError
+from gsl.errors import ArtifactError, ConfigError
 from gsl.policies.linear import Linear
 from gsl.policies.walk_engine import WalkEngine
 from gsl.stages.choices import policies, record
@@ -86,12 +86,21 @@ def _walks(*values: float) -> list[Episode]:
 
 
 @pytest.mark.parametrize(
-    ("check", "best", "failed"),
-    [((0.3, 0.2, 0.3), "fast", []), ((0.0, 0.2, 0.1), "pi0", ["fast", "other"])],
-    ids=["ahead", "not ahead"],
+    ("check", "tolerated", "best", "failed"),
+    [
+        ((0.3, 0.2, 0.3), 1.0, "fast", []),
+        ((0.0, 0.2, 0.1), 1.0, "pi0", ["fast", "other"]),
+        ((0.0, 0.0, 0.9), 0.4, "pi0", ["fast", "other"]),
+    ],
+    ids=["ahead", "not ahead", "falls too often"],
 )
 def test_where_falls_are_tolerated_a_check_has_to_be_ahead_of_the_baseline(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: tuple[float, ...], best: str, failed: list[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    check: tuple[float, ...],
+    tolerated: float,
+    best: str,
+    failed: list[str],
 ) -> None:
     """A high mean in the choice may be luck: the best of many policies on few episodes."""
     walks = {
@@ -112,6 +121,11 @@ def test_where_falls_are_tolerated_a_check_has_to_be_ahead_of_the_baseline(
 
     monkeypatch.setattr(Evaluate, "_measured", measured)
     thetas = {name: WALK.initial for name in ("pi0", "fast", "other", "third")}
-    metrics, _ = _evaluated(tmp_path, thetas, tolerated=1.0)
+    metrics, _ = _evaluated(tmp_path, thetas, tolerated=tolerated)
     assert (metrics["best"], metrics["failed_check"]) == (best, failed)
     assert [name for _, name in asked] == ["pi0", "fast", "other"][: 2 + len(failed) // 2]
+
+
+def test_one_episode_is_no_check_of_a_policy_that_may_fall(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="check = 1: needs two episodes at least where falls are tolerated"):
+        _evaluated(tmp_path, {"pi0": WALK.initial}, tolerated=0.5, check=1)

@@ -68,15 +68,15 @@ class Nothing(gymnasium.Env):
 
 
 class Priced(Strange):
-    """Tells what an action costs, to a power."""
+    """Tells what an action costs, to a power, or something else instead."""
 
-    def __init__(self, power: float = 2.0) -> None:
+    def __init__(self, power: float = 2.0, weight: float = 0.1, each: bool = False) -> None:
         super().__init__()
-        self.power = power
+        self.power, self.weight, self.each = power, weight, each
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        price = -0.1 * float(np.abs(action[0])) ** self.power
-        return np.zeros(2), price, False, False, {"reward_ctrl": price}
+        price = -self.weight * float(np.abs(action[0])) ** self.power
+        return np.zeros(2), price, False, False, {"reward_ctrl": np.array([price, price]) if self.each else price}
 
 
 class Ends(Strange):
@@ -232,8 +232,9 @@ def test_noise_of_the_world_is_not_charged() -> None:
     np.testing.assert_allclose([reward for _, reward, *_ in steps], -0.1 * 0.4**2, rtol=1e-5)
 
 
-def test_a_price_that_is_not_quadratic_is_one_line() -> None:
-    env = GymnasiumWorld(env_id="test_gymnasium:Priced", kwargs={"power": 1.0}, action_noise=0.5).make()
+@pytest.mark.parametrize("kwargs", [{"power": 1.0}, {"weight": -0.1}, {"each": True}], ids=str)
+def test_a_price_that_is_not_quadratic_is_one_line(kwargs: dict[str, Any]) -> None:
+    env = GymnasiumWorld(env_id="test_gymnasium:Priced", kwargs=kwargs, action_noise=0.5).make()
     env.reset(seed=0)
     with pytest.raises(GslError, match=r"info\['reward_ctrl'\] is no -w \|u\|².*control_cost="):
         for _ in range(5):
@@ -249,8 +250,8 @@ def test_the_ends_of_a_range_are_within_it() -> None:
             env.step(np.array([end]))
 
 
-def models(tmp_path: Path, sim: GymnasiumWorld, real: GymnasiumWorld, likelihood: Any = "point") -> tuple[Any, Any]:
-    config = ModelConfig("mlp", hidden=(32,), epochs=40, likelihood=likelihood)
+def models(tmp_path: Path, sim: GymnasiumWorld, real: GymnasiumWorld, **config: Any) -> tuple[Any, Any]:
+    config = ModelConfig("mlp", hidden=(32,), epochs=40, **config)
     for name, world, learn, role in (
         ("f", real, forward_of_states, "real"),
         ("i", sim, inverse_of_states, "sim"),
@@ -283,7 +284,7 @@ def test_the_grounded_simulator_moves_like_the_real_world(tmp_path: Path) -> Non
 
 
 def test_a_stochastic_grounding_makes_the_noise_of_the_real_world(tmp_path: Path) -> None:
-    f, f_inv = models(tmp_path, CART, replace(CART, action_noise=0.3), "gaussian")
+    f, f_inv = models(tmp_path, CART, replace(CART, action_noise=0.3), likelihood="gaussian")
     spread = []
     for world, grounding in (
         (replace(CART, action_noise=0.3), NoGrounding()),
@@ -297,6 +298,21 @@ def test_a_stochastic_grounding_makes_the_noise_of_the_real_world(tmp_path: Path
     real, stochastic, plain = spread
     assert 0.6 * real < stochastic < 1.6 * real
     assert plain < 0.3 * real
+
+
+def test_noise_on_actions_is_drawn_in_all_variables_at_once(tmp_path: Path) -> None:
+    """An inverse model averages noise away that each variable has for itself."""
+    sd, real = 0.3, replace(CART, action_noise=0.3)
+    sends = {}
+    for covariance in ("full", "diagonal"):
+        (tmp_path / covariance).mkdir()
+        f, f_inv = models(tmp_path / covariance, CART, real, likelihood="gaussian", covariance=covariance)
+        assert (f.mixing is None) == (covariance == "diagonal")
+        assert f.mixing is None or (f.mixing @ f.mixing.T)[0, 1] > 0.9
+        run = StateTransformation(f, f_inv, draws=True).start(CART.layout, np.random.default_rng(0))
+        sends[covariance] = np.std([run.transform(np.array([0.5, 0.0]), np.zeros(1))[0] for _ in range(500)])
+    assert sends["full"] == pytest.approx(sd, rel=0.2)
+    assert sends["diagonal"] < sends["full"]
 
 
 def test_choices_are_grounded_by_the_nearest_effect(tmp_path: Path) -> None:
@@ -442,7 +458,7 @@ def test_worlds_that_no_policy_fits_both_of_are_refused(tmp_path: Path) -> None:
         ("collect world=gymnasium world.env_id=CartPole-v1 policy=mlp workers=1",
          "task or policy: needs base.position, which this world does not observe"),
         ("collect world=cliff_walking task=own_reward policy=action_table action_noise=1.5",
-         "action_noise = 1.5: is the chance of another choice here"),
+         "action_noise = 1.5: is the chance of a random choice here"),
         ("collect world=gymnasium task=own_reward policy=mlp", "world.env_id: has no value"),
     ],
 )  # fmt: skip

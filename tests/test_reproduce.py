@@ -223,12 +223,14 @@ def test_table_3_counts_where_chains_stop() -> None:
 
 
 def test_table_4_counts_falls_over_episodes() -> None:
-    gat = [a_trial("gat", k, value=0.2) for k in (1, 2)]
-    trials = [*gat, *(a_trial("sgat", k, falls=k, outcome={"speed [cm/s]": 20.0 + k}) for k in (1, 2))]
+    known = [a_trial(method, k, value=0.2) for method in ("none", "gat") for k in (1, 2)]
+    trials = [*known, *(a_trial("sgat", k, falls=k, outcome={"speed [cm/s]": 20.0 + k}) for k in (1, 2))]
     lines = Table4().markdown(trials, Walk()).splitlines()
     row = next(line for line in lines if line.startswith("| sgat"))
     assert "| 21.5 | 3 of 20 | 0 to 79 |" in row and "0 of 10" in row  # shares .1 and .2: over trials, not over walks
-    assert "| w | sgat - gat | 1 | 5.0 | 5.0 to 5.0 |" in lines
+    for other in ("none", "gat"):
+        assert f"| w | sgat - {other} | 1 | 5.0 | 5.0 to 5.0 | +1.5 | -4.9 to +7.9 |" in lines
+    assert "| none | 1 | 20.0 | 20.0 to 20.0 | nan | 0 of 20 | 0 to 16 |" in next(x for x in lines if "| none" in x)
 
 
 def test_the_linear_walk_has_distances_where_percentages_mean_nothing() -> None:

@@ -161,13 +161,13 @@ class Chain:
         )
         return built(stage, out, console)
 
-    def measure(self, out: Path, found: Artifact, seed: int, console: Any) -> Artifact:
-        """Measure what a search found in the real world."""
+    def measure(self, out: Path, found: Artifact, seed: int, console: Any, only: str = "") -> Artifact:
+        """Measure what a search found in the real world, or one file of it only."""
         stage = Evaluate(
             world=asking(self.real, out),
             task=self.task,
             policy=self.policy,
-            policies=str(found.folder),
+            policies=str(found.folder / only),
             episodes=self.budget.episodes,
             check=self.budget.check,
             confirmation=self.budget.confirmation,

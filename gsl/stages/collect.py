@@ -47,7 +47,7 @@ class Collect:
     neighbours: Annotated[int, setting("episodes of perturbed policies", ge=0)] = 0
     spread: Annotated[float, setting("size of the perturbation, in units of a parameter's scale", ge=0)] = 0.07
     action_noise: Annotated[
-        float, setting("Gaussian noise on every action; where actions are choices, the chance of another one", ge=0)
+        float, setting("Gaussian noise on every action; where actions are choices, the chance of a random one", ge=0)
     ] = 0.0
     initial: Annotated[str | None, setting("policies file or artifact of the policy; none for its start values")] = None
     workers: Workers = -1
@@ -60,7 +60,7 @@ class Collect:
             raise ConfigError("world", "is a real robot, which cannot play the simulator's part")
         if self.world.layout.choices and self.action_noise > 1.0:
             given = f"{self.action_noise:g}"
-            raise ConfigError("action_noise", "is the chance of another choice here, 1 at most", given=given)
+            raise ConfigError("action_noise", "is the chance of a random choice here, 1 at most", given=given)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the artifact that the parameters come from, the file that is played, a robot's answer, if any."""

@@ -65,8 +65,8 @@ def orders(
 ) -> list[Order]:
     """Return how methods stand to others in a world, as far as both were tried there, after one iteration.
 
-    The test and its pairs were fixed before any study was run: with ten trials the least p is .002, which is none any
-    more after a correction for all pairs of seventeen methods.
+    The test was fixed before any study, its pairs on 2026-11-22, before table 2 and after a first comparison of five
+    trials: with ten the least p is .002, which is none any more after a correction for all pairs of seventeen methods.
     """
     there = {trial.method for trial in trials if trial.cell[:2] == (simulator, world)}
     found = []

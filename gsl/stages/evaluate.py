@@ -11,6 +11,7 @@ import numpy as np
 
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
+from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.policy import Policy, sized
 from gsl.stages.choices import FILE, policies, records, vector
@@ -28,9 +29,14 @@ from gsl.worlds.world import World
 TABLE = "evaluation.json"
 _CHOICE, _CHECK, _REPORT = "choice", "check", "report"  # their seeds never meet
 CHALLENGERS = 2  # that are checked, at most, where falls are tolerated
-_ERRANDS = {
+AHEAD = 1.64  # standard errors of a difference: above 0 at 95 %, one-sided
+_UNTIL_FALL = {
     _CHOICE: "To choose a policy: {} of them, {} episodes each, of one that falls none after its fall.",
     _CHECK: "To check the fastest policy that did not fall: {1} episodes more, until it falls.",
+}
+_TO_THE_END = {
+    _CHOICE: "To choose a policy: {} of them, {} episodes each, falls and all.",
+    _CHECK: "To check a policy: {1} episodes more, falls and all.",
     _REPORT: "To report: {1} fresh episodes of the chosen policy and of the one it is compared with, falls and all.",
 }
 
@@ -41,10 +47,10 @@ class Evaluate:
 
     Choice: `episodes` of each policy; one that falls is unstable, and what would have followed is thrown away. Check:
     the fastest stable policy walks `check` episodes more; if it falls, the next best one does. Where falls are
-    tolerated they tell no policy from another: the baseline walks `check` episodes too, and a policy replaces it whose
-    check alone is a standard error above all of the baseline's, of two at most. Report: the policy that is left, or the
-    baseline (the first of the file) if none is, is measured on `confirmation` fresh episodes beside the baseline, and
-    these figures, falls and all, are what is reported: they took no part in the choice.
+    tolerated the baseline walks `check` episodes too, and a policy, one of two at most, has to be above it in these,
+    surely. Report: the policy that is left, or the baseline (the first of the file) if none is,
+    is measured on `confirmation` fresh episodes beside the baseline, and these figures, falls and all, are what is
+    reported: they took no part in the choice.
     """
 
     kind: ClassVar[str] = "evaluate"
@@ -54,14 +60,16 @@ class Evaluate:
     policy: Annotated[Policy, setting("family of the policies")]
     policies: Annotated[str, setting("policies file or optimize artifact")]
     episodes: Annotated[int, setting("episodes of each policy for the choice", ge=1)]
-    check: Annotated[int, setting("episodes the fastest stable policy has to walk without a fall", ge=1)]
+    check: Annotated[int, setting("more episodes of the fastest stable policy, which has to stay so", ge=1)]
     confirmation: Annotated[int, setting("fresh episodes of the chosen policy and of the baseline", ge=2)]
     tolerated: Annotated[float, setting("share of falls up to which a policy counts as stable", ge=0, le=1)] = 0.0
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def __post_init__(self) -> None:
-        """Tell the policy its world."""
+        """Tell the policy its world; refuse a single episode as the check of a policy that may fall."""
+        if self.tolerated and self.check < 2:
+            raise ConfigError("check", "needs two episodes at least where falls are tolerated", given=str(self.check))
         object.__setattr__(self, "policy", sized(self.policy, self.world))
 
     def parents(self) -> Mapping[str, Path]:
@@ -71,12 +79,13 @@ class Evaluate:
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the table of all policies and the chosen one."""
         found = records(self.policy, self.policies)
-        total = self.episodes * len(found) + self.check + 2 * self.confirmation
+        checks = 1 + CHALLENGERS if self.tolerated else 1
+        total = self.episodes * len(found) + self.check * checks + 2 * self.confirmation
         with console.progress(total, "measuring in the real world") as progress:
             measure = partial(self._measured, progress=progress, console=console)
             tried = measure(found, _CHOICE, self.episodes)
             checked = dict(self._checked(found, tried, measure))
-            best = self._passed(tried, checked)
+            best = self._passed(checked)
             reported = sorted({0, best})
             fresh = dict(zip(reported, measure([found[i] for i in reported], _REPORT, self.confirmation), strict=True))
         rows = [row(theta, done) for theta, done in zip(found, tried, strict=True)]
@@ -114,14 +123,17 @@ class Evaluate:
         for index in order:
             (checked[index],) = measure([found[index]], _CHECK, self.check)
             yield index, checked[index]
-            if self._passed(tried, checked):
+            if self._passed(checked):
                 return
 
-    def _passed(self, tried: Sequence[list[Episode]], checked: Mapping[int, list[Episode]]) -> int:
+    def _passed(self, checked: Mapping[int, list[Episode]]) -> int:
         """Return the index of the policy that has passed its check, the baseline's if none has."""
-        known = [*tried[0], *checked.get(0, [])]
-        passes = partial(_ahead, known) if self.tolerated else self._stable
-        return next((index for index, done in checked.items() if index and passes(done)), 0)
+        passed = (
+            index
+            for index, done in checked.items()
+            if index and self._stable(done) and (not self.tolerated or _ahead(done, checked[0]))
+        )
+        return next(passed, 0)
 
     def _stable(self, done: Sequence[Episode]) -> bool:
         return falls(done) <= self.tolerated * len(done)
@@ -141,7 +153,8 @@ class Evaluate:
         if isinstance(self.world, ExternalRobot):
             orders = [Order(thetas[index // count].name, job) for index, job in enumerate(jobs)]
             name = f"{purpose}_{thetas[0].name}" if purpose == _CHECK else purpose
-            errand = Errand(name, _ERRANDS[purpose].format(len(thetas), count), not to_the_end, logs=False)
+            words = (_TO_THE_END if to_the_end else _UNTIL_FALL)[purpose].format(len(thetas), count)
+            errand = Errand(name, words, not to_the_end, logs=False)
             found = asked(scenario, orders, errand, workers=self.workers, console=console)
             done = [None if one is None else one.episode for one in found]
         else:
@@ -150,11 +163,11 @@ class Evaluate:
         return [_until_fall(group, to_the_end=to_the_end) for group in groups]
 
 
-def _ahead(known: Sequence[Episode], done: Sequence[Episode]) -> bool:
-    """Whether a policy's mean is a standard error of the difference above another's, on which much is known."""
-    values = [np.array([episode.value for episode in one]) for one in (known, done)]
-    error = np.sqrt(sum(one.var(ddof=1) / len(one) for one in values if len(one) > 1))
-    return bool(values[1].mean() - values[0].mean() > error)
+def _ahead(done: Sequence[Episode], other: Sequence[Episode]) -> bool:
+    """Whether the mean of some episodes is surely above that of others, two of each at least."""
+    values = [np.array([episode.value for episode in one]) for one in (done, other)]
+    error = np.sqrt(sum(one.var(ddof=1) / len(one) for one in values))
+    return bool(values[0].mean() - values[1].mean() > AHEAD * error)
 
 
 def _until_fall(done: Sequence[Episode | None], *, to_the_end: bool) -> list[Episode]:

@@ -171,7 +171,9 @@ class Gate:
             advice = (
                 "sim.control_cost='{_target_: gsl.worlds.control_cost.Quadratic, weight: 0.1}' says what it charges"
             )
-            self.console.status(f"warning: {problem}; {advice} (world.control_cost in optimize)")
+            self.console.status(
+                f"warning: {problem}; {advice} (world.control_cost in optimize; real. where it is noisy)"
+            )
 
     def _chosen(self, scenario: Scenario, loaded: LoadedTransformation, validation: Batch) -> tuple[str, ...]:
         """Return the joints to ground, and tell them."""

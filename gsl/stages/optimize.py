@@ -104,8 +104,8 @@ class Optimize:
         seed, simulator = derived_seed(self.seed, self.kind), GroundedSimulator(scenario, first)
         total = optimizer.taken + optimizer.generations * self.rollouts
         with console.progress(total, "learning in simulation") as progress:
-            start = self.initial is None
-            steps = optimizer.learn(simulator, self.policy, first, seed, bold=start, advance=progress.advance)
+            bold = self.initial is None
+            steps = optimizer.learn(simulator, self.policy, first, seed, bold=bold, advance=progress.advance)
             for index, parameters in enumerate(steps):
                 value = self._evaluated(scenario, [parameters], index, progress).values[0]
                 yield self._record(index, parameters, value)

@@ -6,12 +6,13 @@ Figures of the paper are those of its text and tables; figure 5 has none that ca
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Annotated
 
 import numpy as np
 
 from gsl.core.setting import component, setting
-from gsl.core.statistics import Interval, mean_interval
+from gsl.core.statistics import Interval, mean_interval, wilson
 from gsl.report.markdown import table
 from gsl.stages.comparison import Summary, differences, orders, summaries
 from gsl.stages.comparison_table import told
@@ -57,13 +58,15 @@ class Table2:
             + TABLE_2.get("ane" if one.method == "ane_02" else one.method, NOTHING)
             for one in found
         ]
-        parts = [table(titles, rows), "Order of methods by their stable winners, Wilcoxon's signed rank over trials:\n"]
+        parts = [table(titles, rows)]
         tested = [
             (world, f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
             for world in dict.fromkeys(one.world for one in found)
             for order in orders(trials, found[0].simulator, world, self.tested, self.against)
         ]
-        parts.append(table(("real world", "difference", "stable winners a trial", "p, Holm-corrected"), tested))
+        if tested:
+            parts.append("Order of methods by their stable winners, Wilcoxon's signed rank over trials:\n")
+            parts.append(table(("real world", "difference", "stable winners a trial", "p, Holm-corrected"), tested))
         return "\n".join([*parts, _single(trials)])
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
@@ -116,6 +119,8 @@ class Table3:
 class Table4:
     """Speed and falls on uneven ground after each grounding step."""
 
+    against: Annotated[tuple[str, ...], setting("methods that the others are set against")] = ("none", "gat")
+
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
         titles = (
@@ -125,8 +130,7 @@ class Table4:
         rows = []
         for one in summaries(trials):
             own = [trial for trial in trials if trial.cell == one[:4]]
-            share = mean_interval([trial.falls / trial.episodes for trial in own])
-            low, high = (f"{100 * np.clip(bound, 0.0, 1.0):.0f}" for bound in (share.lower, share.upper))
+            low, high = (f"{100 * bound:.0f}" for bound in _share_of_falls(own)[1:])
             speed = np.mean([trial.outcome.get(SPEED, np.nan) for trial in own])
             rows.append(
                 (one.method, str(one.iteration), *_value(one.value, task), f"{speed:.1f}")
@@ -138,7 +142,7 @@ class Table4:
             f"π0 in real, a fall worth 0: {task.shown * start.mean:.1f} {task.unit} (paper: 14.7, always falls).",
             "Speed is distance over the planned time, falls and all; intervals are over trials.\n",
         ]
-        return "\n".join([table(titles, rows), *below, _differences(trials, task)])
+        return "\n".join([table(titles, rows), *below, _differences(trials, task, self.against, falls=True)])
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
         """Return what a trial is worth: of a π0 that falls half of the time shares would be of little."""
@@ -168,7 +172,7 @@ class LinearWalkTable:
             + (f"{one.real_episodes:.0f}", *(LINEAR_WALK.get(one.method, NOTHING) if one.iteration == 1 else NOTHING))
             for one in summaries(trials)
         ]
-        return "\n".join([table(titles, rows), _differences(trials, task)])
+        return "\n".join([table(titles, rows), _differences(trials, task, ("none",))])
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
         """Return what a trial is worth."""
@@ -196,14 +200,27 @@ class Figure5:
         return "mean distance in real [°]", [trial.last[ON_AVERAGE] for trial in trials]
 
 
-def _differences(trials: Sequence[Trial], task: Task) -> str:
-    """Return the table of values against the first method's, paired by trial."""
-    first, rows = trials[0].method, []
-    for cell in dict.fromkeys(trial.cell for trial in trials if trial.method != first):
-        apart = differences(trials, cell, first, "value")
-        rows.append((cell.world, f"{cell.method} - {first}", str(cell.iteration), *_value(apart, task)))
+def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *, falls: bool = False) -> str:
+    """Return the table of values, and of falls, against those of other methods, paired by trial."""
+    methods, rows = list(dict.fromkeys(trial.method for trial in trials)), []
+    for other, cell in product(against, dict.fromkeys(trial.cell for trial in trials)):
+        if other not in methods or methods.index(cell.method) <= methods.index(other):
+            continue
+        apart = _value(differences(trials, cell, other, "value"), task)
+        fewer = differences(trials, cell, other, "falls")
+        counted = (f"{fewer.mean:+.1f}", f"{fewer.lower:+.1f} to {fewer.upper:+.1f}") if falls else ()
+        rows.append((cell.world, f"{cell.method} - {other}", str(cell.iteration), *apart, *counted))
+    counted = ("falls of a trial", "95 % interval") if falls else ()
     titles = ("real world", "difference", "iteration", f"in real [{task.unit}]", "95 % interval, paired by trial")
-    return table(titles, rows)
+    return table((*titles, *counted), rows)
+
+
+def _share_of_falls(trials: Sequence[Trial]) -> Interval:
+    """Return the share of falls with an interval over trials; over episodes where all trials are alike."""
+    shares = [trial.falls / trial.episodes for trial in trials]
+    if np.ptp(shares) == 0.0:
+        return wilson(sum(trial.falls for trial in trials), sum(trial.episodes for trial in trials))
+    return Interval(*np.clip(mean_interval(shares), 0.0, 1.0).tolist())
 
 
 def _returned(chain: Sequence[Trial]) -> float:

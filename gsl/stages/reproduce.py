@@ -47,7 +47,11 @@ class Reproduce:
         return known_parent("study.known", self.study.known, DATA)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
-        """Run the study, say beforehand how long that takes, and write every trial's figures and the table."""
+        """Run the study, say beforehand how long that takes, and write every trial's figures and the table.
+
+        Raises:
+            ConfigError: Its optimizer is no search.
+        """
         console.status(f"{told(seconds(self.study))} from nothing; a study that was stopped goes on where it was")
         trials, made = self.study.carried_out(folder, console)
         task = self.study.iterate.task
@@ -60,9 +64,10 @@ class Reproduce:
 def _sizes(study: Compare) -> str:
     """Return the sizes behind a table."""
     budget, optimizer = study.iterate.budget, study.iterate.optimizer
-    searched = f"{optimizer.generations} generations"
-    if isinstance(optimizer, CmaEs):
-        searched += f" of {optimizer.candidates} candidates, {budget.rollouts} rollouts each"
+    assert isinstance(optimizer, CmaEs), "study_effort has refused others"
+    searched = (
+        f"{optimizer.generations} generations of {optimizer.candidates} candidates, {budget.rollouts} rollouts each"
+    )
     learned = f"{budget.real_episodes} real episodes of a policy and {budget.real_neighbours} around it to learn from"
     measured = f"{budget.episodes} for the choice, {budget.check} for the check, {budget.confirmation} for the report"
     return f"{study.trials} trials; {searched}; {learned}; {measured}."

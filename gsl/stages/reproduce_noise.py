@@ -130,7 +130,8 @@ class NoiseStudy:
                 below / "real" / name / "optimize", NoGrounding(), start, seed, console
             )
             value = self._value(at, below / "real" / name / "evaluate", on_real, seed, console)
-            points.append(Point(world, noise, REAL, number, value, getattr(self.further, "taken", None)))
+            steps = self.further.taken if isinstance(self.further, Trpo) else None
+            points.append(Point(world, noise, REAL, number, value, steps))
         return points
 
     @property
@@ -146,7 +147,7 @@ class NoiseStudy:
         return replace(self.iterate.chain, sim=sim, policy=policy, workers=1, accept=True)
 
     def _value(self, chain: Chain, place: Path, policy: Any, seed: int, console: Any) -> float:
-        return float(chain.measure(place, policy, seed, console).metrics["last"]["value"])
+        return float(chain.measure(place, policy, seed, console, only=BEST).metrics["last"]["value"])
 
     def _values(self, points: Sequence[Point], world: str, noise: float, method: str) -> list[float]:
         return [one.value for one in points if one[:3] == (world, noise, method)]

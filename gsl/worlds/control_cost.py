@@ -62,22 +62,23 @@ class Charged:
             info: Of the environment's step, with what was carried out.
 
         Raises:
-            GslError: The environment tells a price that is not -w |u|².
+            GslError: The environment tells a price that is no number, or not -w |u|² with one w of 0 or more.
         """
         out, into = np.clip(charged, -1.0, 1.0), np.clip(agent, -1.0, 1.0)
         if self._cost is not None:
             return reward + self._cost.cost(out) - self._cost.cost(into)
-        return reward + self._told(info) * (self._squares(out) - self._squares(into))
+        return reward + self._weight_in(info) * (self._squares(out) - self._squares(into))
 
-    def _told(self, info: Mapping[str, Any]) -> float:
+    def _weight_in(self, info: Mapping[str, Any]) -> float:
         """Return w, as far as it is known."""
         key = next((key for key in KEYS if key in info), None)
         if key is None:
             return 0.0
         squares = self._squares(info["carried_out"])
         if squares > SMALL * self._squares(np.ones_like(self._half)):
-            weight = max(0.0, -float(info[key]) / squares)
-            if abs(weight - self._weight) > SAME * max(weight, self._weight):
+            price: Any = info[key]
+            weight = -float(price) / squares if isinstance(price, (float, int, np.number)) else np.nan
+            if not 0.0 <= weight < np.inf or abs(weight - self._weight) > SAME * max(weight, self._weight):
                 problem = f"the environment's info['{key}'] is no -w |u|² of its action u"
                 raise GslError(f"{problem}; say what an action costs by control_cost=, weight 0 for nothing")
             self._weight = weight

@@ -47,7 +47,9 @@ class GymnasiumWorld:
 
     def __post_init__(self) -> None:
         """Build it once, so that what is wrong is told by the name of the setting that it is wrong in."""
-        _ = self.layout
+        if self.layout.choices and self.action_noise > 1.0:
+            problem = "is a chance where actions are choices, 1 at most"
+            raise ConfigError("action_noise", problem, given=f"{self.action_noise:g}")
 
     @cached_property
     def layout(self) -> Layout:
