@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STYLES = {"none": (COMMAND, "///"), "ane": (QUIET, "///"), "gat": (SIMULATION, ""), "sgat": (GROUNDED, "")}
+HATCHES = ("///", "...", "xxx")  # of several widths of action noise, in turn
 
 
 class Bars(NamedTuple):
@@ -43,9 +44,11 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str) -> Figure:
         for axes, (name, bars) in zip(whole.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
             methods = [method for method in bars.values if method != reference]
             places, width = np.arange(len(bars.noises)), 0.8 / max(1, len(methods))
+            noisy = [method for method in methods if method.startswith("ane")]
             for k, method in enumerate(methods):
                 means, errors = np.array(bars.values[method]).T
                 colour, hatch = STYLES.get(method.split("_")[0], (QUIET, ""))
+                hatch = HATCHES[noisy.index(method) % len(HATCHES)] if method in noisy else hatch
                 x = places + (k - 0.5 * (len(methods) - 1)) * width
                 axes.bar(
                     x, means, 0.92 * width, yerr=errors, color=colour, hatch=hatch, edgecolor="white", label=method
