@@ -46,6 +46,11 @@ class Table:
                     chances[state, action, after] += chance
                     paid[state, action, after] += chance * reward
                     terminal[after] |= ended
+        return cls.paying(chances, paid, terminal, start)
+
+    @classmethod
+    def paying(cls, chances: np.ndarray, paid: np.ndarray, terminal: np.ndarray, start: np.ndarray) -> Table:
+        """Return the table whose transitions pay `paid` on average, chances times rewards, shape (S, A, S)."""
         rewards = np.divide(paid, chances, out=np.zeros_like(paid), where=chances > 0.0)
         return cls(chances, rewards, terminal, start)
 
@@ -55,8 +60,7 @@ class Table:
             return self
         paid = self.chances * self.rewards
         chances, paid = ((1.0 - noise) * one + noise * one.mean(axis=1, keepdims=True) for one in (self.chances, paid))
-        rewards = np.divide(paid, chances, out=np.zeros_like(paid), where=chances > 0.0)
-        return Table(chances, rewards, self.terminal, self.start)
+        return Table.paying(chances, paid, self.terminal, self.start)
 
     def values(self, policy: np.ndarray) -> np.ndarray:
         """Return the expected return from every state, shape (S,), of a policy: an action a state, shape (S,)."""

@@ -106,8 +106,7 @@ class TableTransformation:
         sent = self.sent
         chances = np.einsum("sab,sbt->sat", sent, table.chances)
         paid = np.einsum("sab,sbt->sat", sent, table.chances * table.rewards)
-        rewards = np.divide(paid, chances, out=np.zeros_like(paid), where=chances > 0.0)
-        return Table(chances, rewards, table.terminal, table.start)
+        return Table.paying(chances, paid, table.terminal, table.start)
 
     def start(self, layout: Layout, rng: np.random.Generator) -> TableTransformationRun:
         """Return the grounding at the beginning of an episode.

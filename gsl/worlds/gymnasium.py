@@ -100,6 +100,7 @@ class StateEnv(gymnasium.Env):
         else:
             ends = env.action_space.low, env.action_space.high  # type: ignore[attr-defined]
             self._low, self._high = (np.asarray(end, dtype=float) for end in ends)
+            self._middle, self._half = (self._low + self._high) / 2.0, (self._high - self._low) / 2.0
             self.charged = Charged(world.control_cost, self._low, self._high)
             self.action_space = Box(-1.0, 1.0, (size,), dtype=np.float64)
         self._lowest = float(env.observation_space.start) if cells else 0.0  # type: ignore[attr-defined]
@@ -142,8 +143,9 @@ class StateEnv(gymnasium.Env):
         else:
             shaken = sent + noise * self._rng.standard_normal(len(sent)) if noise else sent
             sent = np.clip(shaken, -1.0, 1.0)
-            scaled = (self._low + self._high) / 2.0 + (self._high - self._low) / 2.0 * sent
-            given = np.clip(scaled, self._low, self._high).astype(self._env.action_space.dtype)
+            given = np.clip(self._middle + self._half * sent, self._low, self._high).astype(
+                self._env.action_space.dtype
+            )
         with self._told():
             observation, reward, ended, cut, info = self._env.step(given)
         reward = float(reward)
