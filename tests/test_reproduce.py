@@ -62,6 +62,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     left_out += ["~study.simulators.nao_weak", "study.iterate.iterations=2"] if what == "table3" else []
     short = ["study.iterate.budget.episodes=2", "study.iterate.optimizer.generations=1"]
     left_out += short if what in ("table4", "linear-walk", "worlds") else []
+    left_out += ["study.iterate.aggregate=true"] if what == "table4" else []
     said = done("reproduce", what, *FEW, "study.iterate.task.duration=1.2", *left_out, folder=tmp_path)
     assert "minutes from nothing" in said.err
     folder = next((tmp_path / "runs").glob("*/reproduce"))
@@ -72,6 +73,12 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     table = (folder / "table.md").read_text()
     assert all(f"| {name} " in table for name in KEPT[what])
     assert all((one["rank"] is not None) == (what in ("table2", "worlds")) for one in trials)
+    learned = {
+        path.parent.parent.name: json.loads(path.read_text())["metrics"]["trajectories"]
+        for path in folder.parent.rglob("sgat/*/**/train_forward/manifest.json")
+    }
+    if what == "table4":
+        assert learned["iteration_02"] > learned["trial_01"]  # it knows what the first iteration has collected
 
 
 def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) -> None:

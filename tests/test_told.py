@@ -13,6 +13,7 @@ from gsl.stages.iteration_report import Rounds
 from gsl.stages.measured import gain
 from gsl.storage.artifact import Artifact
 from gsl.tasks.own_reward import OwnReward
+from gsl.tasks.walk import Walk
 
 
 def measured(value: float) -> dict[str, Any]:
@@ -58,6 +59,17 @@ def test_the_verdict_says_which_iteration_is_returned_and_why_there_are_no_more(
     rounds.add(evaluation(-14.2, -13.4, -2.0, 4.0), 10)
     assert "returned by iteration 1 -14.6" in rounds.verdict
     assert "The gain of iteration 2 is not sure: no other follows." in rounds.verdict
+
+
+def test_an_environment_that_ends_has_not_fallen() -> None:
+    robot, environment = Rounds(Walk()), Rounds(OwnReward())
+    for rounds in (robot, environment):
+        rounds.add(evaluation(-20.0, -14.6, 3.0, 8.0), 10)
+    assert "falls" in robot.columns and ", 0 falls in 10 fresh episodes." in robot.verdict
+    assert "falls" not in environment.columns and "(95 %), 10 fresh episodes." in environment.verdict
+    assert [row[5] for row in robot.rows] == ["0 of 10"] * 2
+    assert [row[5] for row in environment.rows] == ["10"] * 2
+    assert Unit.of(OwnReward).ended(measured(1.0)) == "10 episodes"
 
 
 def test_a_gain_over_nothing_has_no_share() -> None:

@@ -79,6 +79,26 @@ def test_every_encoding_and_horizon_predicts(real: str, tmp_path: Path, encoding
     assert measured["one_step_deg"] < 0.2 * measured["one_step_no_change_deg"]
 
 
+def test_trajectories_of_earlier_policies_are_learned_from_and_held_out_of_nothing(real: str, tmp_path: Path) -> None:
+    before = tmp_path / "before.parquet"
+    write(before, a_batch(SLOW, "real", pi0=2, others=2))
+    alone = TrainForward(data=real, model=LINEAR).run(tmp_path, QUIET)
+    heldout = (tmp_path / HELDOUT).read_bytes()
+    stage = TrainForward(data=real, model=LINEAR, earlier=(str(before),))
+    assert stage.parents() == {"data": Path(real), "earlier_1": before}
+    assert stage.run(tmp_path, QUIET)["trajectories"] == alone["trajectories"] + 4
+    assert (tmp_path / HELDOUT).read_bytes() == heldout
+
+
+def test_earlier_trajectories_are_of_the_same_robot_and_not_those_that_are_held_out(
+    real: str, sim: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ConfigError, match="the same trajectories twice"):
+        TrainForward(data=real, model=LINEAR, earlier=(real,)).parents()
+    with pytest.raises(TrajectoryError, match="is of another world than the newest trajectories: sim, not real"):
+        TrainForward(data=real, model=LINEAR, earlier=(sim,)).run(tmp_path, QUIET)
+
+
 @pytest.mark.parametrize(("method", "bound"), [("regression", 0.03), ("solve", 0.6)])
 def test_the_inverse_model_recovers_what_was_carried_out(sim: str, tmp_path: Path, method: str, bound: float) -> None:
     metrics = TrainInverse(data=sim, model=LINEAR, method=method).run(tmp_path, QUIET)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.markdown import in_unit
 from gsl.stages.diagnosis_files import report_of
-from gsl.stages.headline import Unit, falls, unit_of
+from gsl.stages.headline import Unit, unit_of
 from gsl.stages.measured import cells, columns
 from gsl.storage.artifact import Artifact
 
@@ -37,7 +37,9 @@ def account(artifact: Artifact) -> list[Told]:
 
 
 def _collect(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    row = {"episodes": metrics["episodes"], "steps": f"{metrics['steps']:,}", "falls": metrics["falls"]}
+    row = {"episodes": metrics["episodes"], "steps": f"{metrics['steps']:,}"}
+    if unit.falls:
+        row["falls"] = metrics["falls"]
     if metrics["value"] is not None:
         row[in_unit("value of π0", unit.name)] = unit.bare(metrics["value"])
     return Told("trajectories", tuple(row), [tuple(map(str, row.values()))])
@@ -118,11 +120,11 @@ def _problems(folder: Path) -> str:
 def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     document = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
     rows = [
-        tuple(cells(one | {"interval": _bounds(one["interval"])}, f"{one['name']}{purpose}", unit.factor))
+        tuple(cells(one | {"interval": _bounds(one["interval"])}, f"{one['name']}{purpose}", unit))
         for phase, purpose in {"policies": "", "check": ", checked", "confirmation": ", fresh"}.items()
         for one in document[phase]
     ]
-    titles = tuple(columns(document["policies"][0], unit.name))
+    titles = tuple(columns(document["policies"][0], unit))
     return Told("policies in the real world", titles, rows, returned(metrics, unit))
 
 
@@ -137,9 +139,7 @@ def returned(metrics: Mapping[str, Any], unit: Unit) -> str:
         return f"no stable policy was faster: {metrics['best']} is returned; {spent}"
     gain, after, before = metrics["gain"], metrics["returned"], metrics["baseline"]
     bounds = unit.interval(gain["interval"], sign=True)
-    values = (
-        f"{unit.shown(after['value'])}, {falls(after['falls'], after['episodes'])}; π0 {unit.shown(before['value'])}"
-    )
+    values = f"{unit.shown(after['value'])}, {unit.ended(after)}; π0 {unit.shown(before['value'])}"
     told = f"on fresh episodes {values}; gain {unit.shown(gain['value'], sign=True)}, 95 % interval {bounds}"
     doubt = "" if gain["interval"][0] > 0.0 else ", not surely a gain" if gain["value"] > 0.0 else ": worse than π0"
     return f"{metrics['best']} is returned: {told}{doubt}; {spent}"

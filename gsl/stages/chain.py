@@ -69,6 +69,12 @@ class Chain:
     diagnosis: DiagnosisPlan
     accept: bool
     workers: int
+    aggregate: bool
+    earlier: tuple[str, ...] = ()  # real trajectories from which f learns as well
+
+    def after(self, place: Path) -> Chain:
+        """Return the links of the round after the one below `place`, which keep its real trajectories if so wanted."""
+        return replace(self, earlier=(*self.earlier, str(place / "collect_real"))) if self.aggregate else self
 
     def check(self, grounding: Grounding | ActionTransformation) -> None:
         """Refuse what could not be trained, before anything is asked of the real robot.
@@ -129,7 +135,7 @@ class Chain:
         if grounding.residual:
             history, horizon = f_inverse.metrics["history"], self.inverse_model.horizon
             needed, base = replace(needed, history=history, horizon=horizon), str(f_inverse.folder)
-        forward = TrainForward(str(home / "collect_real"), needed, base, seed=seed)
+        forward = TrainForward(str(home / "collect_real"), needed, base, seed=seed, earlier=self.earlier)
         f = built(forward, home / forward.kind, console)
         return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))
 

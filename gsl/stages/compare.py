@@ -112,6 +112,7 @@ class Compare:
             )
             yield trial
             spent, previous, first = trial.real_episodes, str(measured.folder), first or measured.metrics
+            chain = chain.after(place)
             seed += 1000
 
     def _ranked(

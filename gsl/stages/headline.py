@@ -13,10 +13,16 @@ Metrics = Mapping[str, Any]
 
 
 class Unit(NamedTuple):
-    """How people are shown the values of a task: `factor` times the value, in `name`."""
+    """How people are shown the values of a task: `factor` times the value, in `name`, with falls if it knows them."""
 
     factor: float = 1.0
     name: str = ""
+    falls: bool = True
+
+    @classmethod
+    def of(cls, task: Any) -> Unit:
+        """Return the unit of a task or of its class."""
+        return cls(float(task.shown), str(task.unit), getattr(task, "falls", True))
 
     def shown(self, value: float | None, *, sign: bool = False) -> str:
         """Return a value with its unit, `-` if there is none."""
@@ -32,6 +38,11 @@ class Unit(NamedTuple):
         """Return an interval without its unit."""
         return " to ".join(self.bare(bound, sign=sign) for bound in bounds)
 
+    def ended(self, summary: Mapping[str, Any]) -> str:
+        """Return how often the robot fell in so many episodes, or the number of episodes."""
+        episodes = summary["episodes"]
+        return f"{falls(summary['falls'])} in {episodes}" if self.falls else f"{episodes} episodes"
+
 
 def unit_of(artifact: Artifact) -> Unit:
     """Return the unit of the task that an artifact's settings name; the bare value if the task is not gsl's."""
@@ -43,7 +54,7 @@ def unit_of(artifact: Artifact) -> Unit:
     try:
         module, _, attribute = str(name).rpartition(".")
         kind = getattr(importlib.import_module(module), attribute)
-        return Unit(float(kind.shown), str(kind.unit))
+        return Unit.of(kind)
     except (ImportError, ValueError, AttributeError):
         return Unit()
 
@@ -57,13 +68,13 @@ def headline(artifact: Artifact) -> str:
         return ""
 
 
-def falls(count: int, episodes: int | None = None) -> str:
+def falls(count: int) -> str:
     """Return how often the robot fell."""
-    return f"{count or 'no'} fall{'s' * (count != 1)}" + (f" in {episodes}" if episodes is not None else "")
+    return f"{count or 'no'} fall{'s' * (count != 1)}"
 
 
 def _collect(metrics: Metrics, unit: Unit) -> str:
-    told = f"{metrics['episodes']} episodes, {falls(metrics['falls'])}"
+    told = f"{metrics['episodes']} episodes" + (f", {falls(metrics['falls'])}" if unit.falls else "")
     return told if metrics["value"] is None else f"{told}, π0 {unit.shown(metrics['value'])}"
 
 
@@ -121,14 +132,14 @@ def _optimize(metrics: Metrics, unit: Unit) -> str:
 
 def _evaluate(metrics: Metrics, unit: Unit) -> str:
     after, gain = metrics["returned"], metrics["gain"]
-    told = f"{metrics['best']} {unit.shown(after['value'])}, {falls(after['falls'], after['episodes'])}"
+    told = f"{metrics['best']} {unit.shown(after['value'])}, {unit.ended(after)}"
     return told if not gain["share"] else f"{told}; {100 * gain['share']:+.1f} % over the start"
 
 
 def _iterate(metrics: Metrics, unit: Unit) -> str:
     before, after = metrics["baseline"], metrics["returned"]
     told = f"π0 {unit.shown(before['value'])} -> {unit.shown(after['value'])}"
-    return f"{told}, {falls(after['falls'], after['episodes'])}; {metrics['real_episodes']} real episodes"
+    return f"{told}, {unit.ended(after)}; {metrics['real_episodes']} real episodes"
 
 
 def _compare(metrics: Metrics, unit: Unit) -> str:

@@ -24,7 +24,7 @@ from gsl.stages.chain import Budget, Chain
 from gsl.stages.choices import FILE, policies, record
 from gsl.stages.diagnosis_plan import DiagnosisPlan, flown
 from gsl.stages.grounding_gate import settled
-from gsl.stages.iteration_report import COLUMNS, Rounds, write_curve, write_table, write_trace
+from gsl.stages.iteration_report import Rounds, write_curve, write_table, write_trace
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers
 from gsl.stages.rollout import Scenario
@@ -67,6 +67,7 @@ class Iterate:
     pretrained: Annotated[bool, setting("improve π0 in the plain simulator before the first iteration")] = False
     beside: Annotated[bool, setting("show the result without grounding beside it")] = False
     accept: Annotated[bool, setting("go on with a grounding that fails its check")] = False
+    aggregate: Annotated[bool, setting("f learns from the real trajectories of all iterations so far")] = False
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
@@ -87,11 +88,15 @@ class Iterate:
         """Run the iterations, write the policy they end with, the table and the plots."""
         self.chain.check(self.grounding)
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
-        with console.live_table(in_unit("grounded simulation learning", self.task.unit), COLUMNS) as table:
+        with console.live_table(in_unit("grounded simulation learning", self.task.unit), rounds.columns) as table:
             start = self._start(home, console)
             grounding = self._diagnosed(home, rounds, console)
+            chain = self.chain
             for number in range(1, self.iterations + 1):
-                evaluation, ready = self._iteration(home, number, grounding, rounds.last or start, console)
+                place = home / f"iteration_{number:02d}"
+                seed = self.seed + 1000 * (number - 1)
+                evaluation, ready = _iteration(chain, place, grounding, rounds.last or start, seed, console)
+                chain = chain.after(place)
                 first = ready if number == 1 else first
                 for row in rounds.add(evaluation, self._collected_real):
                     table.row(*row)
@@ -134,6 +139,7 @@ class Iterate:
             diagnosis=self.diagnosis,
             accept=self.accept,
             workers=self.workers,
+            aggregate=self.aggregate,
         )
 
     @property
@@ -146,15 +152,6 @@ class Iterate:
             return None
         found = self.chain.search(home / "pretrained", NoGrounding(), None, self.seed, console)
         return str(found.folder / BEST)
-
-    def _iteration(
-        self, home: Path, number: int, grounding: Grounding, previous: str | None, console: Any
-    ) -> tuple[Artifact, Grounding]:
-        """Return the evaluation that ends one iteration, and the grounding with its models."""
-        place, seed = home / f"iteration_{number:02d}", self.seed + 1000 * (number - 1)
-        ready = self.chain.ready(place, grounding, previous, seed, console)
-        found = self.chain.search(place / "optimize", ready, previous, seed, console)
-        return self.chain.measure(place / "evaluate", found, seed, console), ready
 
     def _diagnosed(self, home: Path, rounds: Rounds, console: Any) -> Grounding:
         """Return the grounding with its diagnosis: an excitation knows no policy, so that one serves all iterations."""
@@ -180,3 +177,12 @@ class Iterate:
             return  # there are no joints to draw, or nobody knows where the body was
         write_trace(folder, scenario.world, scenario.grounding, walk)
         walk_strip(scenario.world.plant.robot, walk, folder / "walk.png")
+
+
+def _iteration(
+    chain: Chain, place: Path, grounding: Grounding, previous: str | None, seed: int, console: Any
+) -> tuple[Artifact, Grounding]:
+    """Return the evaluation that ends one iteration, and the grounding with its models."""
+    ready = chain.ready(place, grounding, previous, seed, console)
+    found = chain.search(place / "optimize", ready, previous, seed, console)
+    return chain.measure(place / "evaluate", found, seed, console), ready

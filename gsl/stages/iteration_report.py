@@ -19,21 +19,13 @@ from gsl.report.markdown import table
 from gsl.stages.diagnosis_plan import Flight
 from gsl.stages.evaluate import TABLE
 from gsl.stages.grounding_replay import PAST, Place, replay
+from gsl.stages.headline import Unit
+from gsl.stages.measured import ended, ends
 from gsl.storage.artifact import Artifact
 from gsl.tasks.task import Task
 from gsl.worlds.bullet import BulletWorld
 
 CURVE, TRACE, MARKDOWN = "learning_curve.png", "joint_trace.png", "table.md"
-COLUMNS = (
-    "iteration",
-    "policy",
-    "in simulation",
-    "in real",
-    "95 % interval",
-    "falls",
-    "gain over the last",
-    "real episodes",
-)
 BEGUN = {"pi0": "π0", "start": "where it began"}  # what a search without a better policy returns
 TAKEN_OVER, SHOWN = 2.0, 0.8  # when the simulators take over from the real robot, and for how long [s]
 
@@ -42,7 +34,7 @@ class Rounds:
     """The iterations so far: which policy is the best, what it cost, and what to tell."""
 
     def __init__(self, task: Task) -> None:
-        self._task = task
+        self._unit = Unit.of(task)
         self._done: list[Artifact] = []
         self._beside: Artifact | None = None
         self._flight: Flight | None = None
@@ -50,6 +42,12 @@ class Rounds:
         self._collected = 0
         self.rows: list[tuple[str, ...]] = []
         self.best: Artifact | None = None
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Titles of the rows."""
+        places = ("in simulation", "in real", "95 % interval", ends(self._unit))
+        return ("iteration", "policy", *places, "gain over the last", "real episodes")
 
     @property
     def rising(self) -> bool:
@@ -92,15 +90,14 @@ class Rounds:
         if self.best is None:
             return f"No improvement over π0 was found: π0 is returned. {cost}"
         after, before = self.best.metrics["returned"], self._done[0].metrics["baseline"]
-        shown = self._task.shown
-        values = [shown * one["value"] for one in (before, after)]
-        falls = f"{after['falls']} falls in {after['episodes']} fresh episodes"
-        factor, unit = (100.0 / before["value"], "% of π0") if before["interval"][0] > 0.0 else (shown, self._task.unit)
+        unit = self._unit
+        factor, name = (100.0 / before["value"], "% of π0") if before["interval"][0] > 0.0 else unit[:2]
         low, high = (factor * bound for bound in self.best.metrics["gain"]["interval"])
-        last = " ".join(filter(None, [f"gain of the last step {low:+.0f} to {high:+.0f}", unit, "(95 %)"]))
-        returned = f"{values[1]:.1f} {self._task.unit}".rstrip()
+        last = " ".join(filter(None, [f"gain of the last step {low:+.0f} to {high:+.0f}", name, "(95 %)"]))
         of = f" by iteration {1 + self._done.index(self.best)}" if len(self._done) > 1 else ""
-        return f"In real: π0 {values[0]:.1f}, returned{of} {returned}, {last}, {falls}. {self._ended}{cost}"
+        fell = f"{after['falls']} falls in " if unit.falls else ""
+        end = f"{fell}{after['episodes']} fresh episodes. {self._ended}{cost}"
+        return f"In real: π0 {unit.bare(before['value'])}, returned{of} {unit.shown(after['value'])}, {last}, {end}"
 
     @property
     def _ended(self) -> str:
@@ -147,16 +144,16 @@ class Rounds:
     @property
     def unit(self) -> str:
         """Of what people are shown."""
-        return self._task.unit
+        return self._unit.name
 
     def _search(self, label: str, evaluation: Artifact, start: str) -> Search:
         document = json.loads((evaluation.folder / TABLE).read_text(encoding="utf-8"))
-        return search(label, document, shown=self._task.shown, returned=evaluation.metrics["best"], start=start)
+        return search(label, document, shown=self._unit.factor, returned=evaluation.metrics["best"], start=start)
 
     def _added(self, label: str, metrics: Mapping[str, Any], cost: str, *, first: bool) -> list[tuple[str, ...]]:
         simulated, gain = metrics["returned_value_sim"], metrics["gain"]
-        expected = "" if simulated is None else f"{self._task.shown * simulated:.1f}"
-        absolute = f"{self._task.shown * gain['value']:+.1f} {self._task.unit}"
+        expected = "" if simulated is None else self._unit.bare(simulated)
+        absolute = self._unit.shown(gain["value"], sign=True)
         gained = absolute if gain["share"] is None else f"{100 * gain['share']:+.1f} %"
         zero: tuple[str, ...] = ("0", "π0", "", *self._measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
@@ -166,14 +163,12 @@ class Rounds:
         return rows
 
     def _measured(self, summary: Mapping[str, Any]) -> tuple[str, str, str]:
-        low, high = (self._task.shown * bound for bound in summary["interval"])
-        value = f"{self._task.shown * summary['value']:.1f}"
-        return value, f"{low:.1f} to {high:.1f}", f"{summary['falls']} of {summary['episodes']}"
+        return self._unit.bare(summary["value"]), self._unit.interval(summary["interval"]), ended(summary, self._unit)
 
 
 def write_table(folder: Path, rounds: Rounds) -> None:
     """Write the table, the diagnosis if there was one, and the verdict as markdown."""
-    told = "\n\n".join([table(COLUMNS, rounds.rows).rstrip(), *rounds.diagnosis, rounds.verdict])
+    told = "\n\n".join([table(rounds.columns, rounds.rows).rstrip(), *rounds.diagnosis, rounds.verdict])
     (folder / MARKDOWN).write_text(f"{told}\n", encoding="utf-8")
 
 

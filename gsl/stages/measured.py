@@ -9,6 +9,7 @@ import numpy as np
 
 from gsl.core.statistics import difference_interval, mean_interval
 from gsl.report.markdown import in_unit
+from gsl.stages.headline import Unit
 from gsl.stages.population import Episode
 from gsl.storage.policies import PolicyRecord
 
@@ -51,16 +52,26 @@ def gain(after: Sequence[Episode], before: Sequence[Episode]) -> dict[str, Any]:
     return {"value": difference.mean, "interval": [difference.lower, difference.upper], "share": share}
 
 
-def columns(first: Mapping[str, Any], unit: str) -> list[str]:
+def columns(first: Mapping[str, Any], unit: Unit) -> list[str]:
     """Return the titles of `cells`."""
-    places = [in_unit(place, unit) for place in ("in simulation", "in real")]
-    return ["policy", *places, "95 % interval", "falls", *first["outcome"]]
+    places = [in_unit(place, unit.name) for place in ("in simulation", "in real")]
+    return ["policy", *places, "95 % interval", ends(unit), *first["outcome"]]
 
 
-def cells(one: Mapping[str, Any], name: str, shown: float) -> list[str]:
-    """Return a row for people, values multiplied by `shown`; a policy that stopped at its fall has no interval."""
-    low, high = (shown * bound for bound in one["interval"])
+def ends(unit: Unit) -> str:
+    """Return the title over `ended`."""
+    return "falls" if unit.falls else "episodes"
+
+
+def ended(one: Mapping[str, Any], unit: Unit) -> str:
+    """Return a cell for people: falls of episodes, or episodes alone."""
+    return f"{one['falls']} of {one['episodes']}" if unit.falls else str(one["episodes"])
+
+
+def cells(one: Mapping[str, Any], name: str, unit: Unit) -> list[str]:
+    """Return a row for people; a policy that stopped at its fall has no interval."""
+    low, high = (unit.factor * bound for bound in one["interval"])
     interval = f"{low:.1f} to {high:.1f}" if np.isfinite(high) and not one["falls"] else ""
-    simulated = "" if one["value_sim"] is None else f"{shown * one['value_sim']:.1f}"
+    simulated = "" if one["value_sim"] is None else unit.bare(one["value_sim"])
     outcome = [f"{value:.1f}" for value in one["outcome"].values()]
-    return [name, simulated, f"{shown * one['value']:.1f}", interval, f"{one['falls']} of {one['episodes']}", *outcome]
+    return [name, simulated, unit.bare(one["value"]), interval, ended(one, unit), *outcome]

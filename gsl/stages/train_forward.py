@@ -29,6 +29,7 @@ from gsl.stages.train_states import forward_of_states
 from gsl.stages.training import (
     FALLS,
     Parts,
+    aggregated,
     checked,
     data_file,
     degrees,
@@ -66,17 +67,24 @@ class TrainForward:
     ] = None
     heldout: Annotated[float, setting("share of the trajectories that is held out", gt=0, lt=1)] = 0.2
     seed: Annotated[int, setting("of the split and of the fit", ge=0)] = 1
+    earlier: Annotated[
+        tuple[str, ...], setting("real trajectories of earlier policies, to learn from as well; none is held out")
+    ] = ()
 
     def parents(self) -> Mapping[str, Path]:
-        """Return the file of trajectories, or the artifact, and the inverse model."""
-        path = data_file(self.data)
+        """Return the files of trajectories, or the artifacts, and the inverse model."""
         below = {} if self.residual_to is None else {"residual_to": resolve(self.residual_to, kind="train_inverse")}
-        return {"data": path if path == Path(self.data) else path.parent, **below}
+        named = {"data": self.data, **{f"earlier_{n}": one for n, one in enumerate(self.earlier, start=1)}}
+        files = {name: data_file(reference) for name, reference in named.items()}
+        if len({path.resolve() for path in files.values()}) < len(files):
+            raise ConfigError("earlier", "names the same trajectories twice; what is held out would be learned from")
+        return {name: path if path == Path(named[name]) else path.parent for name, path in files.items()} | below
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the model and the trajectories it has not seen."""
         path = data_file(self.data)
-        data = parts(path, other=SIM, share=self.heldout, seed=self.seed)
+        newest = parts(path, other=SIM, share=self.heldout, seed=self.seed)
+        data = aggregated(newest, [data_file(one) for one in self.earlier])
         console.status(f"fitting a forward model to {len(data.training)} trajectories")
         base = None if self.residual_to is None else self._simulator(self.residual_to, data.training)
         if data.training.states:

@@ -71,6 +71,32 @@ def parted(batch: Batch, share: float, seed: int) -> Parts:
     return Parts(*_split(rest, share, rng), heldout)
 
 
+def aggregated(data: Parts, earlier: Sequence[Path]) -> Parts:
+    """Add the trajectories of earlier policies to those that models learn from; the other parts stay the newest's.
+
+    Raises:
+        TrajectoryError: A file breaks the contract, or is of another robot, rate or role.
+    """
+    if not earlier:
+        return data
+    training = data.training
+    episodes, entries = list(training.episodes), [{"policy": label} for label in labels(training)]
+    for path in earlier:
+        batch = read(path)
+        for what, one, other in (
+            ("of other joints", batch.joints, training.joints),
+            ("of another number of states", batch.states, training.states),
+            ("of another control period", batch.control_period, training.control_period),
+            ("of another world", batch.metadata.get("role"), training.metadata.get("role")),
+        ):
+            if one != other:
+                raise TrajectoryError(path, f"is {what} than the newest trajectories: {one}, not {other}")
+        episodes += batch.episodes
+        entries += [{"policy": f"earlier_{label}"} for label in labels(batch)]
+    metadata = {**training.metadata, "episodes": entries}
+    return data._replace(training=replace(training, episodes=tuple(episodes), metadata=metadata))
+
+
 def _check_joints(path: Path, batch: Batch) -> None:
     """Refuse joints that the robot of the file does not have, if it is one of ours."""
     name = batch.metadata["robot"]

@@ -21,6 +21,7 @@ class OwnReward:
     unit: ClassVar[str] = ""
     shown: ClassVar[float] = 1.0
     duration: ClassVar[float] = math.inf
+    falls: ClassVar[bool] = False  # an end may be a success
 
     def start(self, layout: Layout, observation: np.ndarray, role: str) -> OwnRewardRun:
         """Return the task at the beginning of an episode."""
