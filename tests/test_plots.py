@@ -10,6 +10,7 @@ import pytest
 from gsl.report.grounding_errors import grounding_errors, grounding_errors_figure
 from gsl.report.joint_trace import Traces, joint_trace, joint_trace_figure
 from gsl.report.learning_curve import Point, Search, learning_curve, learning_curve_figure, points, search
+from gsl.report.noise_bars import Bars, noise_bars_figure
 from gsl.report.style import spread
 from gsl.report.trial_dots import Dots, trial_dots_figure
 
@@ -55,7 +56,10 @@ def test_points_are_the_rows_of_an_evaluation_in_the_unit_that_is_shown() -> Non
 
 def test_a_policy_that_falls_after_the_choice_has_fallen() -> None:
     later = search("iteration 1", {**EVALUATION, "check": [{**STABLE, "falls": 1}]}, shown=100.0)
-    assert [point.falls for point in later.points] == [0, 1, 1]
+    assert [(point.falls, point.later) for point in later.points] == [(0, 0), (0, 1), (1, 0)]
+    axes = learning_curve_figure([later], unit="cm/s").axes[0]
+    assert lines(axes)["fell later"] == ([1], [21.0])
+    assert "0 stay on their feet" in axes.figure.get_suptitle()
 
 
 def test_the_returned_policy_is_shown_as_it_was_measured_again() -> None:
@@ -120,6 +124,21 @@ def test_every_trial_is_a_dot_and_a_failed_one_is_hollow() -> None:
     hollow = [line.get_xdata()[0] for line in dots if len(line.get_xdata()) and line.get_markerfacecolor() == "white"]
     assert hollow == [-1.0]
     assert [label.get_text() for label in axes.get_yticklabels()] == ["none", "gat"]
+
+
+def test_trials_that_came_out_alike_are_all_seen() -> None:
+    panels = {"a world": {"none": Dots([3.0, 3.0, 3.01, 9.0], [False] * 4)}}
+    (axes,) = trial_dots_figure(panels, axis="improvement [%]", title="t").axes
+    (heights,) = [line.get_ydata() for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata())]
+    assert sorted(heights) == [-0.13, 0.0, 0.0, 0.13]
+
+
+def test_bars_tell_widths_of_noise_apart() -> None:
+    values = {name: [(1.0, 0.1)] for name in ("none", "ane 0.2", "ane 0.4", "gat", "trained on real")}
+    (axes,) = noise_bars_figure({"a world": Bars((0.5,), values)}, "trained on real", title="t").axes
+    hatches = {bars.get_label(): bars.patches[0].get_hatch() for bars in axes.containers if hasattr(bars, "patches")}
+    assert hatches["ane 0.2"] != hatches["ane 0.4"] and not hatches["gat"]
+    assert "trained on real" not in hatches
 
 
 def test_files_are_written_1600_pixels_wide_and_leave_nothing_behind(tmp_path: Path) -> None:

@@ -23,7 +23,8 @@ class Point(NamedTuple):
         simulated: Value in simulation, if known.
         real: Mean value in real.
         lower, upper: 95 % interval of the real value, infinite where one episode is all there is.
-        falls: In real; a policy that falls once is unstable.
+        falls: In real, of the choice; a policy that falls once is unstable.
+        later: Falls in its check or in the report.
     """
 
     generation: int
@@ -32,6 +33,12 @@ class Point(NamedTuple):
     lower: float
     upper: float
     falls: int
+    later: int = 0
+
+    @property
+    def stable(self) -> bool:
+        """Whether it never fell."""
+        return not self.falls and not self.later
 
 
 class Search(NamedTuple):
@@ -53,7 +60,7 @@ class Search(NamedTuple):
 def search(
     label: str, evaluation: Mapping[str, Any], *, shown: float = 1.0, returned: str | None = None, start: str = "π0"
 ) -> Search:
-    """Return what an `evaluation.json` holds; a policy that fell in any of its episodes, early or late, has fallen.
+    """Return what an `evaluation.json` holds.
 
     Args:
         label: Heading of its panel.
@@ -64,9 +71,12 @@ def search(
     """
     fresh = [row for row in evaluation["confirmation"] if row["name"] == returned and row["generation"]]
     confirmed = points(fresh, shown=shown)[0] if fresh else None
-    later = {one["name"] for phase in ("check", "confirmation") for one in evaluation[phase] if one["falls"]}
-    rows = [{**one, "falls": one["falls"] + (one["name"] in later)} for one in evaluation["policies"]]
-    return Search(label, points(rows, shown=shown), confirmed, start)
+    later = [(one["name"], one["falls"]) for phase in ("check", "confirmation") for one in evaluation[phase]]
+    found = [
+        point._replace(later=sum(falls for name, falls in later if name == row["name"]))
+        for row, point in zip(evaluation["policies"], points(evaluation["policies"], shown=shown), strict=True)
+    ]
+    return Search(label, found, confirmed, start)
 
 
 def points(rows: Sequence[Mapping[str, Any]], *, shown: float = 1.0) -> list[Point]:
@@ -119,7 +129,7 @@ def _limits(searches: Sequence[Search]) -> tuple[float, float]:
     values = [one.simulated for one in drawn if one.simulated is not None]
     values += [one.points[0].real for one in searches]
     for one in drawn:
-        if not one.falls:
+        if not one.falls or math.isfinite(one.lower):
             values += [bound for bound in (one.real, one.lower, one.upper) if math.isfinite(bound)]
     return min(values), max(values)
 
@@ -138,31 +148,37 @@ def _scale(axes: Axes, low: float, high: float, *, strip: bool) -> None:
 def _draw(axes: Axes, one: Search) -> None:
     start, last = one.points[0], one.points[-1].generation
     simulated = [(point.generation, point.simulated) for point in one.points if point.simulated is not None]
-    stable = [point for point in one.points if not point.falls]
+    standing = [point for point in one.points if not point.falls]
     axes.axhline(start.real, color=COMMAND, linewidth=1.2, linestyle=(0, (5, 4)), zorder=1, label=one.start)
     if simulated:
         axes.plot(*zip(*simulated, strict=True), "-o", color=SIMULATION, markersize=4.5, label="simulation")
-    _draw_stable(axes, stable)
+    _draw_standing(axes, standing)
     _draw_falls(axes, [point for point in one.points if point.falls])
-    if one.confirmed is not None and not one.confirmed.falls:
-        _draw_confirmed(axes, one.confirmed, stable)
+    if one.confirmed is not None:
+        _draw_confirmed(axes, one.confirmed, standing)
     axes.set_title(one.label, loc="left", fontsize=10.5)
     axes.set_xlabel("generation")
     axes.set_xticks([point.generation for point in one.points])
     axes.set_xlim(-0.4, max(1, last) + 0.4)
     ends = [(start.real, f"{one.start} in real", COMMAND)]
     ends += [(simulated[-1][1], "best in\nsimulation", SIMULATION)] if simulated else []
-    ends += [(stable[-1].real, "the same\nin real", REAL)] if stable and stable[-1].generation > 0 else []
+    ends += [(standing[-1].real, "the same\nin real", REAL)] if standing and standing[-1].generation > 0 else []
     label_ends(axes, axes.get_xlim()[1], ends, gap=0.12)
 
 
-def _draw_stable(axes: Axes, stable: Sequence[Point]) -> None:
-    generations, values = [point.generation for point in stable], [point.real for point in stable]
-    bounded = [point for point in stable if math.isfinite(point.lower) and math.isfinite(point.upper)]
+def _draw_standing(axes: Axes, standing: Sequence[Point]) -> None:
+    """Draw what did not fall in the choice, hollow where it did later."""
+    generations, values = [point.generation for point in standing], [point.real for point in standing]
+    bounded = [point for point in standing if math.isfinite(point.lower) and math.isfinite(point.upper)]
+    fallen = [(point.generation, point.real) for point in standing if point.later]
     axes.plot(generations, values, ":", color=REAL, linewidth=1.0, zorder=2)
     axes.plot(generations, values, "o", color=REAL, markersize=7, label="real", zorder=4)
     lower, upper = [point.lower for point in bounded], [point.upper for point in bounded]
     axes.vlines([point.generation for point in bounded], lower, upper, color=REAL, linewidth=1.8, zorder=3)
+    if fallen:
+        axes.plot(*zip(*fallen, strict=True), "o", color=REAL, markerfacecolor="white", label="fell later", zorder=5)
+        for place, value in fallen:
+            _say(axes, "fell later", place, value, 9, REAL)
 
 
 def _draw_falls(axes: Axes, fallen: Sequence[Point]) -> None:
@@ -174,9 +190,9 @@ def _draw_falls(axes: Axes, fallen: Sequence[Point]) -> None:
     _say(axes, "fell in real", sum(places) / len(places), strip, 9, REAL)
 
 
-def _draw_confirmed(axes: Axes, confirmed: Point, stable: Sequence[Point]) -> None:
+def _draw_confirmed(axes: Axes, confirmed: Point, standing: Sequence[Point]) -> None:
     place = confirmed.generation + 0.18
-    beside = [point.lower for point in stable if point.generation == confirmed.generation]
+    beside = [point.lower for point in standing if point.generation == confirmed.generation]
     lowest = min(bound for bound in [confirmed.real, confirmed.lower, *beside] if math.isfinite(bound))
     axes.vlines([place], [confirmed.lower], [confirmed.upper], color=INK, linewidth=1.8, zorder=5)
     axes.plot([place], [confirmed.real], "D", color=INK, markersize=6, label="measured again", zorder=6)
@@ -199,8 +215,8 @@ def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -
 
 def _finding(searches: Sequence[Search]) -> str:
     winners = [(point, one.points[0]) for one in searches for point in one.points[1:]]
-    stable = sum(not point.falls for point, _ in winners)
-    better = sum(not point.falls and point.real > start.real for point, start in winners)
+    stable = sum(point.stable for point, _ in winners)
+    better = sum(point.stable and point.real > start.real for point, start in winners)
     if stable == len(winners):
         return f"{better} of {len(winners)} generation winners beat their start in real"
     return f"Of {len(winners)} generation winners {stable} stay on their feet in real, {better} beat their start"

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gsl.report.style import COMMAND, GROUNDED, QUIET, REAL, SIMULATION, figure, headline, look, save
+from gsl.report.style import GAT, QUIET, REAL, SGAT, UNINFORMED, figure, headline, look, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-STYLES = {"none": (COMMAND, "///"), "ane": (QUIET, "///"), "gat": (SIMULATION, ""), "sgat": (GROUNDED, "")}
+STYLES = {"none": (UNINFORMED, "///"), "ane": (QUIET, "///"), "gat": (GAT, ""), "sgat": (SGAT, "")}
 HATCHES = ("///", "...", "xxx")  # of several widths of action noise, in turn
 
 
@@ -27,17 +27,18 @@ class Bars(NamedTuple):
     values: Mapping[str, Sequence[tuple[float, float]]]
 
 
-def noise_bars(path: Path, panels: Mapping[str, Bars], reference: str) -> None:
+def noise_bars(path: Path, panels: Mapping[str, Bars], reference: str, *, title: str) -> None:
     """Write the figure as a PNG file; arguments as those of `noise_bars_figure`."""
-    save(noise_bars_figure(panels, reference), path)
+    save(noise_bars_figure(panels, reference, title=title), path)
 
 
-def noise_bars_figure(panels: Mapping[str, Bars], reference: str) -> Figure:
+def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str) -> Figure:
     """Return the figure.
 
     Args:
         panels: By real world.
         reference: The method that is drawn as a line.
+        title: What there is to see.
     """
     with look():
         whole = figure(3.8)
@@ -47,7 +48,7 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str) -> Figure:
             noisy = [method for method in methods if method.startswith("ane")]
             for k, method in enumerate(methods):
                 means, errors = np.array(bars.values[method]).T
-                colour, hatch = STYLES.get(method.split("_")[0], (QUIET, ""))
+                colour, hatch = STYLES.get(method.split()[0].split("_")[0], (QUIET, ""))
                 hatch = HATCHES[noisy.index(method) % len(HATCHES)] if method in noisy else hatch
                 x = places + (k - 0.5 * (len(methods) - 1)) * width
                 axes.bar(
@@ -57,9 +58,9 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str) -> Figure:
                 label = reference if place == 0 else None
                 axes.hlines(mean, place - 0.45, place + 0.45, color=REAL, linestyle="--", linewidth=1.4, label=label)
             axes.set_xticks(places, [f"{noise:g}" for noise in bars.noises])
-            axes.set_xlabel("standard deviation of the real world's action noise")
+            axes.set_xlabel("standard deviation of the real world's action noise [half ranges]")
             axes.set_ylabel("return in real")
             axes.set_title(name, loc="left", fontsize=10.5)
         axes.legend(frameon=False, fontsize=9, loc="upper right")
-        headline(whole, "Return in the real world")
+        headline(whole, title)
     return whole

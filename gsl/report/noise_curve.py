@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gsl.core.statistics import Interval
-from gsl.report.style import COMMAND, GROUNDED, REAL, SIMULATION, figure, headline, look, save
+from gsl.report.style import COMMAND, EFFECTS, GAT, SGAT, figure, headline, look, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLOURS = (SIMULATION, GROUNDED, REAL)
+COLOURS = (GAT, SGAT, EFFECTS)
 
 
 class Curve(NamedTuple):
@@ -42,7 +42,7 @@ def noise_curve_figure(curves: Mapping[str, Curve], exact: Mapping[str, Sequence
         axes, ends = whole.subplots(), []
         noises = next(iter(curves.values())).noises
         for name, values in exact.items():
-            axes.plot(noises, values, color=COMMAND, linewidth=1.2, linestyle=(0, (5, 3)))
+            axes.plot(noises, values, color=COMMAND, linewidth=1.2, linestyle=(0, (5, 3)), zorder=4)
             middle = int(0.45 * len(noises))
             axes.annotate(name, (noises[middle], values[middle]), (8, 8), textcoords="offset points", color=COMMAND)
         for colour, (name, curve) in zip(COLOURS, curves.items(), strict=False):
@@ -56,6 +56,6 @@ def noise_curve_figure(curves: Mapping[str, Curve], exact: Mapping[str, Sequence
         for place, height, name, colour in ends:
             axes.annotate(name, (noises[place], height), (-26, -14), textcoords="offset points", color=colour)
         axes.set_xlabel("chance that the real world replaces an action")
-        axes.set_ylabel("return in real")
+        axes.set_ylabel("return in real, 95 % interval shaded")
         headline(whole, title)
     return whole

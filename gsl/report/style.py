@@ -15,6 +15,12 @@ if TYPE_CHECKING:
 
 REAL, SIMULATION, GROUNDED = "#d55e00", "#0072b2", "#009e73"  # Okabe and Ito 2008
 COMMAND, QUIET, INK = "#8c8c8c", "#d0d0d0", "#222222"
+UNINFORMED, GAT, SGAT, EFFECTS = (
+    COMMAND,
+    SIMULATION,
+    GROUNDED,
+    REAL,
+)  # methods: the first know nothing of the real robot
 WIDTH, DPI = 10.0, 160  # [in], [1/in]: 1600 pixels
 
 _SETTINGS: Any = {
@@ -71,11 +77,12 @@ def label_ends(axes: Axes, x: float, ends: Sequence[tuple[float, str, str]], *, 
         axes: With its final limits.
         x: In data units.
         ends: Height in data units, text and colour of each.
-        gap: Least distance of two labels, in shares of the axes' height.
+        gap: Least distance of two labels, in shares of the axes' height, of which half is kept below the lowest.
     """
     low, high = axes.get_ylim()
     order = sorted(range(len(ends)), key=lambda index: ends[index][0])
-    places = spread([(ends[index][0] - low) / (high - low) for index in order], gap)
+    free = spread([(ends[index][0] - low) / (high - low) for index in order], gap)
+    places = [max(place, (0.5 + index) * gap) for index, place in enumerate(free)]
     for index, place in zip(order, places, strict=True):
         height, text, colour = ends[index]
         axes.annotate(

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from gsl.core.statistics import mean_interval
-from gsl.report.style import GROUNDED, INK, QUIET, REAL, SIMULATION, figure, headline, look, save
+from gsl.report.style import INK, QUIET, figure, headline, look, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-KNOWS_NOTHING, LEARNS, KNOWS = SIMULATION, GROUNDED, REAL  # of the real robot: nothing, by actions, by parameters
+APART = (0.0, 0.13, -0.13, 0.26, -0.26)  # of dots that would cover each other, in rows
+CLOSE = 0.015  # of the range of all values
 
 
 class Dots(NamedTuple):
@@ -40,19 +42,20 @@ def trial_dots_figure(panels: Mapping[str, Mapping[str, Dots]], *, axis: str, ti
         title: What there is to see.
     """
     most = max(len(methods) for methods in panels.values())
+    spanned = float(np.ptp([value for methods in panels.values() for one in methods.values() for value in one.values]))
     with look():
         whole = figure(1.4 + 0.32 * most)
         for axes, (world, methods) in zip(
             whole.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0], panels.items(), strict=True
         ):
-            _draw(axes, methods)
+            _draw(axes, methods, CLOSE * spanned)
             axes.set_title(world, loc="left", fontsize=10.5)
             axes.set_xlabel(axis)
         headline(whole, title)
     return whole
 
 
-def _draw(axes: Axes, methods: Mapping[str, Dots]) -> None:
+def _draw(axes: Axes, methods: Mapping[str, Dots], close: float) -> None:
     axes.axvline(0.0, color=QUIET, linewidth=1.0, zorder=0)
     for row, one in enumerate(methods.values()):
         values, failed = np.asarray(one.values, float), np.asarray(one.failed, bool)
@@ -61,9 +64,17 @@ def _draw(axes: Axes, methods: Mapping[str, Dots]) -> None:
             axes.plot([found.lower, found.upper], [row, row], color=one.colour, linewidth=6, alpha=0.25)
         axes.plot([found.mean] * 2, [row - 0.3, row + 0.3], color=one.colour, linewidth=2.2)
         for part, face in ((~failed, one.colour), (failed, "white")):
-            axes.plot(
-                values[part], np.full(part.sum(), row), "o", color=one.colour, markerfacecolor=face, markersize=4.5
-            )
+            heights = row + _apart(values, close)[part]
+            axes.plot(values[part], heights, "o", color=one.colour, markerfacecolor=face, markersize=4.5)
     axes.set_yticks(range(len(methods)), list(methods))
     axes.set_ylim(len(methods) - 0.5, -0.5)
     axes.tick_params(axis="y", length=0)
+
+
+def _apart(values: np.ndarray, close: float) -> np.ndarray:
+    """Return how far each dot is moved out of its row, shape (n,), so that those at one place are all seen."""
+    order, moved, alike = np.argsort(values, kind="stable"), np.zeros(len(values)), 0
+    for before, index in pairwise(order):
+        alike = alike + 1 if values[index] - values[before] <= close else 0
+        moved[index] = APART[alike % len(APART)]
+    return moved

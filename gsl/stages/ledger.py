@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -98,13 +99,10 @@ class Ledger:
         if unused := len(self._known.keys() - self._done.keys()):
             self._console.status(f"{unused} of {len(self._known)} known trials are of other settings and were not used")
         write_json(path, self._rows())
-        makers: dict[str, set[int]] = {}
-        for row in self._rows():
-            makers.setdefault(row[MADE_BY], set()).add(_number(row))
-        if len(makers) > 1:
-            self._console.status(f"these trials were made by {len(makers)} versions of gsl; the table says which")
-        told = "; ".join(f"trials {', '.join(map(str, sorted(found)))} by {name}" for name, found in makers.items())
-        return f"Made: {told}."
+        made = _made(self._rows())
+        if len(made) > 1:
+            self._console.status(f"these trials were made by {len(made)} versions of gsl; the table says which")
+        return f"Made: {'; '.join(f'trials {trials} by {name}' for name, trials in made.items())}."
 
     def _rows(self) -> list[dict[str, Any]]:
         return sorted((row for rows in self._done.values() for row in rows), key=_number)
@@ -144,6 +142,21 @@ def _read(path: Path, fields: Sequence[str]) -> dict[str, list[dict[str, Any]]]:
 
 def _number(row: Mapping[str, Any]) -> int:
     return int(next(row[name] for name in NUMBER if name in row))
+
+
+def _made(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Return by maker which trials, with the methods of those that several have made."""
+    found: dict[str, dict[int, set[str]]] = {}
+    for row in rows:
+        found.setdefault(row[MADE_BY], {}).setdefault(_number(row), set()).add(row.get("method", ""))
+    makers = Counter(number for trials in found.values() for number in trials)
+    return {
+        name: ", ".join(
+            f"{number} ({', '.join(sorted(methods))})" if makers[number] > 1 else str(number)
+            for number, methods in sorted(trials.items())
+        )
+        for name, trials in found.items()
+    }
 
 
 def _made_by() -> str:

@@ -172,11 +172,11 @@ class LinearWalkTable:
             + (f"{one.real_episodes:.0f}", *(LINEAR_WALK.get(one.method, NOTHING) if one.iteration == 1 else NOTHING))
             for one in summaries(trials)
         ]
-        return "\n".join([table(titles, rows), _differences(trials, task, ("none",))])
+        return "\n".join([table(titles, rows), _differences(trials, task, ("none", "gat"))])
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
-        """Return what a trial is worth."""
-        return worth(trials, task)
+        """Return the distances."""
+        return f"distance in real [{task.unit}]", [task.shown * trial.value for trial in trials]
 
 
 @component

@@ -11,7 +11,8 @@ from gsl.grounding.effects import DiagnosedEffects
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.optimizers.cma_es import CmaEs
-from gsl.report.trial_dots import KNOWS, KNOWS_NOTHING, LEARNS, Dots, trial_dots
+from gsl.report.style import EFFECTS, GAT, SGAT, UNINFORMED
+from gsl.report.trial_dots import Dots, trial_dots
 from gsl.stages.compare import DATA, TABLE, Compare
 from gsl.stages.comparison import summaries
 from gsl.stages.ledger import known_parent
@@ -88,10 +89,12 @@ def _draw(path: Path, trials: Sequence[Trial], study: Compare, axis: str, values
         name = f"{cell.method}, iteration {cell.iteration}" if several else cell.method
         panels.setdefault(panel, {})[name] = Dots(shown, failed, _colour(study.methods[cell.method]))
     missed = "no sure improvement" if tolerant else "no stable improvement"
-    trial_dots(path, panels, axis=axis, title=f"Every trial; hollow: {missed}")
+    trial_dots(path, panels, axis=axis, title=f"Every trial (hollow: {missed}), mean and 95 % interval")
 
 
 def _colour(grounding: Grounding) -> str:
     if isinstance(grounding, DiagnosedEffects):
-        return KNOWS
-    return LEARNS if isinstance(grounding, ActionTransformation) else KNOWS_NOTHING
+        return EFFECTS
+    if not isinstance(grounding, ActionTransformation):
+        return UNINFORMED
+    return GAT if grounding.predicts == "point" else SGAT

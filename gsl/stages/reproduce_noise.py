@@ -16,6 +16,7 @@ from gsl.console import Console
 from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
 from gsl.core.statistics import mean_interval
+from gsl.grounding.ane import ActionNoise
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
@@ -95,15 +96,23 @@ class NoiseStudy:
         points = [Point(**row) for row in ledger.figures]
         (folder / TABLE).write_text(f"{self._table(points)}\n{made}\n", encoding="utf-8")
         panels = {
-            world: Bars(self.noises, {method: self._means(points, world, method) for method in self._shown})
-            for world in self.worlds
+            f"{place.env_id}, {world.replace('_', ' ')}": Bars(
+                self.noises, {name: self._means(points, world, method) for method, name in self._shown.items()}
+            )
+            for world, place in self.worlds.items()
         }
-        noise_bars(folder / FIGURE, panels, REAL)
+        title = f"Return in real, mean ± standard error of {self.trials} trials; hatched: knows nothing of it"
+        noise_bars(folder / FIGURE, panels, REAL, title=title)
         return {"points": len(points)}
 
     @property
-    def _shown(self) -> tuple[str, ...]:
-        return (*self.methods, REAL)
+    def _shown(self) -> dict[str, str]:
+        """Names of all methods for people."""
+        told = {
+            method: f"ane {grounding.sd:g}" if isinstance(grounding, ActionNoise) else method
+            for method, grounding in self.methods.items()
+        }
+        return {**told, REAL: REAL}
 
     @property
     def _places(self) -> list[tuple[str, float]]:
@@ -170,8 +179,27 @@ class NoiseStudy:
             f"Mean ± standard error over {self.trials} trials; real steps are the median and range of what learned",
             f"groundings saw; the reference learned from {self._reference}.",
         ]
-        titles = ("real world", "noise", *self._shown, "sgat - gat (95 %)", "real steps")
-        return markdown(titles, rows) + "\n" + "\n".join(below) + "\n"
+        titles = ("real world", "noise", *self._shown.values(), "sgat - gat (95 %)", "real steps")
+        return "\n".join([markdown(titles, rows), *below, "", *self._differences(points)])
+
+    def _differences(self, points: Sequence[Point]) -> list[str]:
+        """Return the lines of a table of what learned groundings are above methods that know nothing, by trial."""
+        learned = [name for name, one in self.methods.items() if isinstance(innermost(one), ActionTransformation)]
+        noisy = [name for name, one in self.methods.items() if isinstance(one, ActionNoise)]
+        if self.trials < 2 or not learned:
+            return []
+        rows = []
+        for world, noise in self._places:
+            values = {method: np.array(self._values(points, world, noise, method)) for method in self.methods}
+            widest = max(noisy, key=lambda name: values[name].mean(), default=None)
+            others = [name for name in ("none", widest) if name in values]
+            found = (mean_interval(values[name] - values[other]) for other in others for name in learned)
+            told = (f"{one.mean:+.0f} ({one.lower:+.0f} to {one.upper:+.0f})" for one in found)
+            rows.append((world, f"{noise:g}", *told, *([self._shown[widest]] if widest else [])))
+        others = [*(["none"] if "none" in self.methods else []), *(["best ane"] if noisy else [])]
+        titles = [f"{name} - {other}" for other in others for name in learned]
+        below = "Paired differences with 95 % intervals; the best width of action noise is known only afterwards."
+        return [markdown(("real world", "noise", *titles, *(["best ane"] if noisy else [])), rows), below, ""]
 
     def _spent(self, points: Sequence[Point], world: str, noise: float) -> str:
         steps = [one.real_steps for one in points if one[:2] == (world, noise) and one.method != REAL]
