@@ -15,7 +15,7 @@ from scenarios import AIR, QUIET, REACH
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
 from gsl.stages.generations import Generation, GenerationLog
-from gsl.stages.optimize import Optimize
+from gsl.stages.optimize import BEST, Optimize
 from gsl.storage.policies import read_policies
 from gsl.tasks.arm import Arm
 
@@ -55,6 +55,15 @@ def test_generations_read_from_the_log_are_not_run_again(tmp_path: Path) -> None
     _search(2).run(tmp_path, QUIET)
     assert (tmp_path / "policies.json").read_bytes() == whole
     assert log.read_text() == first + second
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_of_equally_good_generations_the_last_one_is_the_best(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, value: float
+) -> None:
+    monkeypatch.setattr(Optimize, "_evaluated", lambda self, *_: Generation(_[2], [value] * 6, [0] * 6))
+    assert _search(3).run(tmp_path, QUIET)["best_value_sim"] == value
+    assert [one.name for one in read_policies(tmp_path / BEST).records] == ["generation_03"]
 
 
 def test_a_log_returns_its_values_to_the_bit(tmp_path: Path) -> None:

@@ -34,7 +34,10 @@ BEST = "best_in_simulation.json"
 
 @component
 class Optimize:
-    """Candidates are judged by the mean value of `rollouts` episodes each; a killed search goes on where it was."""
+    """Candidates are judged by the mean value of `rollouts` episodes each; a killed search goes on where it was.
+
+    Of equally good generations the last one's is the best: its distribution has left the edge of what does as well.
+    """
 
     kind: ClassVar[str] = "optimize"
     progress: ClassVar[str] = PROGRESS
@@ -69,7 +72,7 @@ class Optimize:
         else:
             found += self._learned(self.optimizer, scenario, first, console)
         write_policies(folder / FILE, policies(self.policy, self.task, found))
-        best = max(found[1:], key=lambda one: one.value_sim or -np.inf)
+        best = max(reversed(found[1:]), key=lambda one: -np.inf if one.value_sim is None else one.value_sim)
         write_policies(folder / BEST, policies(self.policy, self.task, [best]))
         return {
             "generations": len(found) - 1,
