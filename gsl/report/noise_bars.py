@@ -61,6 +61,6 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str)
             axes.set_xlabel("standard deviation of the real world's action noise [half ranges]")
             axes.set_ylabel("return in real")
             axes.set_title(name, loc="left", fontsize=10.5)
-        axes.legend(frameon=False, fontsize=9, loc="upper right")
+        whole.legend(*axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9)
         headline(whole, title)
     return whole
