@@ -74,8 +74,8 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     assert all(f"| {name} " in table for name in KEPT[what])
     assert all((one["rank"] is not None) == (what in ("table2", "worlds")) for one in trials)
     learned = {
-        path.parent.parent.name: json.loads(path.read_text())["metrics"]["trajectories"]
-        for path in folder.parent.rglob("sgat/*/**/train_forward/manifest.json")
+        path.parent.parent.name: json.loads(path.read_text())["trajectories"]
+        for path in folder.parent.rglob("sgat/*/**/train_forward/metrics.json")
     }
     if what == "table4":
         assert learned["iteration_02"] > learned["trial_01"]  # it knows what the first iteration has collected
@@ -95,7 +95,7 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     again = json.loads((tmp_path / "runs/on/reproduce/trials.json").read_text())
     assert again[:2] == rows and [one["number"] for one in again] == [1, 1, 2, 2]
     assert not list((tmp_path / "runs/on").rglob("trial_01"))
-    assert "trials 1 by a1b2c3d; " in (tmp_path / "runs/on/reproduce/table.md").read_text()
+    assert f"trials 1 ({rows[0]['method']}) by a1b2c3d; " in (tmp_path / "runs/on/reproduce/table.md").read_text()
     assert len(json.loads((tmp_path / "runs/on/trials.json").read_text())) == 5  # nothing that was known is lost
 
 
