@@ -155,7 +155,7 @@ def _draw(axes: Axes, one: Search) -> None:
     _draw_standing(axes, standing)
     _draw_falls(axes, [point for point in one.points if point.falls])
     if one.confirmed is not None:
-        _draw_confirmed(axes, one.confirmed, standing)
+        _draw_confirmed(axes, one.confirmed, last)
     axes.set_title(one.label, loc="left", fontsize=10.5)
     axes.set_xlabel("generation")
     axes.set_xticks([point.generation for point in one.points])
@@ -190,24 +190,23 @@ def _draw_falls(axes: Axes, fallen: Sequence[Point]) -> None:
     _say(axes, "fell in real", sum(places) / len(places), strip, 9, REAL)
 
 
-def _draw_confirmed(axes: Axes, confirmed: Point, standing: Sequence[Point]) -> None:
+def _draw_confirmed(axes: Axes, confirmed: Point, last: int) -> None:
     place = confirmed.generation + 0.18
-    beside = [point.lower for point in standing if point.generation == confirmed.generation]
-    lowest = min(bound for bound in [confirmed.real, confirmed.lower, *beside] if math.isfinite(bound))
     axes.vlines([place], [confirmed.lower], [confirmed.upper], color=INK, linewidth=1.8, zorder=5)
     axes.plot([place], [confirmed.real], "D", color=INK, markersize=6, label="measured again", zorder=6)
-    _say(axes, "measured again", place, lowest, -25, INK)
+    _say(axes, "measured\nagain", place, confirmed.real, -24, INK, beside=1 if confirmed.generation < last else -1)
 
 
-def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -> None:
+def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str, *, beside: int = 0) -> None:
+    """Write something above a point, or to the right (1) or left (-1) of it."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=3.0, foreground="white")]
     place: dict[str, Any] = {
         "path_effects": halo,
-        "xytext": (0, above),
+        "xytext": (8 * beside, above),
         "textcoords": "offset points",
-        "ha": "center",
+        "ha": {-1: "right", 0: "center", 1: "left"}[beside],
         "fontsize": 9.5,
     }
     axes.annotate(text, (x, y), color=colour, zorder=7, **place)
