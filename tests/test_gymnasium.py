@@ -509,7 +509,9 @@ def test_figure_12_is_one_command(tmp_path: Path) -> None:
     points = json.loads((folder / "points.json").read_text())
     assert [one["method"] for one in points] == ["none", "gat", "sgat", "trained on real"]
     assert all(one["value"] > 1.0 for one in points)
-    assert 0 == points[0]["real_steps"] < points[1]["real_steps"]
+    assert 0 == points[0]["real_steps"] < points[1]["real_steps"] == points[2]["real_steps"]
+    for shared in ("collect_real", "collect_sim", "train_inverse"):
+        assert len(list((tmp_path / "runs/fig12").rglob(shared))) == 1
     assert (folder / "figure.png").stat().st_size > 10_000
     assert "trained on real" in said.out
     known = ("known=runs/fig12/points.json", "name=again", "preset=toy", *few, "iterate.budget.episodes=3")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -71,6 +71,7 @@ class Chain:
     workers: int
     aggregate: bool
     earlier: tuple[str, ...] = ()  # real trajectories from which f learns as well
+    shared: Mapping[str, Path] = field(default_factory=dict)  # by role, where groundings keep what they have in common
 
     def after(self, place: Path) -> Chain:
         """Return the links of the round after the one below `place`, which keep its real trajectories if so wanted."""
@@ -113,9 +114,11 @@ class Chain:
             REAL: (budget.real_episodes, budget.real_neighbours),
             SIM: (budget.sim_episodes, budget.sim_neighbours),
         }
+        places = {role: self.shared.get(role, home) for role in counts}
+        data = {role: place / f"collect_{role}" for role, place in places.items()}
         for role, (episodes, neighbours) in counts.items():
             stage = Collect(
-                world=asking(self.real, home / f"collect_{role}") if role == REAL else self.sim,
+                world=asking(self.real, data[role]) if role == REAL else self.sim,
                 task=self.task,
                 policy=self.policy,
                 role=role,
@@ -127,15 +130,15 @@ class Chain:
                 workers=self.workers,
                 seed=seed,
             )
-            built(stage, home / f"collect_{role}", console)
+            built(stage, data[role], console)
         method: Method = "solve" if grounding.residual else self.inverse_method
-        inverse = TrainInverse(str(home / "collect_sim"), self.inverse_model, method=method, seed=seed)
-        f_inverse = built(inverse, home / inverse.kind, console)
+        inverse = TrainInverse(str(data[SIM]), self.inverse_model, method=method, seed=seed)
+        f_inverse = built(inverse, places[SIM] / inverse.kind, console)
         needed, base = as_needed(self.forward_model, grounding), None
         if grounding.residual:
             history, horizon = f_inverse.metrics["history"], self.inverse_model.horizon
             needed, base = replace(needed, history=history, horizon=horizon), str(f_inverse.folder)
-        forward = TrainForward(str(home / "collect_real"), needed, base, seed=seed, earlier=self.earlier)
+        forward = TrainForward(str(data[REAL]), needed, base, seed=seed, earlier=self.earlier)
         f = built(forward, home / forward.kind, console)
         return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))
 

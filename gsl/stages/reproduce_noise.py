@@ -31,11 +31,12 @@ from gsl.stages.iterate import Iterate
 from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
+from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import GymnasiumWorld
 from gsl.worlds.world import World
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "figure.png"
-REAL, BOTH = "trained on real", {"gat", "sgat"}
+REFERENCE, BOTH = "trained on real", {"gat", "sgat"}
 
 
 class Point(NamedTuple):
@@ -102,7 +103,7 @@ class NoiseStudy:
             for world, place in self.worlds.items()
         }
         title = f"Return in real, mean ± standard error of {self.trials} trials; hatched: knows nothing of it"
-        noise_bars(folder / FIGURE, panels, REAL, title=title)
+        noise_bars(folder / FIGURE, panels, REFERENCE, title=title)
         return {"points": len(points)}
 
     @property
@@ -112,7 +113,7 @@ class NoiseStudy:
             method: f"ane {grounding.sd:g}" if isinstance(grounding, ActionNoise) else method
             for method, grounding in self.methods.items()
         }
-        return {**told, REAL: REAL}
+        return {**told, REFERENCE: REFERENCE}
 
     @property
     def _places(self) -> list[tuple[str, float]]:
@@ -127,20 +128,22 @@ class NoiseStudy:
             chain = self._chain(sim or self.iterate.sim)
             alone, below = home / (f"{world}_sim" if sim else "sim"), home / f"{world}_{noise:g}"
             first = chain.search(alone / "pretrained" / name, NoGrounding(), None, seed, console)
-            at, start = replace(chain, real=real, optimizer=self.further), str(first.folder / BEST)
+            shared = {SIM: alone / "models" / name, REAL: below / "models" / name}
+            at = replace(chain, real=real, optimizer=self.further, shared=shared)
+            start = str(first.folder / BEST)
             for method, grounding in self.methods.items():
                 learned = isinstance(innermost(grounding), ActionTransformation)
                 place = (below if learned else alone) / method / name
                 ready = at.ready(place, grounding, start, seed, console)
                 policy = at.search(place / "optimize", ready, start, seed, console)
                 value = self._value(at, below / method / name / "evaluate", policy, seed, console)
-                points.append(Point(world, noise, method, number, value, _steps(place) if learned else 0))
+                points.append(Point(world, noise, method, number, value, _steps(shared[REAL]) if learned else 0))
             on_real = replace(at, sim=real).search(
                 below / "real" / name / "optimize", NoGrounding(), start, seed, console
             )
             value = self._value(at, below / "real" / name / "evaluate", on_real, seed, console)
             steps = self.further.taken if isinstance(self.further, Trpo) else None
-            points.append(Point(world, noise, REAL, number, value, steps))
+            points.append(Point(world, noise, REFERENCE, number, value, steps))
         return points
 
     @property
@@ -202,7 +205,7 @@ class NoiseStudy:
         return [markdown(("real world", "noise", *titles, *(["best ane"] if noisy else [])), rows), below, ""]
 
     def _spent(self, points: Sequence[Point], world: str, noise: float) -> str:
-        steps = [one.real_steps for one in points if one[:2] == (world, noise) and one.method != REAL]
+        steps = [one.real_steps for one in points if one[:2] == (world, noise) and one.method != REFERENCE]
         learned = [one for one in steps if one]
         return f"{np.median(learned):,.0f} ({min(learned):,} to {max(learned):,})" if learned else "-"
 
