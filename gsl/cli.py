@@ -109,6 +109,7 @@ stage("blind reveal", "Check the seals, set the answers against the labels, and 
 stage("evaluate", "Measure policies in the real world.")
 stage("compare", "Set groundings against each other over paired trials.")
 stage("reproduce table2", "Groundings against each other on the walk, beside the paper's table 2.")
+stage("reproduce table2-paper", "The same by the paper's recipe to the letter.")
 stage("reproduce worlds", "The best groundings in worlds that took no part in their choice.")
 stage("reproduce table3", "Three iterations with either of two simulators, beside the paper's table 3.")
 stage("reproduce table4", "Uneven ground, two grounding steps, beside the paper's table 4.")

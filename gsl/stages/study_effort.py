@@ -5,19 +5,21 @@ from __future__ import annotations
 import time
 
 from gsl.errors import ConfigError
-from gsl.grounding.effects import innermost
+from gsl.grounding.effects import DiagnosedEffects, innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
 from gsl.stages.compare import Compare
 from gsl.stages.population import threads
 from gsl.stages.rollout import Scenario, rollout
+from gsl.stages.values import Values
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.world import World
 
 TRIED = 2  # rollouts of π0 in each world, after one that compiles
 LEARNED = 1.4  # how much longer a rollout takes with a learned grounding
-APART = 60.0  # of a learned grounding: fits and checks [s]
+APART = 25.0  # of a learned grounding: fits and checks [s]
+DIAGNOSED = {"diagnose": 240.0, "identify": 60.0}  # of a log in the air, on two cores [s]
 
 
 def seconds(study: Compare) -> float:
@@ -35,14 +37,21 @@ def seconds(study: Compare) -> float:
     sim = sum(_rollout(study, world, SIM) for world in sims.values()) / len(sims)
     searched = iterate.optimizer.generations * iterate.optimizer.candidates * budget.rollouts
     measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
-    total = 0.0
+    collected = budget.real_episodes + budget.real_neighbours, budget.sim_episodes + budget.sim_neighbours
+    rounds, worlds = iterate.iterations * len(study.worlds), len(study.worlds)
+    rolled = fitted = 0.0
     for method in study.methods.values():
         learned = isinstance(innermost(method), ActionTransformation)
-        collected = budget.real_episodes + budget.real_neighbours, budget.sim_episodes + budget.sim_neighbours
-        rollouts = searched * sim * (LEARNED if learned else 1.0) + measured * real
-        rollouts += (collected[0] * real + collected[1] * sim) if learned else 0.0
-        total += rollouts / workers + (APART if learned else 0.0)
-    return total * study.trials * iterate.iterations * len(study.worlds) * len(sims)
+        apart = learned or isinstance(method, DiagnosedEffects)
+        searches = rounds if apart else rounds - worlds + 1  # what knows no world searches first for all of them
+        rolled += searches * searched * sim * (LEARNED if learned else 1.0) + rounds * measured * real
+        rolled += (searches if apart else 1) * Values.count * sim if study.rank else 0.0
+        if learned:
+            rolled += rounds * (collected[0] * real + collected[1] * sim)
+            fitted += rounds * APART
+    flights = {one.method for one in study.methods.values() if isinstance(one, DiagnosedEffects) and not one.effects}
+    fitted += worlds * sum(DIAGNOSED[method] for method in flights)
+    return (rolled / workers + fitted) * study.trials * len(sims)
 
 
 def told(duration: float) -> str:
