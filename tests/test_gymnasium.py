@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -488,6 +489,13 @@ def test_joints_of_an_environment_cannot_be_grounded(tmp_path: Path) -> None:
     grounding = ActionTransformation("f", "i", x=("elbow",))
     with pytest.raises(ConfigError, match="x: names joints of a robot"):
         grounding.load(lambda _: f, lambda _: f_inv)
+
+
+def test_what_gymnasium_remarks_on_an_id_is_in_the_log(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level("INFO", logger="gsl"), warnings.catch_warnings(action="error"):
+        GymnasiumWorld(env_id="CartPole")
+    assert any("latest versioned environment `CartPole-v1`" in said for said in caplog.messages)
+    assert not any("\x1b" in said for said in caplog.messages)
 
 
 def test_batches_that_leave_a_part_of_a_rollout_are_refused() -> None:

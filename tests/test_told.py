@@ -75,3 +75,18 @@ def test_an_environment_that_ends_has_not_fallen() -> None:
 def test_a_gain_over_nothing_has_no_share() -> None:
     around = [cast(Any, SimpleNamespace(value=value, fell=False)) for value in (-1.0, 0.5, 1.0)]
     assert gain(around, around)["share"] is None
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [(0.0, "+0.0"), (-17.23, "-17.2"), (0.06, "+0.06"), (0.643, "+0.64"), (-0.0082, "-0.0082"), (5000.0, "+5000.0")],
+)
+def test_values_of_an_environment_are_told_whatever_their_size(value: float, told: str) -> None:
+    assert Unit.of(OwnReward()).bare(value, sign=True) == told
+    assert Unit.of(Walk()).bare(0.0043) == "0.4"  # cm/s, whose size is known
+
+
+def test_a_gain_below_one_is_told() -> None:
+    rounds = Rounds(OwnReward())
+    rounds.add(evaluation(0.06, 0.64, 0.43, 0.73), 10)
+    assert "gain of the last step +0.43 to +0.73 (95 %)" in rounds.verdict

@@ -14,6 +14,7 @@ from gsl.core.statistics import difference_interval, mean_interval
 from gsl.core.trajectory import Trajectory
 from gsl.grounding.grounding import Grounding, GroundingRun
 from gsl.grounding.none import NoGrounding
+from gsl.stages.headline import Unit
 from gsl.stages.rollout import Scenario, rollout
 from gsl.worlds.control_cost import KEYS
 
@@ -33,7 +34,7 @@ class ValueReport:
         """Why nothing should be optimised in this grounding, in words: π0 is surely farther from real than without."""
         if not self._surely_nearer("ungrounded", "grounded"):
             return ()
-        told = {name: f"{self.values[name].mean():.1f}" for name in self.values}
+        told = {name: Unit().bare(self.values[name].mean()) for name in self.values}
         return (f"π0 is worth {told['grounded']}, {told['ungrounded']} without grounding, {told['real']} in real",)
 
     @property
@@ -68,8 +69,8 @@ class ValueReport:
     def _row(self, name: str) -> tuple[str, ...]:
         values = self.values[name]
         interval = mean_interval(values)
-        bounds = f"{interval.lower:.1f} to {interval.upper:.1f}" if len(values) > 1 else "-"
-        return name, f"{values.mean():.1f}", bounds, f"{self.steps[name].mean():.0f}"
+        bounds = Unit().interval([interval.lower, interval.upper]) if len(values) > 1 else "-"
+        return name, Unit().bare(values.mean()), bounds, f"{self.steps[name].mean():.0f}"
 
 
 @dataclass(frozen=True)

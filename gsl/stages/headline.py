@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from gsl.grounding.effects import named
+from gsl.report.markdown import significant
 from gsl.storage.artifact import Artifact
 
 Metrics = Mapping[str, Any]
@@ -30,13 +31,18 @@ class Unit(NamedTuple):
             return "-"
         return f"{self.bare(value, sign=sign)} {self.name}".rstrip()
 
-    def bare(self, value: float | None, *, sign: bool = False) -> str:
-        """Return a value without its unit."""
-        return "-" if value is None else f"{self.factor * value:{'+' if sign else ''}.1f}"
+    def bare(self, value: float | None, *, sign: bool = False, size: float | None = None) -> str:
+        """Return a value without its unit; nobody knows how large values without one are, unless `size` tells."""
+        if value is None:
+            return "-"
+        if not self.name:
+            return significant(self.factor * value, sign=sign, size=size)
+        return f"{self.factor * value:{'+' if sign else ''}.1f}"
 
     def interval(self, bounds: list[float | None], *, sign: bool = False) -> str:
         """Return an interval without its unit."""
-        return " to ".join(self.bare(bound, sign=sign) for bound in bounds)
+        size = self.factor * max((abs(bound) for bound in bounds if bound is not None), default=0.0)
+        return " to ".join(self.bare(bound, sign=sign, size=size) for bound in bounds)
 
     def ended(self, summary: Mapping[str, Any]) -> str:
         """Return how often the robot fell in so many episodes, or the number of episodes."""

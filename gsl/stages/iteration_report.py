@@ -91,9 +91,11 @@ class Rounds:
             return f"No improvement over π0 was found: π0 is returned. {cost}"
         after, before = self.best.metrics["returned"], self._done[0].metrics["baseline"]
         unit = self._unit
-        factor, name = (100.0 / before["value"], "% of π0") if before["interval"][0] > 0.0 else unit[:2]
-        low, high = (factor * bound for bound in self.best.metrics["gain"]["interval"])
-        last = " ".join(filter(None, [f"gain of the last step {low:+.0f} to {high:+.0f}", name, "(95 %)"]))
+        gained, name = unit.interval(self.best.metrics["gain"]["interval"], sign=True), unit.name
+        if before["interval"][0] > 0.0:
+            low, high = (100.0 * bound / before["value"] for bound in self.best.metrics["gain"]["interval"])
+            gained, name = f"{low:+.0f} to {high:+.0f}", "% of π0"
+        last = " ".join(filter(None, ["gain of the last step", gained, name, "(95 %)"]))
         of = f" by iteration {1 + self._done.index(self.best)}" if len(self._done) > 1 else ""
         fell = f"{after['falls']} falls in " if unit.falls else ""
         end = f"{fell}{after['episodes']} fresh episodes. {self._ended}{cost}"

@@ -7,10 +7,14 @@ both are vectors of one number.
 from __future__ import annotations
 
 import importlib
+import logging
+import re
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import field
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Annotated, Any
 
 import gymnasium
@@ -24,6 +28,7 @@ from gsl.errors import ConfigError, GslError
 from gsl.worlds.control_cost import Charged, ControlCost
 from gsl.worlds.mujoco import change_masses, without_remarks
 
+_log = logging.getLogger("gsl")
 _STREAM = 11  # sets the noise on actions apart from the environment's own randomness, whose seed is the same
 
 
@@ -190,7 +195,7 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
     """
     make = _maker(name)
     try:
-        with without_remarks():
+        with without_remarks(), _of_gymnasium_in_the_log():
             env = make(**kwargs)
     except gymnasium.error.DependencyNotInstalled as error:
         raise ConfigError("env_id", f"{_line(error)}; MuJoCo's are in gsl[mujoco]", given=name) from error
@@ -213,7 +218,7 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
 def _maker(name: str) -> Callable[..., Any]:
     place, separator, attribute = name.partition(":")
     if not separator or not attribute.isidentifier():
-        with suppress(Exception):  # what is wrong with it, gymnasium will tell
+        with suppress(Exception), _of_gymnasium_in_the_log():  # what is wrong with it, gymnasium will tell
             importlib.import_module(str(gymnasium.spec(name).entry_point).partition(":")[0])
         return partial(gymnasium.make, name, disable_env_checker=True)
     try:
@@ -223,6 +228,19 @@ def _maker(name: str) -> Callable[..., Any]:
     except Exception as error:
         told = f"its module cannot be imported: {type(error).__name__}: {_line(error)}"
         raise ConfigError("env_id", told, given=name) from error
+
+
+@contextmanager
+def _of_gymnasium_in_the_log() -> Iterator[None]:
+    """Have gymnasium's own warnings, of an id without a version, say, in the log; others stay warnings."""
+    with warnings.catch_warnings(record=True) as remarks:
+        warnings.simplefilter("always")
+        yield
+    for remark in remarks:
+        if Path(remark.filename).is_relative_to(Path(gymnasium.__file__).parent):
+            _log.info("gymnasium: %s", re.sub(r"\x1b\[\d+m", "", str(remark.message)).removeprefix("WARN: "))
+        else:
+            warnings.warn_explicit(remark.message, remark.category, remark.filename, remark.lineno)
 
 
 def _line(error: Exception) -> str:
