@@ -6,18 +6,21 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scenarios import AIR, QUIET, REACH
 
+from gsl.core.layout import Layout
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
 from gsl.stages.generations import Generation, GenerationLog
 from gsl.stages.optimize import BEST, Optimize
 from gsl.storage.policies import read_policies
 from gsl.tasks.arm import Arm
+from gsl.tasks.task import Step
 
 SETTINGS = [
     *("name=kill", "grounding=none", "task=arm", "policy=linear", "world.floating=false", "world.settle=0.1"),
@@ -57,12 +60,23 @@ def test_generations_read_from_the_log_are_not_run_again(tmp_path: Path) -> None
     assert log.read_text() == first + second
 
 
+@dataclass(frozen=True)
+class Anything(Arm):
+    """Every step is worth as much."""
+
+    worth: float = 0.0
+
+    def start(self, layout: Layout, observation: np.ndarray, role: str) -> Anything:
+        return self
+
+    def step(self, before: np.ndarray, after: np.ndarray, fell: bool) -> Step:
+        return Step(self.worth, ended=False)
+
+
 @pytest.mark.parametrize("value", [0.0, 1.0])
-def test_of_equally_good_generations_the_last_one_is_the_best(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, value: float
-) -> None:
-    monkeypatch.setattr(Optimize, "_evaluated", lambda self, *_: Generation(_[2], [value] * 6, [0] * 6))
-    assert _search(3).run(tmp_path, QUIET)["best_value_sim"] == value
+def test_of_equally_good_generations_the_last_one_is_the_best(tmp_path: Path, value: float) -> None:
+    search = replace(_search(3), task=Anything(duration=0.1, worth=value))
+    assert search.run(tmp_path, QUIET)["best_value_sim"] == pytest.approx(5 * value)
     assert [one.name for one in read_policies(tmp_path / BEST).records] == ["generation_03"]
 
 

@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gsl.core.statistics import mean_interval
+from gsl.report.budget_curve import Line, budget_curve_figure
 from gsl.report.grounding_errors import grounding_errors, grounding_errors_figure
 from gsl.report.joint_trace import Traces, joint_trace, joint_trace_figure
 from gsl.report.learning_curve import Point, Search, learning_curve, learning_curve_figure, points, search
 from gsl.report.noise_bars import Bars, noise_bars_figure
-from gsl.report.style import spread
+from gsl.report.noise_curve import Curve, noise_curve_figure
+from gsl.report.style import GAT, SGAT, spread
 from gsl.report.trial_dots import Dots, trial_dots_figure
 
 PI0 = {"name": "pi0", "generation": None, "value_sim": None, "value": 0.19, "interval": [0.18, 0.20], "falls": 0}
@@ -86,6 +89,13 @@ def test_a_learning_curve_tells_what_it_shows() -> None:
     assert learning_curve_figure([SEARCH], unit="cm/s", title="mine").get_suptitle() == "mine"
 
 
+def test_what_is_not_drawn_takes_no_room() -> None:
+    fell = Point(1, None, 13.0, -150.0, 410.0, 1)
+    whole = [Point(0, None, 20.0, 19.5, 20.5, 0), fell, Point(2, None, 22.0, 21.0, 23.0, 0)]
+    (axes,) = learning_curve_figure([Search("x", whole)], unit="cm/s").axes
+    assert axes.get_ylim()[0] > 15.0 and axes.get_ylim()[1] < 30.0
+
+
 def test_nothing_that_is_stable_is_drawn_too() -> None:
     fallen = [Point(generation, None, 0.0, -math.inf, math.inf, 1) for generation in range(3)]
     learning_curve_figure([Search("bad", fallen)], unit="cm/s")
@@ -127,10 +137,24 @@ def test_every_trial_is_a_dot_and_a_failed_one_is_hollow() -> None:
 
 
 def test_trials_that_came_out_alike_are_all_seen() -> None:
-    panels = {"a world": {"none": Dots([3.0, 3.0, 3.01, 9.0], [False] * 4)}}
+    panels = {"a world": {"none": Dots([3.0, 3.0, 3.01, 9.0], [False] * 4), "gat": Dots([0.0] * 10, [False] * 10)}}
     (axes,) = trial_dots_figure(panels, axis="improvement [%]", title="t").axes
-    (heights,) = [line.get_ydata() for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata())]
-    assert sorted(heights) == [-0.13, 0.0, 0.0, 0.13]
+    few, many = [line.get_ydata() for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata())]
+    assert sorted(few) == [-0.13, 0.0, 0.0, 0.13]
+    assert len(np.unique(many)) == 10 and np.ptp(many) < 0.61
+
+
+def test_a_method_has_one_colour_in_all_figures() -> None:
+    from matplotlib.colors import to_hex
+
+    one = [mean_interval([1.0, 2.0])] * 2
+    budget = budget_curve_figure({"p": {name: Line((1, 2), one) for name in ("sgat", "gat")}}, {}, "t").axes[0]
+    noise = noise_curve_figure({name: Curve((0.1, 0.2), one) for name in ("gat", "sgat")}, {}, "t").axes[0]
+    values = {name: [(1.0, 0.1)] for name in ("gat", "sgat")}
+    bars = noise_bars_figure({"w": Bars((0.5,), values)}, "none", title="t").axes[0]
+    drawn = [line.get_color() for axes in (budget, noise) for line in axes.lines if line.get_marker() == "o"]
+    assert drawn == [SGAT, GAT, GAT, SGAT]
+    assert [to_hex(one.patches[0].get_facecolor()) for one in bars.containers if hasattr(one, "patches")] == [GAT, SGAT]
 
 
 def test_bars_tell_widths_of_noise_apart() -> None:

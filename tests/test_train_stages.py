@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import done, refused
+from commands import done, gsl, refused
 from toy_plant import LAYOUT, QUICK, SLOW, ToyEnv, a_batch
 
 from gsl.core.transitions import transitions
@@ -95,8 +95,23 @@ def test_earlier_trajectories_are_of_the_same_robot_and_not_those_that_are_held_
 ) -> None:
     with pytest.raises(ConfigError, match="the same trajectories twice"):
         TrainForward(data=real, model=LINEAR, earlier=(real,)).parents()
-    with pytest.raises(TrajectoryError, match="is of another world than the newest trajectories: sim, not real"):
+    with pytest.raises(TrajectoryError, match="was recorded with role=sim; a forward model learns the real robot"):
         TrainForward(data=real, model=LINEAR, earlier=(sim,)).run(tmp_path, QUIET)
+    other = tmp_path / "other.parquet"
+    batch = a_batch(SLOW, "real", pi0=2, others=2)
+    write(other, replace(batch, metadata={**batch.metadata, "robot": "crane"}))
+    with pytest.raises(
+        TrajectoryError, match=r"other\.parquet: is of another robot than .*: crane"
+    ):
+        TrainForward(data=real, model=LINEAR, earlier=(str(other),)).run(tmp_path, QUIET)
+
+
+def test_what_is_for_several_iterations_is_refused_where_there_is_one(tmp_path: Path) -> None:
+    for asked in (("grounding=none", "iterations=2"), ("grounding=gat", "iterations=1")):
+        said = refused("iterate", "aggregate=true", *asked, folder=tmp_path)
+        assert said.startswith("aggregate = true: is for a grounding that learns from real trajectories")
+    said = gsl("reproduce", "fig12", "iterate.aggregate=true", folder=tmp_path)
+    assert said.code == 2 and "iterate.aggregate = true: is for several iterations" in said.lines[-1]
 
 
 @pytest.mark.parametrize(("method", "bound"), [("regression", 0.03), ("solve", 0.6)])

@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gsl.core.statistics import Interval
-from gsl.report.style import COMMAND, GROUNDED, REAL, SIMULATION, figure, headline, label_ends, look, save
+from gsl.report.style import COMMAND, figure, headline, label_ends, look, method_colour, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-COLOURS = (GROUNDED, SIMULATION, REAL)
 
 
 class Line(NamedTuple):
@@ -50,7 +48,8 @@ def budget_curve_figure(panels: Mapping[str, Mapping[str, Line]], bases: Mapping
 
 def _draw(axes: Axes, lines: Mapping[str, Line], base: float | None) -> None:
     ends = []
-    for colour, (method, line) in zip(COLOURS, lines.items(), strict=False):
+    for method, line in lines.items():
+        colour = method_colour(method)
         means = [one.mean for one in line.found]
         bounds = np.array([[one.lower, one.upper] for one in line.found]).T
         axes.plot(line.budgets, means, "o-", color=colour, markersize=4)

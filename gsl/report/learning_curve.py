@@ -125,12 +125,12 @@ def _point(row: Mapping[str, Any], shown: float) -> Point:
 
 def _limits(searches: Sequence[Search]) -> tuple[float, float]:
     """Least and greatest value that is drawn."""
-    drawn = [one for search in searches for one in (*search.points, *filter(None, [search.confirmed]))]
-    values = [one.simulated for one in drawn if one.simulated is not None]
+    points = [point for search in searches for point in search.points]
+    again = [search.confirmed for search in searches if search.confirmed]
+    values = [one.simulated for one in (*points, *again) if one.simulated is not None]
     values += [one.points[0].real for one in searches]
-    for one in drawn:
-        if not one.falls or math.isfinite(one.lower):
-            values += [bound for bound in (one.real, one.lower, one.upper) if math.isfinite(bound)]
+    for one in (*again, *(point for point in points if not point.falls)):  # winners that fell are in the strip
+        values += [bound for bound in (one.real, one.lower, one.upper) if math.isfinite(bound)]
     return min(values), max(values)
 
 

@@ -20,7 +20,7 @@ def significant(value: float, *, sign: bool = False, size: float | None = None) 
         size: What decides instead of the value, of two bounds the larger.
     """
     size = abs(value if size is None else size)
-    places = 1 if size >= 1.0 or size == 0.0 else 2 if size >= 0.01 else 1 - math.floor(math.log10(size))
+    places = 1 if not 0.0 < size < 1.0 else 2 if size >= 0.01 else 1 - math.floor(math.log10(size))
     return f"{value:{'+' if sign else ''}.{places}f}"
 
 

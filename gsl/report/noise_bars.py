@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gsl.report.style import GAT, QUIET, REAL, SGAT, UNINFORMED, figure, headline, look, save
+from gsl.report.style import REAL, figure, headline, look, method_colour, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-STYLES = {"none": (UNINFORMED, "///"), "ane": (QUIET, "///"), "gat": (GAT, ""), "sgat": (SGAT, "")}
-HATCHES = ("///", "...", "xxx")  # of several widths of action noise, in turn
+HATCHES = ("///", "...", "xxx")  # of what uses no real data: of several widths of action noise, in turn
 
 
 class Bars(NamedTuple):
@@ -48,9 +47,10 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str)
             noisy = [method for method in methods if method.startswith("ane")]
             for k, method in enumerate(methods):
                 means, errors = np.array(bars.values[method]).T
-                colour, hatch = STYLES.get(method.split()[0].split("_")[0], (QUIET, ""))
-                hatch = HATCHES[noisy.index(method) % len(HATCHES)] if method in noisy else hatch
-                x = places + (k - 0.5 * (len(methods) - 1)) * width
+                hatch = HATCHES[0] if method == "none" else ""
+                if method in noisy:
+                    hatch = HATCHES[noisy.index(method) % len(HATCHES)]
+                x, colour = places + (k - 0.5 * (len(methods) - 1)) * width, method_colour(method)
                 axes.bar(
                     x, means, 0.92 * width, yerr=errors, color=colour, hatch=hatch, edgecolor="white", label=method
                 )

@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gsl.core.statistics import Interval
-from gsl.report.style import COMMAND, EFFECTS, GAT, SGAT, figure, headline, look, save
+from gsl.report.style import COMMAND, figure, headline, look, method_colour, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-COLOURS = (GAT, SGAT, EFFECTS)
 
 
 class Curve(NamedTuple):
@@ -45,7 +43,8 @@ def noise_curve_figure(curves: Mapping[str, Curve], exact: Mapping[str, Sequence
             axes.plot(noises, values, color=COMMAND, linewidth=1.2, linestyle=(0, (5, 3)), zorder=4)
             middle = int(0.45 * len(noises))
             axes.annotate(name, (noises[middle], values[middle]), (8, 8), textcoords="offset points", color=COMMAND)
-        for colour, (name, curve) in zip(COLOURS, curves.items(), strict=False):
+        for name, curve in curves.items():
+            colour = method_colour(name)
             means = [one.mean for one in curve.found]
             bounds = np.array([(one.lower, one.upper) for one in curve.found]).T
             axes.plot(noises, means, "o-", color=colour, markersize=4)

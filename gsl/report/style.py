@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,12 +16,7 @@ if TYPE_CHECKING:
 
 REAL, SIMULATION, GROUNDED = "#d55e00", "#0072b2", "#009e73"  # Okabe and Ito 2008
 COMMAND, QUIET, INK = "#8c8c8c", "#d0d0d0", "#222222"
-UNINFORMED, GAT, SGAT, EFFECTS = (
-    COMMAND,
-    SIMULATION,
-    GROUNDED,
-    REAL,
-)  # methods: the first know nothing of the real robot
+UNINFORMED, GAT, SGAT, EFFECTS = COMMAND, SIMULATION, GROUNDED, REAL  # the first know nothing of the real robot
 WIDTH, DPI = 10.0, 160  # [in], [1/in]: 1600 pixels
 
 _SETTINGS: Any = {
@@ -41,6 +37,11 @@ _SETTINGS: Any = {
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
 }
+
+
+def method_colour(name: str) -> str:
+    """Return the colour of a method by the first word of its name, the same in all figures."""
+    return {"gat": GAT, "sgat": SGAT, "effects": EFFECTS, "ane": QUIET}.get(re.split("[ _]", name)[0], UNINFORMED)
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-APART = (0.0, 0.13, -0.13, 0.26, -0.26)  # of dots that would cover each other, in rows
+APART, WIDEST = 0.13, 0.3  # of dots that would cover each other, and of all of them from their row, in rows
 CLOSE = 0.015  # of the range of all values
 
 
@@ -73,8 +72,8 @@ def _draw(axes: Axes, methods: Mapping[str, Dots], close: float) -> None:
 
 def _apart(values: np.ndarray, close: float) -> np.ndarray:
     """Return how far each dot is moved out of its row, shape (n,), so that those at one place are all seen."""
-    order, moved, alike = np.argsort(values, kind="stable"), np.zeros(len(values)), 0
-    for before, index in pairwise(order):
-        alike = alike + 1 if values[index] - values[before] <= close else 0
-        moved[index] = APART[alike % len(APART)]
+    order, moved = np.argsort(values, kind="stable"), np.zeros(len(values))
+    for alike in np.split(order, np.flatnonzero(np.diff(values[order]) > close) + 1):
+        wide = min(0.5 * APART * (len(alike) - 1), WIDEST)
+        moved[alike] = np.linspace(-wide, wide, len(alike))
     return moved

@@ -86,6 +86,9 @@ class Iterate:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run the iterations, write the policy they end with, the table and the plots."""
+        if self.aggregate and not (self.learned and self.iterations > 1):
+            problem = "is for a grounding that learns from real trajectories, in two iterations or more"
+            raise ConfigError("aggregate", problem, given="true")
         self.chain.check(self.grounding)
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
         with console.live_table(in_unit("grounded simulation learning", self.task.unit), rounds.columns) as table:

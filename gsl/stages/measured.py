@@ -70,8 +70,7 @@ def ended(one: Mapping[str, Any], unit: Unit) -> str:
 
 def cells(one: Mapping[str, Any], name: str, unit: Unit) -> list[str]:
     """Return a row for people; a policy that stopped at its fall has no interval."""
-    low, high = (unit.factor * bound for bound in one["interval"])
-    interval = f"{low:.1f} to {high:.1f}" if np.isfinite(high) and not one["falls"] else ""
+    interval = unit.interval(one["interval"]) if np.isfinite(one["interval"]).all() and not one["falls"] else ""
     simulated = "" if one["value_sim"] is None else unit.bare(one["value_sim"])
     outcome = [f"{value:.1f}" for value in one["outcome"].values()]
     return [name, simulated, unit.bare(one["value"]), interval, ended(one, unit), *outcome]

@@ -245,8 +245,9 @@ def worth(trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
 
 def _best_noise(found: Sequence[Summary], world: str) -> tuple[str, str]:
     noisy = [one for one in found if one.world == world and one.method.startswith("ane") and one.improvement]
-    best = max(noisy, key=lambda one: one.improvement.mean if one.improvement else 0.0, default=None)
-    return world, best.method if best else ""
+    if len(noisy) < 2:
+        return world, ""  # nothing was chosen
+    return world, max(noisy, key=lambda one: one.improvement.mean if one.improvement else 0.0).method
 
 
 def _improvement(one: Summary) -> tuple[str, str]:

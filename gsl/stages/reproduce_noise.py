@@ -16,6 +16,7 @@ from gsl.console import Console
 from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
 from gsl.core.statistics import mean_interval
+from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
@@ -76,6 +77,11 @@ class NoiseStudy:
     )
     workers: Workers = -1
     known: Known = None
+
+    def __post_init__(self) -> None:
+        """Refuse what only several iterations know."""
+        if self.iterate.aggregate:
+            raise ConfigError("iterate.aggregate", "is for several iterations; a trial here has one", given="true")
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -194,14 +200,14 @@ class NoiseStudy:
         rows = []
         for world, noise in self._places:
             values = {method: np.array(self._values(points, world, noise, method)) for method in self.methods}
-            widest = max(noisy, key=lambda name: values[name].mean(), default=None)
-            others = [name for name in ("none", widest) if name in values]
+            best = max(noisy, key=lambda name: values[name].mean(), default=None)
+            others = [name for name in ("none", best) if name in values]
             found = (mean_interval(values[name] - values[other]) for other in others for name in learned)
             told = (f"{one.mean:+.0f} ({one.lower:+.0f} to {one.upper:+.0f})" for one in found)
-            rows.append((world, f"{noise:g}", *told, *([self._shown[widest]] if widest else [])))
+            rows.append((world, f"{noise:g}", *told, *([self._shown[best]] if best else [])))
         others = [*(["none"] if "none" in self.methods else []), *(["best ane"] if noisy else [])]
         titles = [f"{name} - {other}" for other in others for name in learned]
-        below = "Paired differences with 95 % intervals; the best width of action noise is known only afterwards."
+        below = "Paired differences with 95 % intervals, which know nothing of the choice of the best width."
         return [markdown(("real world", "noise", *titles, *(["best ane"] if noisy else [])), rows), below, ""]
 
     def _spent(self, points: Sequence[Point], world: str, noise: float) -> str:

@@ -19,7 +19,7 @@ from gsl.worlds.world import World
 TRIED = 2  # rollouts of π0 in each world, after one that compiles
 LEARNED = 1.4  # how much longer a rollout takes with a learned grounding
 APART = 25.0  # of a learned grounding: fits and checks [s]
-DIAGNOSED = {"diagnose": 240.0, "identify": 60.0}  # of a log in the air, on two cores [s]
+DIAGNOSED = {"diagnose": 7.5, "identify": 2.0}  # of a second of motion in the air, on two cores [s]
 
 
 def seconds(study: Compare) -> float:
@@ -42,15 +42,16 @@ def seconds(study: Compare) -> float:
     rolled = fitted = 0.0
     for method in study.methods.values():
         learned = isinstance(innermost(method), ActionTransformation)
-        apart = learned or isinstance(method, DiagnosedEffects)
+        apart = learned or (isinstance(method, DiagnosedEffects) and not method.effects)
         searches = rounds if apart else rounds - worlds + 1  # what knows no world searches first for all of them
         rolled += searches * searched * sim * (LEARNED if learned else 1.0) + rounds * measured * real
-        rolled += (searches if apart else 1) * Values.count * sim if study.rank else 0.0
+        rolled += (worlds if apart else 1) * Values.count * sim if study.rank else 0.0
         if learned:
             rolled += rounds * (collected[0] * real + collected[1] * sim)
             fitted += rounds * APART
     flights = {one.method for one in study.methods.values() if isinstance(one, DiagnosedEffects) and not one.effects}
-    fitted += worlds * sum(DIAGNOSED[method] for method in flights)
+    flown = len(iterate.diagnosis.excitation.motions) * iterate.diagnosis.excitation.duration if flights else 0.0
+    fitted += worlds * flown * sum(DIAGNOSED[method] for method in flights)
     return (rolled / workers + fitted) * study.trials * len(sims)
 
 

@@ -34,6 +34,7 @@ from gsl.stages.training import (
     data_file,
     degrees,
     degrees_by_joint,
+    earlier_batch,
     explained,
     of_policy,
     parts,
@@ -84,7 +85,8 @@ class TrainForward:
         """Write the model and the trajectories it has not seen."""
         path = data_file(self.data)
         newest = parts(path, other=SIM, share=self.heldout, seed=self.seed)
-        data = aggregated(newest, [data_file(one) for one in self.earlier])
+        earlier = {one: earlier_batch(one, newest.training) for one in map(data_file, self.earlier)}
+        data = aggregated(newest, list(earlier.values()))
         console.status(f"fitting a forward model to {len(data.training)} trajectories")
         base = None if self.residual_to is None else self._simulator(self.residual_to, data.training)
         if data.training.states:
@@ -92,7 +94,8 @@ class TrainForward:
             return forward_of_states(folder, data, self.model, self.seed)
         if self.model.covariance == "full":
             raise ConfigError("model.covariance", "full is for a gymnasium environment; robots' joints are drawn alone")
-        self._check(path, data)
+        for file, batches in {path: newest, **{one: [batch] for one, batch in earlier.items()}}.items():
+            self._check(file, batches)
         model, choice = fitted(self.model, data, self.seed, base)
         write_model(folder, model)
         own = [one for part in data for one in of_policy(part, pi0=True)]
@@ -122,9 +125,9 @@ class TrainForward:
             raise ConfigError("model", f"{problem}; say model.history and model.horizon alike")
         return base
 
-    def _check(self, path: Path, data: Parts) -> None:
+    def _check(self, path: Path, batches: Sequence[Batch]) -> None:
         try:
-            for part in data:
+            for part in batches:
                 long = checked(path, part.episodes, shortest(self.model.of_body, self.model.horizon))
                 _rows(self.model, long)
         except KeyError as error:

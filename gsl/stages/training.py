@@ -71,26 +71,33 @@ def parted(batch: Batch, share: float, seed: int) -> Parts:
     return Parts(*_split(rest, share, rng), heldout)
 
 
-def aggregated(data: Parts, earlier: Sequence[Path]) -> Parts:
-    """Add the trajectories of earlier policies to those that models learn from; the other parts stay the newest's.
+def earlier_batch(path: Path, newest: Batch) -> Batch:
+    """Read the real trajectories of an earlier policy.
 
     Raises:
-        TrajectoryError: A file breaks the contract, or is of another robot, rate or role.
+        TrajectoryError: The file breaks the contract, is simulated, or of another robot or rate than the newest ones.
     """
+    batch = read(path)
+    if batch.metadata.get("role") == SIM:
+        raise TrajectoryError(path, f"was recorded with role={SIM}; a forward model learns the real robot")
+    for what, one, other in (
+        ("of another robot", batch.metadata["robot"], newest.metadata["robot"]),
+        ("of other joints", batch.joints, newest.joints),
+        ("of another number of states", batch.states, newest.states),
+        ("of another control period", batch.control_period, newest.control_period),
+    ):
+        if one != other:
+            raise TrajectoryError(path, f"is {what} than the newest trajectories: {one}, not {other}")
+    return batch
+
+
+def aggregated(data: Parts, earlier: Sequence[Batch]) -> Parts:
+    """Add the trajectories of earlier policies to those that models learn from; the other parts stay the newest's."""
     if not earlier:
         return data
     training = data.training
     episodes, entries = list(training.episodes), [{"policy": label} for label in labels(training)]
-    for path in earlier:
-        batch = read(path)
-        for what, one, other in (
-            ("of other joints", batch.joints, training.joints),
-            ("of another number of states", batch.states, training.states),
-            ("of another control period", batch.control_period, training.control_period),
-            ("of another world", batch.metadata.get("role"), training.metadata.get("role")),
-        ):
-            if one != other:
-                raise TrajectoryError(path, f"is {what} than the newest trajectories: {one}, not {other}")
+    for batch in earlier:
         episodes += batch.episodes
         entries += [{"policy": f"earlier_{label}"} for label in labels(batch)]
     metadata = {**training.metadata, "episodes": entries}

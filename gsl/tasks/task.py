@@ -51,6 +51,8 @@ class Task(Protocol):
         duration: Planned length of an episode [s]; infinite where the world ends it.
         unit: Of a value as people are shown it.
         shown: What a value is multiplied by to be in that unit.
+
+    Where an episode may end in another way than by a fall, `falls: ClassVar[bool] = False` has none reported.
     """
 
     @property

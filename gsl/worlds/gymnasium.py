@@ -8,13 +8,10 @@ from __future__ import annotations
 
 import importlib
 import logging
-import re
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import field
 from functools import cached_property, partial
-from pathlib import Path
 from typing import Annotated, Any
 
 import gymnasium
@@ -195,7 +192,7 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
     """
     make = _maker(name)
     try:
-        with without_remarks(), _of_gymnasium_in_the_log():
+        with without_remarks(), _without_gymnasiums_warnings():
             env = make(**kwargs)
     except gymnasium.error.DependencyNotInstalled as error:
         raise ConfigError("env_id", f"{_line(error)}; MuJoCo's are in gsl[mujoco]", given=name) from error
@@ -209,6 +206,8 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
         raise ConfigError("kwargs", f"{name} {told}", given=str(dict(kwargs))) from error
     if not isinstance(env, gymnasium.Env):
         raise ConfigError("env_id", "is no gymnasium.Env", given=name)
+    if env.spec and env.spec.id not in name:
+        _log.info("%s is %s", name, env.spec.id)
     for lacking in ("observation_space", "action_space"):
         if not isinstance(getattr(env, lacking, None), gymnasium.Space):
             raise ConfigError("env_id", f"has no {lacking}", given=name)
@@ -218,7 +217,7 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
 def _maker(name: str) -> Callable[..., Any]:
     place, separator, attribute = name.partition(":")
     if not separator or not attribute.isidentifier():
-        with suppress(Exception), _of_gymnasium_in_the_log():  # what is wrong with it, gymnasium will tell
+        with suppress(Exception), _without_gymnasiums_warnings():  # what is wrong with it, gymnasium will tell
             importlib.import_module(str(gymnasium.spec(name).entry_point).partition(":")[0])
         return partial(gymnasium.make, name, disable_env_checker=True)
     try:
@@ -231,16 +230,14 @@ def _maker(name: str) -> Callable[..., Any]:
 
 
 @contextmanager
-def _of_gymnasium_in_the_log() -> Iterator[None]:
-    """Have gymnasium's own warnings, of an id without a version, say, in the log; others stay warnings."""
-    with warnings.catch_warnings(record=True) as remarks:
-        warnings.simplefilter("always")
+def _without_gymnasiums_warnings() -> Iterator[None]:
+    """Have gymnasium say nothing of a registered id; it would with every environment that is made."""
+    before = gymnasium.logger.min_level
+    gymnasium.logger.min_level = gymnasium.logger.ERROR
+    try:
         yield
-    for remark in remarks:
-        if Path(remark.filename).is_relative_to(Path(gymnasium.__file__).parent):
-            _log.info("gymnasium: %s", re.sub(r"\x1b\[\d+m", "", str(remark.message)).removeprefix("WARN: "))
-        else:
-            warnings.warn_explicit(remark.message, remark.category, remark.filename, remark.lineno)
+    finally:
+        gymnasium.logger.min_level = before
 
 
 def _line(error: Exception) -> str:
