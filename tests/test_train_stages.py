@@ -100,9 +100,7 @@ def test_earlier_trajectories_are_of_the_same_robot_and_not_those_that_are_held_
     other = tmp_path / "other.parquet"
     batch = a_batch(SLOW, "real", pi0=2, others=2)
     write(other, replace(batch, metadata={**batch.metadata, "robot": "crane"}))
-    with pytest.raises(
-        TrajectoryError, match=r"other\.parquet: is of another robot than .*: crane"
-    ):
+    with pytest.raises(TrajectoryError, match=r"other\.parquet: is of another robot than .*: crane"):
         TrainForward(data=real, model=LINEAR, earlier=(str(other),)).run(tmp_path, QUIET)
 
 
