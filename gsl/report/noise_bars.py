@@ -58,7 +58,7 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str)
                 label = reference if place == 0 else None
                 axes.hlines(mean, place - 0.45, place + 0.45, color=REAL, linestyle="--", linewidth=1.4, label=label)
             axes.set_xticks(places, [f"{noise:g}" for noise in bars.noises])
-            axes.set_xlabel("standard deviation of the real world's action noise [half ranges]")
+            axes.set_xlabel("sd of action noise in real [half ranges]")
             axes.set_ylabel("return in real")
             axes.set_title(name, loc="left", fontsize=10.5)
         whole.legend(*axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9)
