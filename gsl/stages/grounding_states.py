@@ -45,8 +45,16 @@ class ValueReport:
         if self.problems:
             return "with the grounding π0 is surely farther from what it is worth in real"
         if self._surely_nearer("grounded", "ungrounded"):
-            return "with the grounding π0 is surely nearer to what it is worth in real"
+            return f"with the grounding π0 is surely nearer to what it is worth in real{self._left}"
         return "π0 does not tell whether this grounding is nearer to real: the search goes on with it"
+
+    @property
+    def _left(self) -> str:
+        """What the grounding leaves of the gap, as far as that is sure; a search makes use of it."""
+        left = difference_interval(self.values["grounded"], self.values["real"])
+        if left.lower > 0.0 or left.upper < 0.0:
+            return f", and still surely worth {'more' if left.lower > 0.0 else 'less'} in it"
+        return ""
 
     def _surely_nearer(self, one: str, other: str) -> bool:
         """Whether π0 is nearer in one simulator to what it is worth in real than in another, by both intervals."""
