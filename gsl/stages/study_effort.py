@@ -39,19 +39,21 @@ def seconds(study: Compare) -> float:
     measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
     collected = budget.real_episodes + budget.real_neighbours, budget.sim_episodes + budget.sim_neighbours
     rounds, worlds = iterate.iterations * len(study.worlds), len(study.worlds)
+    flights = {
+        name: one.method for name, one in study.methods.items() if isinstance(one, DiagnosedEffects) and not one.effects
+    }
     rolled = fitted = 0.0
-    for method in study.methods.values():
+    for name, method in study.methods.items():
         learned = isinstance(innermost(method), ActionTransformation)
-        apart = learned or (isinstance(method, DiagnosedEffects) and not method.effects)
+        apart = learned or name in flights
         searches = rounds if apart else rounds - worlds + 1  # what knows no world searches first for all of them
         rolled += searches * searched * sim * (LEARNED if learned else 1.0) + rounds * measured * real
         rolled += (worlds if apart else 1) * Values.count * sim if study.rank else 0.0
         if learned:
             rolled += rounds * (collected[0] * real + collected[1] * sim)
             fitted += rounds * APART
-    flights = {one.method for one in study.methods.values() if isinstance(one, DiagnosedEffects) and not one.effects}
     flown = len(iterate.diagnosis.excitation.motions) * iterate.diagnosis.excitation.duration if flights else 0.0
-    fitted += worlds * flown * sum(DIAGNOSED[method] for method in flights)
+    fitted += worlds * flown * sum(DIAGNOSED[method] for method in set(flights.values()))
     return (rolled / workers + fitted) * study.trials * len(sims)
 
 

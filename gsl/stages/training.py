@@ -54,10 +54,7 @@ def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
     Raises:
         TrajectoryError: The file breaks the contract, is of the other world or holds fewer than three trajectories.
     """
-    batch = read(path)
-    if batch.metadata.get("role") == other:
-        wanted = "a forward model learns the real robot" if other == SIM else "an inverse model learns the simulator"
-        raise TrajectoryError(path, f"was recorded with role={other}; {wanted}")
+    batch = _of_role(path, other)
     _check_joints(path, batch)
     if len(batch) < 3:
         raise TrajectoryError(path, f"holds {len(batch)} episodes; three are the least: to fit, to stop, to hold out")
@@ -77,17 +74,15 @@ def earlier_batch(path: Path, newest: Batch) -> Batch:
     Raises:
         TrajectoryError: The file breaks the contract, is simulated, or of another robot or rate than the newest ones.
     """
-    batch = read(path)
-    if batch.metadata.get("role") == SIM:
-        raise TrajectoryError(path, f"was recorded with role={SIM}; a forward model learns the real robot")
-    for what, one, other in (
+    batch = _of_role(path, other=SIM)
+    for what, one, wanted in (
         ("of another robot", batch.metadata["robot"], newest.metadata["robot"]),
         ("of other joints", batch.joints, newest.joints),
         ("of another number of states", batch.states, newest.states),
         ("of another control period", batch.control_period, newest.control_period),
     ):
-        if one != other:
-            raise TrajectoryError(path, f"is {what} than the newest trajectories: {one}, not {other}")
+        if one != wanted:
+            raise TrajectoryError(path, f"is {what} than the newest trajectories: {one}, not {wanted}")
     return batch
 
 
@@ -102,6 +97,15 @@ def aggregated(data: Parts, earlier: Sequence[Batch]) -> Parts:
         entries += [{"policy": f"earlier_{label}"} for label in labels(batch)]
     metadata = {**training.metadata, "episodes": entries}
     return data._replace(training=replace(training, episodes=tuple(episodes), metadata=metadata))
+
+
+def _of_role(path: Path, other: str) -> Batch:
+    """Read trajectories of a world that has not played the `other` role."""
+    batch = read(path)
+    if batch.metadata.get("role") == other:
+        wanted = "a forward model learns the real robot" if other == SIM else "an inverse model learns the simulator"
+        raise TrajectoryError(path, f"was recorded with role={other}; {wanted}")
+    return batch
 
 
 def _check_joints(path: Path, batch: Batch) -> None:
