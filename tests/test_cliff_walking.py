@@ -33,7 +33,7 @@ def the_cliff(noise: float = 0.0) -> Table:
 
 
 @pytest.mark.parametrize("noise", EDGE)
-def test_exact_values_are_those_of_the_paper(noise: float) -> None:
+def test_exact_values_are_those_that_were_measured_beforehand(noise: float) -> None:
     real = the_cliff(noise)
     along_the_edge = the_cliff().solved(np.full(48, DOWN))
     assert real.value(along_the_edge) == pytest.approx(EDGE[noise], abs=0.01)
@@ -141,6 +141,15 @@ def test_figure_11_is_one_command(tmp_path: Path) -> None:
     assert all(abs(one["estimate"] - one["value"]) < 3.0 for one in points)
     assert (folder / "figure_11.png").stat().st_size > 10_000
     assert "real optimum" in said.out
+
+
+def test_the_command_of_the_docs_finds_the_safe_path(tmp_path: Path) -> None:
+    done("iterate", "experiment=cliff_walking", "name=cliff", "workers=1", folder=tmp_path)
+    metrics = json.loads((tmp_path / "runs/cliff/iterate/metrics.json").read_text())
+    assert metrics["gain"]["interval"][0] > 0.0
+    returned = json.loads((tmp_path / "runs/cliff/iterate/policies.json").read_text())["policies"][-1]
+    found = the_cliff(0.5).value(np.array(returned["parameters"], dtype=int))
+    assert found > 0.85 * BEST[0.5] > EDGE[0.5]
 
 
 def test_the_chain_of_stages_grounds_the_cliff(tmp_path: Path) -> None:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import pytest
 
 from gsl.stages.comparison import differences, orders, summaries
-from gsl.stages.comparison_table import markdown, rows
+from gsl.stages.comparison_table import markdown
+from gsl.stages.headline import Unit
 from gsl.stages.trial import Cell, Trial
+from gsl.tasks.own_reward import OwnReward
+from gsl.tasks.walk import Walk
 
 
 def _trial(method: str, number: int, gain: float, generation: int, stable: int = 3, falls: int = 0) -> Trial:
@@ -62,9 +65,17 @@ def test_winners_are_counted_over_all_trials() -> None:
 
 
 def test_the_tables_show_every_method_and_every_trial() -> None:
-    text = markdown(summaries(TRIALS), TRIALS)
-    assert "20.0, 10.0" in text and "0.0*, -5.0*" in text and "gat - none" in text
-    assert len(rows(summaries(TRIALS))) == 2
+    text = markdown(summaries(TRIALS), TRIALS, Unit.of(Walk))
+    assert "20.0, 10.0" in text and "0.0*, -5.0*" in text
+    assert "| nao_worn | gat - none | +17.5 |" in text and "falls in fresh episodes" in text
+    assert "| nao_worn | gat | 28.7 (" in text  # cm/s
+
+
+def test_without_falls_and_percentages_the_tables_tell_returns() -> None:
+    trials = [trial._replace(improvement=None) for trial in TRIALS]
+    text = markdown(summaries(trials), trials, Unit.of(OwnReward))
+    assert "falls" not in text and "stable winners" not in text
+    assert "| nao_worn | gat | 0.30, 0.28 |" in text and "| nao_worn | gat - none | +0.04 |" in text
 
 
 def test_an_order_is_claimed_by_a_signed_rank_test_over_trials_with_holms_correction() -> None:

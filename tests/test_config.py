@@ -83,7 +83,8 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
         ),
         (
             ["experiment=lng"],
-            "no experiment called lng; did you mean long? There is arm, cliff_walking, gymnasium, linear_walk, long",
+            "no experiment called lng; did you mean long? There is arm, cliff_walking, environments, gymnasium, "
+            "linear_walk, long",
         ),
         (["episodes=four"], "episodes = four: must be a whole number"),
         (["episodes=-1"], "episodes = -1: must be above 0"),
@@ -228,12 +229,19 @@ def _choices() -> Iterator[tuple[str, ...]]:
         ]
         found = [_typed(next(iter(entry)).lstrip("/"), conf, command.stem) for entry in groups]
         for number in range(max(map(len, found), default=0)):
-            chosen = (typed[min(number, len(typed) - 1)] for typed in found)
+            chosen = (typed[min(number, len(typed) - 1)] for typed in found if typed)
             yield command.stem.replace("_", "-"), *chosen, *NEEDED.get(command.stem, ())
     experiments = sorted(option.stem for option in (conf / "experiment").glob("*.yaml"))
     cart = ("sim.env_id=examples.cart:Cart", "real.env_id=examples.cart:Cart")
     for name in experiments:
-        yield "iterate", f"experiment={name}", *(cart if name == "gymnasium" else ())
+        if name == "environments":
+            yield (
+                "compare",
+                f"experiment={name}",
+                *(f"{place}.env_id=CartPole-v1" for place in ("iterate.sim", "worlds.real")),
+            )
+        else:
+            yield "iterate", f"experiment={name}", *(cart if name == "gymnasium" else ())
     for grounding in ("none", "ane", "gat", "sgat"):
         yield "iterate", "experiment=gymnasium", f"grounding={grounding}", *cart
     for command in ("collect world", "evaluate world", "iterate real"):
@@ -256,7 +264,7 @@ def _typed(group: str, conf: Path, command: str) -> list[str]:
     if role.endswith("excitation"):  # the policy that a diagnosis plays
         return [f"{role}=excitation"]
     if command in ("reproduce_fig11", "reproduce_fig12", "reproduce_fig13", "reproduce_garat"):
-        return []
+        return [f"{folder}={name}" for name in ("toy", "study")] if folder == "preset" else []
     mine = (name for name in found if name not in OF_ENVIRONMENTS.get(folder, ()))
     robots = (name for name in mine if folder != "world" or name.startswith("nao"))
     return [f"{role or folder}={name}" for name in robots if name != "excite" or command == "collect"]

@@ -31,7 +31,7 @@ from gsl.models.states import NearestChoice, StateForward, StateInverse
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.mlp import Mlp
 from gsl.policies.policy import sized
-from gsl.stages.grounding_states import ValueReport, value_report
+from gsl.stages.grounding_states import ValueReport, uncharged, value_report
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.simulator import GroundedSimulator
 from gsl.stages.train_states import forward_of_states, inverse_of_states
@@ -62,6 +62,13 @@ class Strange(gymnasium.Env):
         state = np.zeros(self.observation_space.shape)  # type: ignore[arg-type]
         state[1] = self.value
         return state, self.reward, False, False, {}
+
+
+class PlainCost:
+    """Tells a cost, but no settings."""
+
+    def cost(self, action: np.ndarray) -> float:
+        return 0.0
 
 
 class Nothing(gymnasium.Env):
@@ -358,6 +365,25 @@ def test_the_example_of_the_docs_wins_by_its_grounding(tmp_path: Path) -> None:
     assert metrics["returned"]["value"] > metrics["ungrounded"]["returned"]["value"]
 
 
+def test_groundings_of_environments_are_compared(tmp_path: Path) -> None:
+    worlds = ("iterate.sim.env_id=examples.cart:Cart", "worlds.real.env_id=examples.cart:Cart")
+    search = ("optimizer@iterate.optimizer=cma_es", "iterate.policy.hidden=[]", "iterate.optimizer.sigma=0.5")
+    few = ("trials=2", "preset=toy", "~methods.ane_02", "~methods.ane_05", "~methods.sgat")
+    few += tuple(f"iterate.budget.{name}=4" for name in ("real_episodes", "sim_episodes", "episodes", "confirmation"))
+    slope = ("worlds.real.kwargs={slope: 2.0}", "iterate.workers=1")
+    said = done("compare", "experiment=environments", "name=e", *few, *worlds, *slope, *search, folder=tmp_path)
+    home = tmp_path / "runs/e"
+    collected = (home / "real/gat/trial_01/collect_real/config.yaml").read_text()
+    assert "initial: runs/e/sim/pretrained/trial_01/best_in_simulation.json" in collected
+    trials = json.loads((home / "compare/trials.json").read_text())
+    assert [(one["method"], one["number"]) for one in trials] == [("none", 1), ("gat", 1), ("none", 2), ("gat", 2)]
+    assert trials[0]["start"] == trials[1]["start"]  # the same π0, in the same episodes
+    assert "falls" not in said.out and "stable winners" not in said.out
+    other = ("+world@worlds.other=gymnasium", "worlds.other.env_id=CartPole-v1")
+    said = refused("compare", "experiment=environments", *few, *worlds, *search, *other, folder=tmp_path)
+    assert said == "real: has 4 states, the simulator 2; a policy must fit both"
+
+
 def test_the_check_of_pi0_is_with_the_noise_of_the_real_episodes() -> None:
     policy = a_policy(CART)
     real = episodes(CART, 30, 0.8).episodes
@@ -435,7 +461,28 @@ def test_an_environment_that_breaks_is_one_line(wrong: str, line: str) -> None:
         env.step(np.zeros(1))
 
 
+def test_a_setting_without_settings_of_its_own_is_refused(tmp_path: Path) -> None:
+    cost = f"world.control_cost={{_target_: {__name__}.PlainCost}}"
+    place = ("world=gymnasium", "world.env_id=examples.cart:Cart", "task=own_reward", "policy=mlp", "role=sim")
+    said = refused("collect", *place, cost, "episodes=3", "neighbours=0", folder=tmp_path)
+    assert said.startswith("_target_ = PlainCost: is no dataclass") and said.endswith("put @dataclass above it")
+
+
+def test_too_few_episodes_are_refused_before_anything_is_collected(tmp_path: Path) -> None:
+    place = ("sim.env_id=examples.cart:Cart", "real.env_id=examples.cart:Cart", "optimizer=cma_es")
+    said = refused("iterate", "experiment=gymnasium", *place, "recipe.real_episodes=2", folder=tmp_path)
+    assert said.startswith("budget.real_episodes: 2 episodes with neighbours; 3 are the least for a model")
+
+
+def test_environments_that_charge_nothing_are_known() -> None:
+    pytest.importorskip("mujoco")
+    told = ("InvertedPendulum-v5", "InvertedDoublePendulum-v5", "HalfCheetah-v5", "Pendulum-v1", "examples.cart:Cart")
+    assert [uncharged(GymnasiumWorld(env_id=name)) for name in told] == [False, False, False, True, False]
+
+
 def test_worlds_that_no_policy_fits_both_of_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"real: takes actions of -2 to 2, the simulator of -1 to 1;"):
+        check_alike(CART.layout, replace(CART.layout, ranges=((-2.0, 2.0),)))
     with pytest.raises(ConfigError, match="real: has 4 states, the simulator 2"):
         check_alike(CART.layout, POLE.layout)
     with pytest.raises(ConfigError, match=r"real: acts every 0\.05 s, the simulator every 0\.02 s"):
@@ -528,6 +575,23 @@ def test_figure_12_is_one_command(tmp_path: Path) -> None:
     assert not list((tmp_path / "runs/again").rglob("trial_01"))
 
 
+@pytest.mark.parametrize(("figure", "worlds"), [("fig13", 2), ("garat", 3)])
+def test_the_other_studies_of_environments_are_one_command(figure: str, worlds: int, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    pytest.importorskip("sb3_contrib")
+    few = ("trials=1", "workers=1", "iterate.budget.real_episodes=3", "iterate.budget.sim_episodes=3", "~methods.sgat")
+    few += ("iterate.budget.episodes=1", "iterate.budget.rollouts=1")
+    left = ("noises=[0.6]", "~methods.ane_02", "~methods.ane_06") if figure == "fig13" else ("~methods.ane",)
+    done("reproduce", figure, "preset=toy", *few, *left, folder=tmp_path)
+    folder = tmp_path / f"runs/{figure}/reproduce"
+    points = json.loads((folder / "points.json").read_text())
+    assert [one["method"] for one in points] == ["none", "gat", "trained on real"] * worlds
+    assert all(one["real_steps"] > 0 and np.isfinite(one["promised"]) for one in points if one["method"] != "none")
+    table = (folder / "table.md").read_text()
+    assert "±" not in table.splitlines()[2] and " -> " in table  # one trial has no standard error
+    assert (folder / "figure.png").stat().st_size > 10_000
+
+
 def test_figure_12_goes_on_with_a_search_instead(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("sb3_contrib")
@@ -592,10 +656,10 @@ def test_help_is_of_the_world_that_is_typed(tmp_path: Path) -> None:
     ("real", "grounded", "line"),
     [
         ([-50.0, -51.0, -52.0], -50.5, "surely nearer to what it is worth in real"),
-        ([-50.0, -51.0, -52.0], -45.5, "worth in real, and still surely worth more in it"),
-        ([-50.0, -51.0, -52.0], -56.5, "worth in real, and still surely worth less in it"),
+        ([-50.0, -51.0, -52.0], -45.5, "worth in real, and π0 is still surely worth more in it"),
+        ([-50.0, -51.0, -52.0], -56.5, "worth in real, and π0 is still surely worth less in it"),
         ([-20.0, -21.0, -22.0], -50.5, "surely farther"),
-        ([-50.0, -20.0, -30.0], -35.0, "does not tell"),
+        ([-50.0, -20.0, -30.0], -35.0, "held-out real episodes do not tell"),
         ([-50.0], -50.5, "is no measure"),
     ],
 )
@@ -604,3 +668,10 @@ def test_a_check_says_whether_a_grounding_is_nearer(real: list[float], grounded:
     values = {"real": np.array(real), "grounded": grounded + around, "ungrounded": around - 20.0}
     told = ValueReport(values, values).told
     assert line in told and ("still" in told) == ("still" in line)
+
+
+def test_values_that_are_all_alike_are_not_taken_for_certain() -> None:
+    seldom = np.repeat([1.0, 0.0], [5, 195])  # ten zeros are the rule there
+    found = ValueReport(dict.fromkeys(("grounded", "ungrounded"), np.zeros(10)) | {"real": seldom}, {})
+    assert "200 held-out real episodes do not tell" in found.told
+    assert "still" not in found.told

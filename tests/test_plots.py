@@ -84,7 +84,7 @@ def test_a_learning_curve_shows_values_and_falls() -> None:
 
 def test_a_learning_curve_tells_what_it_shows() -> None:
     figure = learning_curve_figure([SEARCH, Search("no grounding", SEARCH.points)], unit="cm/s")
-    assert figure.get_suptitle() == "Of 4 generation winners 2 stay on their feet in real, 2 beat their start"
+    assert figure.get_suptitle() == "Of 4 generation winners 2 stay on their feet in real, 2 are above their start"
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["iteration 1", "no grounding"]
     assert learning_curve_figure([SEARCH], unit="cm/s", title="mine").get_suptitle() == "mine"
 

@@ -12,10 +12,15 @@ from gsl.core.validation import make
 from gsl.errors import ConfigError
 
 _OURS = "gsl"
+_PLAIN = {"builtins", "numpy", "pathlib"}
 
 
 def described(thing: Any) -> Any:
-    """Return a component's settings with its class under `_target_`, its components likewise; plain data as it is."""
+    """Return a component's settings with its class under `_target_`, its components likewise; plain data as it is.
+
+    Raises:
+        ConfigError: Something is of a class that tells no settings.
+    """
     if is_dataclass(thing) and not isinstance(thing, type):
         kind = type(thing)
         settings = {field.name: described(getattr(thing, field.name)) for field in fields(thing)}
@@ -24,6 +29,9 @@ def described(thing: Any) -> Any:
         return {key: described(value) for key, value in thing.items()}
     if isinstance(thing, list | tuple):
         return [described(value) for value in thing]
+    if type(thing).__module__.partition(".")[0] not in _PLAIN:
+        problem = "is no dataclass, so that its settings, which are part of what it makes, cannot be written down"
+        raise ConfigError("_target_", f"{problem}; put @dataclass above it", given=type(thing).__qualname__)
     return thing
 
 

@@ -21,6 +21,7 @@ class Layout:
         control_period: Time between two actions [s].
         cells: Number of states where the state is the number of one of them, else 0.
         choices: Number of actions where an action is the number of one of them, else 0.
+        ranges: Ends of each action in the environment's own unit, where actions are scaled to -1 to 1.
     """
 
     joints: tuple[str, ...]
@@ -28,6 +29,7 @@ class Layout:
     control_period: float
     cells: int = 0
     choices: int = 0
+    ranges: tuple[tuple[float, float], ...] = ()
 
     def __getitem__(self, part: str) -> slice:
         """Return where a part stands."""
@@ -65,13 +67,18 @@ def check_alike(sim: Layout, real: Layout) -> None:
         ConfigError: They differ.
     """
     for name, ours, theirs in (
-        ("states", sim.states, real.states),
         ("discrete states", sim.cells, real.cells),
+        ("states", sim.states, real.states),
         ("discrete actions", sim.choices, real.choices),
         ("actions", len(sim.joints), len(real.joints)),
     ):
         if ours != theirs:
-            raise ConfigError("real", f"has {theirs} {name}, the simulator {ours}; a policy must fit both")
+            told, other = (count or "no" for count in (theirs, ours))
+            raise ConfigError("real", f"has {told} {name}, the simulator {other}; a policy must fit both")
+    if sim.ranges != real.ranges:
+        here, there = (", ".join(f"{low:g} to {high:g}" for low, high in one.ranges) for one in (sim, real))
+        problem = f"takes actions of {there}, the simulator of {here}; an action must mean the same in both"
+        raise ConfigError("real", f"{problem}: give them one range, and limit it inside of one")
     if abs(sim.control_period - real.control_period) > 1e-9:
         rates = f"acts every {real.control_period:g} s, the simulator every {sim.control_period:g} s"
         raise ConfigError("real", f"{rates}; a change within a step must mean the same in both")

@@ -25,16 +25,29 @@ def mean_interval(values: Sequence[float] | np.ndarray, *, confidence: float = 0
     )
 
 
-def difference_interval(after: np.ndarray, before: np.ndarray, *, confidence: float = 0.95) -> Interval:
-    """Return mean(after) - mean(before) of two independent samples with Welch's t interval."""
+def difference_interval(
+    after: np.ndarray, before: np.ndarray, *, confidence: float = 0.95, pooled: bool = False
+) -> Interval:
+    """Return mean(after) - mean(before) of two independent samples with Welch's t interval.
+
+    Args:
+        after: Shape (n,).
+        before: Shape (m,).
+        confidence: Of the interval.
+        pooled: Whether one variance is taken to be both's (Student's interval).
+    """
     after, before = np.asarray(after, dtype=float), np.asarray(before, dtype=float)
     difference = after.mean() - before.mean()
     if min(len(after), len(before)) < 2:
         return Interval(float(difference), -np.inf, np.inf)
-    shares = np.array([after.var(ddof=1) / len(after), before.var(ddof=1) / len(before)])
+    counts, variances = np.array([len(after), len(before)]), np.array([after.var(ddof=1), before.var(ddof=1)])
+    if pooled:
+        variance = np.average(variances, weights=counts - 1)
+        return _t_interval(difference, variance * np.sum(1.0 / counts), counts.sum() - 2, confidence)
+    shares = variances / counts
     if shares.sum() == 0.0:
         return Interval(float(difference), float(difference), float(difference))
-    freedom = shares.sum() ** 2 / np.sum(shares**2 / (np.array([len(after), len(before)]) - 1))
+    freedom = shares.sum() ** 2 / np.sum(shares**2 / (counts - 1))
     return _t_interval(difference, shares.sum(), freedom, confidence)
 
 

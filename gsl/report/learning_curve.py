@@ -95,8 +95,8 @@ def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str |
     Args:
         searches: Panels from left to right.
         unit: Of all values.
-        title: By default how many of the generations' best stay on their feet in real, if some fall, and beat their
-            start.
+        title: By default how many of the generations' best stay on their feet in real, if some fall, and are above
+            their start.
     """
     with look():
         whole = figure(4.6)
@@ -155,7 +155,7 @@ def _draw(axes: Axes, one: Search) -> None:
     _draw_standing(axes, standing)
     _draw_falls(axes, [point for point in one.points if point.falls])
     if one.confirmed is not None:
-        _draw_confirmed(axes, one.confirmed, last)
+        _draw_confirmed(axes, one.confirmed)
     axes.set_title(one.label, loc="left", fontsize=10.5)
     axes.set_xlabel("generation")
     axes.set_xticks([point.generation for point in one.points])
@@ -163,6 +163,7 @@ def _draw(axes: Axes, one: Search) -> None:
     ends = [(start.real, f"{one.start} in real", COMMAND)]
     ends += [(simulated[-1][1], "best in\nsimulation", SIMULATION)] if simulated else []
     ends += [(standing[-1].real, "the same\nin real", REAL)] if standing and standing[-1].generation > 0 else []
+    ends += [(one.confirmed.real, "chosen,\nmeasured again", INK)] if one.confirmed else []
     label_ends(axes, axes.get_xlim()[1], ends, gap=0.12)
 
 
@@ -190,23 +191,22 @@ def _draw_falls(axes: Axes, fallen: Sequence[Point]) -> None:
     _say(axes, "fell in real", sum(places) / len(places), strip, 9, REAL)
 
 
-def _draw_confirmed(axes: Axes, confirmed: Point, last: int) -> None:
+def _draw_confirmed(axes: Axes, confirmed: Point) -> None:
     place = confirmed.generation + 0.18
     axes.vlines([place], [confirmed.lower], [confirmed.upper], color=INK, linewidth=1.8, zorder=5)
     axes.plot([place], [confirmed.real], "D", color=INK, markersize=6, label="measured again", zorder=6)
-    _say(axes, "measured\nagain", place, confirmed.real, -24, INK, beside=1 if confirmed.generation < last else -1)
 
 
-def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str, *, beside: int = 0) -> None:
-    """Write something above a point, or to the right (1) or left (-1) of it."""
+def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -> None:
+    """Write something above a point."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=3.0, foreground="white")]
     place: dict[str, Any] = {
         "path_effects": halo,
-        "xytext": (8 * beside, above),
+        "xytext": (0, above),
         "textcoords": "offset points",
-        "ha": {-1: "right", 0: "center", 1: "left"}[beside],
+        "ha": "center",
         "fontsize": 9.5,
     }
     axes.annotate(text, (x, y), color=colour, zorder=7, **place)
@@ -217,5 +217,5 @@ def _finding(searches: Sequence[Search]) -> str:
     stable = sum(point.stable for point, _ in winners)
     better = sum(point.stable and point.real > start.real for point, start in winners)
     if stable == len(winners):
-        return f"{better} of {len(winners)} generation winners beat their start in real"
-    return f"Of {len(winners)} generation winners {stable} stay on their feet in real, {better} beat their start"
+        return f"{better} of {len(winners)} generation winners are above their start in real"
+    return f"Of {len(winners)} generation winners {stable} stay on their feet in real, {better} are above their start"

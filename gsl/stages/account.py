@@ -171,7 +171,7 @@ def _compare(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 def _reproduce(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     if "trials" not in metrics:  # figures alone
         figures = ", ".join(sorted(path.name for path in folder.glob("*.png")))
-        return Told("as in the paper", *_markdown(folder / "table.md"), f"figures: {folder.as_posix()}/ ({figures})")
+        return Told("what came out", *_markdown(folder / "table.md"), f"figures: {folder.as_posix()}/ ({figures})")
     below = f"every trial: {folder.as_posix()}/trials.json, tables: {folder.as_posix()}/table.md"
     return Told(f"ours, and the paper's ({metrics['trials']} trials)", *_markdown(folder / "table.md"), below)
 

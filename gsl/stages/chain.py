@@ -21,10 +21,12 @@ from gsl.stages.collect import Collect
 from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.diagnosis_plan import DiagnosisPlan
 from gsl.stages.evaluate import Evaluate
+from gsl.stages.headline import several
 from gsl.stages.link import built
-from gsl.stages.optimize import Optimize
+from gsl.stages.optimize import BEST, Optimize
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import Method, TrainInverse
+from gsl.stages.training import FEWEST, WHY
 from gsl.stages.values import Values
 from gsl.storage.artifact import Artifact
 from gsl.tasks.task import REAL, SIM, Task
@@ -51,6 +53,16 @@ class Budget:
     check: Annotated[int, setting("real episodes the fastest stable policy has to walk without a fall", ge=1)]
     confirmation: Annotated[int, setting("fresh real episodes of the chosen policy", ge=2)]
     tolerated: Annotated[float, setting("share of falls up to which a policy counts as stable", ge=0, le=1)] = 0.0
+
+    @property
+    def real(self) -> tuple[int, int]:
+        """Real episodes of the policy and of its neighbours that models learn from."""
+        return self.real_episodes, self.real_neighbours
+
+    @property
+    def sim(self) -> tuple[int, int]:
+        """The same of the simulator."""
+        return self.sim_episodes, self.sim_neighbours
 
 
 @dataclass(frozen=True)
@@ -81,11 +93,21 @@ class Chain:
         """Refuse what could not be trained, before anything is asked of the real robot.
 
         Raises:
-            ConfigError: A residual of an environment's states.
+            ConfigError: A residual of an environment's states, or too few episodes.
         """
         inner = innermost(grounding)
-        if isinstance(inner, ActionTransformation) and inner.residual and self.sim.layout.states:
+        if not isinstance(inner, ActionTransformation):
+            return
+        if inner.residual and self.sim.layout.states:
             raise ConfigError("grounding.residual", "is for robots; f of an environment's states corrects nothing")
+        for role, count in {REAL: sum(self.budget.real), SIM: sum(self.budget.sim)}.items():
+            if count < FEWEST:
+                problem = f"{several(count, 'episode')} with neighbours; {FEWEST} are the least for a model: {WHY}"
+                raise ConfigError(f"budget.{role}_episodes", problem)
+
+    def pretrained(self, place: Path, seed: int, console: Any) -> str:
+        """Improve the policy's start values in the plain simulator at `place`; return the file of the best."""
+        return str(self.search(place, NoGrounding(), None, seed, console).folder / BEST)
 
     def diagnosed(self, home: Path, grounding: Grounding, seed: int, console: Any) -> Grounding:
         """Return a grounding that has its diagnosis, made below `home` if it wants one of its own."""
@@ -110,10 +132,7 @@ class Chain:
     ) -> ActionTransformation:
         """Collect in both worlds, train both models below `home`, and return the grounding that they make."""
         budget = self.budget
-        counts: dict[Literal["real", "sim"], tuple[int, int]] = {
-            REAL: (budget.real_episodes, budget.real_neighbours),
-            SIM: (budget.sim_episodes, budget.sim_neighbours),
-        }
+        counts: dict[Literal["real", "sim"], tuple[int, int]] = {REAL: budget.real, SIM: budget.sim}
         places = {role: self.shared.get(role, home) for role in counts}
         data = {role: place / f"collect_{role}" for role, place in places.items()}
         for role, (episodes, neighbours) in counts.items():

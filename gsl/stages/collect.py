@@ -95,6 +95,7 @@ class Collect:
             "steps": steps,
             "seconds": steps * layout.control_period,
             "falls": sum(episode.ended_in_a_fall for episode in episodes),
+            "action_noise": self.action_noise,
             "value": None if isinstance(policy, Programmed) else float(np.mean(own)),
         }
 

@@ -8,6 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation
@@ -16,6 +17,7 @@ from gsl.stages.chain import Chain
 from gsl.stages.comparison import summaries
 from gsl.stages.comparison_table import markdown
 from gsl.stages.diagnosis_plan import flown
+from gsl.stages.headline import Unit
 from gsl.stages.iterate import Iterate
 from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.trial import Cell, Trial
@@ -59,7 +61,8 @@ class Compare:
         """Run all trials; write every trial's figures and the tables."""
         found, made = self.carried_out(folder, console)
         summary = summaries(found)
-        (folder / TABLE).write_text(f"{markdown(summary, found)}\n{made}\n", encoding="utf-8")
+        text = markdown(summary, found, Unit.of(self.iterate.task))
+        (folder / TABLE).write_text(f"{text}\n{made}\n", encoding="utf-8")
         return {"trials": self.trials, "summaries": [one._asdict() for one in summary]}
 
     def carried_out(self, folder: Path, console: Any) -> tuple[list[Trial], str]:
@@ -67,6 +70,8 @@ class Compare:
         for grounding in self.methods.values():
             self.iterate.chain.check(grounding)
         home, simulators = folder.parent, self.simulators or {"": self.iterate.sim}
+        for sim, real in product(simulators.values(), self.worlds.values()):
+            check_alike(sim.layout, real.layout)
         ledger = Ledger(home / DATA, self.parents(), Trial._fields, console)
         cells = product(range(1, self.trials + 1), self.methods, simulators, self.worlds)
         for number, method, simulator, world in cells:
@@ -78,7 +83,7 @@ class Compare:
             trials = []
             for trial in self._trial(home, sim, cell, number, console):
                 trials.append(trial)
-                console.status(f"{where}, {method}, trial {number}: {trial.told}")
+                console.status(f"{where}, {method}, trial {number}: {trial.told(Unit.of(self.iterate.task))}")
             ledger.add(key, [trial._asdict() for trial in trials])
         return [Trial(**row) for row in ledger.figures], ledger.close(folder / DATA)
 
@@ -89,13 +94,14 @@ class Compare:
         below = home / cell.simulator
         grounding = chain.diagnosed(below / cell.world / "diagnosis" / name, method, seed, console)
         flight = flown(below / cell.world / "diagnosis" / name, method, grounding)
-        spent, previous, first = flight.episodes if flight else 0, None, None
+        spent, first, previous = flight.episodes if flight else 0, None, None
+        if self.iterate.pretrained:
+            previous = chain.pretrained(below / "sim" / "pretrained" / name, seed, console)
         learned = isinstance(innermost(grounding), ActionTransformation)
-        budget = self.iterate.budget
         for iteration in range(1, self.iterate.iterations + 1):
             place = below / cell.world / cell.method / name / (f"iteration_{iteration:02d}" if iteration > 1 else "")
             apart = learned or flight is not None or iteration > 1
-            spent += (budget.real_episodes + budget.real_neighbours) if learned else 0
+            spent += sum(self.iterate.budget.real) if learned else 0
             ready = chain.ready(place, grounding, previous, seed, console)
             out = place if apart else below / "sim" / cell.method / name
             found = chain.search(out / "optimize", ready, previous, seed, console)

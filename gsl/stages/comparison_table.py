@@ -2,60 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from gsl.core.statistics import Interval
-from gsl.report.markdown import table
+from gsl.report.markdown import in_unit, table
 from gsl.stages.comparison import Summary, differences
+from gsl.stages.headline import Unit
 from gsl.stages.trial import Cell, Trial
 
-COLUMNS = (
-    *("real world", "grounding", "improvement in real [%]", "95 % interval", "trials without"),
-    *("stable winners", "improving winners", "best generation", "falls in fresh episodes", "refused by the check"),
-    *("rank correlation", "real episodes"),
-)
+BY_FALLS = ("stable winners", "falls in fresh episodes")
 
 
-def rows(found: Sequence[Summary]) -> list[tuple[str, ...]]:
-    """Return the table's cells; its titles are `COLUMNS`."""
-    return [
-        (
-            one.world,
-            one.method,
-            "" if one.improvement is None else f"{one.improvement.mean:.1f}",
-            "" if one.improvement is None else told(one.improvement),
-            f"{one.without} of {one.trials}",
-            f"{one.stable} of {one.winners}",
-            f"{one.improving} of {one.winners}",
-            f"{one.generation:.1f}",
-            f"{one.falls}",
-            f"{one.refused} of {one.trials}",
-            "" if one.rank is None else f"{one.rank.mean:.2f}",
-            f"{one.real_episodes:.0f}",
-        )
-        for one in found
-    ]
+def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> str:
+    """Return the table, the paired differences to the first method, and every single trial.
 
+    Trials are told as improvements where π0 is surely worth something in each of them, else as what they are worth.
+    """
+    first, columns = found[0].method, _columns(found, unit)
+    as_shares = all(trial.improvement is not None for trial in trials)
+    figure = "improvement" if as_shares else "value"
+    shown = f"{figure} in real [%]" if as_shares else in_unit(f"{figure} in real", unit.name)
 
-def markdown(found: Sequence[Summary], trials: Sequence[Trial]) -> str:
-    """Return the table, the paired differences to the first method, and the improvement of every single trial."""
-    first, single, paired = found[0].method, [], []
+    def several(interval: Interval) -> tuple[str, str]:
+        if as_shares:
+            return f"{interval.mean:+.1f}", told(interval)
+        return unit.shown(interval.mean, sign=True), unit.interval([interval.lower, interval.upper])
+
+    single, paired = [], []
     for one in found:
         values = [
-            f"{trial.improvement:.1f}{'*' if trial.without else ''}"
+            (f"{trial.improvement:.1f}" if as_shares else unit.bare(trial.value)) + "*" * trial.without
             for trial in trials
-            if trial.cell == one[:4] and trial.improvement is not None
+            if trial.cell == one[:4]
         ]
         single.append((one.world, one.method, ", ".join(values)))
-        if one.method != first and one.improvement is not None:
-            difference = differences(trials, Cell(*one[:4]), first)
-            paired.append((one.world, f"{one.method} - {first}", f"{difference.mean:+.1f}", told(difference)))
+        if one.method != first:
+            difference = several(differences(trials, Cell(*one[:4]), first, figure))
+            paired.append((one.world, f"{one.method} - {first}", *difference))
     return "\n".join(
         [
-            table(COLUMNS, rows(found)),
-            "Differences of the improvement, paired by trial [percentage points]:\n",
+            table(tuple(columns), list(zip(*columns.values(), strict=True))),
+            f"Differences of the {shown}, paired by trial{' (percentage points)' * as_shares}:\n",
             table(("real world", "difference", "mean", "95 % interval"), paired),
-            "Improvement of each trial [%], in the order of the trials; * without a stable improvement:\n",
+            f"The {shown} of each trial, in their order; * without a stable improvement:\n",
             table(("real world", "grounding", "trials"), single),
         ]
     )
@@ -64,3 +53,27 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial]) -> str:
 def told(interval: Interval) -> str:
     """Return the bounds of an interval for people."""
     return f"{interval.lower:.1f} to {interval.upper:.1f}"
+
+
+def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]]:
+    """Return the cells below each title, but for columns that have none: without falls there are no stable winners."""
+    tellers: dict[str, Callable[[Summary], str]] = {
+        "real world": lambda one: one.world,
+        "grounding": lambda one: one.method,
+        f"{in_unit('in real', unit.name)} (95 %)": lambda one: (
+            f"{unit.bare(one.value.mean)} ({unit.interval([one.value.lower, one.value.upper])})"
+        ),
+        "improvement in real [%] (95 %)": lambda one: (
+            "" if one.improvement is None else f"{one.improvement.mean:.1f} ({told(one.improvement)})"
+        ),
+        "trials without": lambda one: f"{one.without} of {one.trials}",
+        "stable winners": lambda one: f"{one.stable} of {one.winners}",
+        "improving winners": lambda one: f"{one.improving} of {one.winners}",
+        "best generation": lambda one: f"{one.generation:.1f}",
+        "falls in fresh episodes": lambda one: f"{one.falls}",
+        "refused by the check": lambda one: f"{one.refused} of {one.trials}",
+        "rank correlation": lambda one: "" if one.rank is None else f"{one.rank.mean:.2f}",
+        "real episodes": lambda one: f"{one.real_episodes:.0f}",
+    }
+    columns = {title: [tell(one) for one in found] for title, tell in tellers.items()}
+    return {title: cells for title, cells in columns.items() if any(cells) and (unit.falls or title not in BY_FALLS)}

@@ -166,11 +166,10 @@ class Gate:
 
     def _charged(self, scenario: Scenario) -> None:
         """Warn where nobody knows whose action the reward charges for."""
-        if uncharged(scenario):
+        if uncharged(scenario.world):
             problem = "the reward may charge for the grounded action instead of the agent's"
-            advice = (
-                "sim.control_cost='{_target_: gsl.worlds.control_cost.Quadratic, weight: 0.1}' says what it charges"
-            )
+            price = "'{_target_: gsl.worlds.control_cost.Quadratic, weight: 0.1}'"
+            advice = f"sim.control_cost={price} says what it charges, weight: 0 that it does not"
             self.console.status(
                 f"warning: {problem}; {advice} (world.control_cost in optimize; real. where it is noisy)"
             )

@@ -10,13 +10,13 @@ import numpy as np
 
 from gsl.core.layout import Layout
 from gsl.core.seeds import derived_seed
-from gsl.core.statistics import difference_interval, mean_interval
+from gsl.core.statistics import Interval, difference_interval, mean_interval
 from gsl.core.trajectory import Trajectory
 from gsl.grounding.grounding import Grounding, GroundingRun
 from gsl.grounding.none import NoGrounding
 from gsl.stages.headline import Unit
 from gsl.stages.rollout import Scenario, rollout
-from gsl.worlds.control_cost import KEYS
+from gsl.worlds.control_cost import FREE, KEYS
 
 EPISODES = 10  # of π0 in either simulator
 TITLES = ("where", "value of π0", "95 % interval", "steps")
@@ -40,27 +40,37 @@ class ValueReport:
     @property
     def told(self) -> str:
         """What π0 tells of the grounding, in words."""
-        if len(self.values["real"]) < 2:
+        count = len(self.values["real"])
+        if count < 2:
             return "one held-out real episode is no measure: nothing is known of this grounding"
         if self.problems:
             return "with the grounding π0 is surely farther from what it is worth in real"
         if self._surely_nearer("grounded", "ungrounded"):
             return f"with the grounding π0 is surely nearer to what it is worth in real{self._left}"
-        return "π0 does not tell whether this grounding is nearer to real: the search goes on with it"
+        found = f"π0's {count} held-out real episodes do not tell whether this grounding is nearer to real{self._left}"
+        return f"{found}: the search goes on with it"
 
     @property
     def _left(self) -> str:
         """What the grounding leaves of the gap, as far as that is sure; a search makes use of it."""
-        left = difference_interval(self.values["grounded"], self.values["real"])
+        left = self._apart("grounded")
         if left.lower > 0.0 or left.upper < 0.0:
-            return f", and still surely worth {'more' if left.lower > 0.0 else 'less'} in it"
+            return f", and π0 is still surely worth {'more' if left.lower > 0.0 else 'less'} in it"
         return ""
+
+    def _apart(self, name: str) -> Interval:
+        """Return how much more π0 is worth in a simulator than in real.
+
+        Few values may be alike by chance: then the spread of the others is taken to be theirs too.
+        """
+        simulated, real = self.values[name], self.values["real"]
+        alike = any(np.ptp(values) == 0.0 for values in (simulated, real))
+        return difference_interval(simulated, real, pooled=alike)
 
     def _surely_nearer(self, one: str, other: str) -> bool:
         """Whether π0 is nearer in one simulator to what it is worth in real than in another, by both intervals."""
-        real = self.values["real"]
-        near, far = (difference_interval(self.values[name], real) for name in (one, other))
-        return len(real) > 1 and max(abs(near.lower), abs(near.upper)) < max(0.0, far.lower, -far.upper)
+        near, far = self._apart(one), self._apart(other)
+        return len(self.values["real"]) > 1 and max(abs(near.lower), abs(near.upper)) < max(0.0, far.lower, -far.upper)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return a table for people; its titles are `TITLES`."""
@@ -127,16 +137,17 @@ def value_report(
     return ValueReport(values, steps)
 
 
-def uncharged(scenario: Scenario) -> bool:
-    """Whether nobody knows what the reward charges for an action, so that the grounded action is charged."""
-    world: Any = scenario.world
+def uncharged(world: Any) -> bool:
+    """Whether nobody knows what a world's reward charges for an action, so that a grounded or noisy one is charged."""
     if world.layout.choices or getattr(world, "control_cost", None) is not None:
         return False
     env = world.make()
+    inside = type(env.unwrapped_env)
     env.reset(seed=0)
     info = env.step(np.zeros(len(world.layout.joints)))[-1]
     env.close()
-    return not any(key in info for key in KEYS)
+    free = inside.__name__ in FREE and inside.__module__.startswith("gymnasium.")
+    return not free and not any(key in info for key in KEYS)
 
 
 def _episodes(scenario: Scenario, parameters: np.ndarray, seed: int) -> list[Trajectory]:

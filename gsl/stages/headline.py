@@ -47,7 +47,7 @@ class Unit(NamedTuple):
     def ended(self, summary: Mapping[str, Any]) -> str:
         """Return how often the robot fell in so many episodes, or the number of episodes."""
         episodes = summary["episodes"]
-        return f"{falls(summary['falls'])} in {episodes}" if self.falls else f"{episodes} episodes"
+        return f"{falls(summary['falls'])} in {episodes}" if self.falls else several(episodes, "episode")
 
 
 def unit_of(artifact: Artifact) -> Unit:
@@ -74,18 +74,25 @@ def headline(artifact: Artifact) -> str:
         return ""
 
 
+def several(count: int, what: str) -> str:
+    """Return a count of things."""
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
 def falls(count: int) -> str:
     """Return how often the robot fell."""
     return f"{count or 'no'} fall{'s' * (count != 1)}"
 
 
 def _collect(metrics: Metrics, unit: Unit) -> str:
-    told = f"{metrics['episodes']} episodes" + (f", {falls(metrics['falls'])}" if unit.falls else "")
-    return told if metrics["value"] is None else f"{told}, π0 {unit.shown(metrics['value'])}"
+    told = several(metrics["episodes"], "episode") + (f", {falls(metrics['falls'])}" if unit.falls else "")
+    if metrics["value"] is None:
+        return told
+    return f"{told}, π0 {'with noise ' * bool(metrics.get('action_noise'))}{unit.shown(metrics['value'])}"
 
 
 def _import(metrics: Metrics, unit: Unit) -> str:
-    return f"{metrics['episodes']} episodes, {metrics['seconds']:.0f} s, {metrics['time']}"
+    return f"{several(metrics['episodes'], 'episode')}, {metrics['seconds']:.0f} s, {metrics['time']}"
 
 
 def _diagnose(metrics: Metrics, unit: Unit) -> str:
@@ -126,7 +133,8 @@ def _train_inverse(metrics: Metrics, unit: Unit) -> str:
 
 
 def _optimize(metrics: Metrics, unit: Unit) -> str:
-    told = f"{metrics['generations']} generations, best {unit.shown(metrics['best_value_sim'])} in simulation"
+    best = unit.shown(metrics["best_value_sim"])
+    told = f"{several(metrics['generations'], 'generation')}, best {best} in simulation"
     if "effects" in metrics:
         told += f"; {named(metrics['effects']) or 'calibration'} switched on"
     alpha = metrics.get("alpha")
@@ -150,7 +158,7 @@ def _iterate(metrics: Metrics, unit: Unit) -> str:
 
 def _compare(metrics: Metrics, unit: Unit) -> str:
     methods = dict.fromkeys(one["method"] for one in metrics["summaries"])
-    return f"{metrics['trials']} trials of {', '.join(methods)}"
+    return f"{several(metrics['trials'], 'trial')} of {', '.join(methods)}"
 
 
 def _values(metrics: Metrics, unit: Unit) -> str:

@@ -25,7 +25,6 @@ from gsl.stages.choices import FILE, policies, record
 from gsl.stages.diagnosis_plan import DiagnosisPlan, flown
 from gsl.stages.grounding_gate import settled
 from gsl.stages.iteration_report import Rounds, write_curve, write_table, write_trace
-from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers
 from gsl.stages.rollout import Scenario
 from gsl.stages.train_forward import HELDOUT
@@ -92,7 +91,7 @@ class Iterate:
         self.chain.check(self.grounding)
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
         with console.live_table(in_unit("grounded simulation learning", self.task.unit), rounds.columns) as table:
-            start = self._start(home, console)
+            start = self.chain.pretrained(home / "pretrained", self.seed, console) if self.pretrained else None
             grounding = self._diagnosed(home, rounds, console)
             chain = self.chain
             for number in range(1, self.iterations + 1):
@@ -147,14 +146,7 @@ class Iterate:
 
     @property
     def _collected_real(self) -> int:
-        return (self.budget.real_episodes + self.budget.real_neighbours) if self.learned else 0
-
-    def _start(self, home: Path, console: Any) -> str | None:
-        """Return the file of π0, none for the policy's start values."""
-        if not self.pretrained:
-            return None
-        found = self.chain.search(home / "pretrained", NoGrounding(), None, self.seed, console)
-        return str(found.folder / BEST)
+        return sum(self.budget.real) if self.learned else 0
 
     def _diagnosed(self, home: Path, rounds: Rounds, console: Any) -> Grounding:
         """Return the grounding with its diagnosis: an excitation knows no policy, so that one serves all iterations."""

@@ -28,6 +28,7 @@ from gsl.policies.policy import sized
 from gsl.report.markdown import table as markdown
 from gsl.report.noise_bars import Bars, noise_bars
 from gsl.stages.chain import Chain
+from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate
 from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.optimize import BEST
@@ -46,6 +47,7 @@ class Point(NamedTuple):
     Attributes:
         value: Mean return of its policy in the real world.
         real_steps: In the real world, that it learned from; None of a search there, whose steps nobody counts.
+        promised: Mean return of its policy where that was learned; None of trials that were made before this was kept.
     """
 
     world: str
@@ -54,6 +56,7 @@ class Point(NamedTuple):
     trial: int
     value: float
     real_steps: int | None
+    promised: float | None
 
 
 @component
@@ -91,6 +94,8 @@ class NoiseStudy:
         """Run all trials; write the points, the table and the figure."""
         for name, world in self.worlds.items():
             check_alike(self.sims.get(name, self.iterate.sim).layout, world.layout)
+        for grounding in self.methods.values():
+            self.iterate.chain.check(grounding)
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point._fields, console)
         keys = {number: recipe(replace(self, trials=1, known=None), number) for number in range(1, self.trials + 1)}
@@ -108,7 +113,7 @@ class NoiseStudy:
             )
             for world, place in self.worlds.items()
         }
-        title = f"Return in real, mean ± standard error of {self.trials} trials; hatched: knows nothing of it"
+        title = f"Return in real, mean ± standard error ({several(self.trials, 'trial')}); hatched: without real data"
         noise_bars(folder / FIGURE, panels, REFERENCE, title=title)
         return {"points": len(points)}
 
@@ -133,23 +138,23 @@ class NoiseStudy:
             real, sim = replace(self.worlds[world], action_noise=noise), self.sims.get(world)
             chain = self._chain(sim or self.iterate.sim)
             alone, below = home / (f"{world}_sim" if sim else "sim"), home / f"{world}_{noise:g}"
-            first = chain.search(alone / "pretrained" / name, NoGrounding(), None, seed, console)
+            start = chain.pretrained(alone / "pretrained" / name, seed, console)
             shared = {SIM: alone / "models" / name, REAL: below / "models" / name}
             at = replace(chain, real=real, optimizer=self.further, shared=shared)
-            start = str(first.folder / BEST)
             for method, grounding in self.methods.items():
                 learned = isinstance(innermost(grounding), ActionTransformation)
                 place = (below if learned else alone) / method / name
                 ready = at.ready(place, grounding, start, seed, console)
                 policy = at.search(place / "optimize", ready, start, seed, console)
                 value = self._value(at, below / method / name / "evaluate", policy, seed, console)
-                points.append(Point(world, noise, method, number, value, _steps(shared[REAL]) if learned else 0))
+                spent, promised = _steps(shared[REAL]) if learned else 0, policy.metrics["best_value_sim"]
+                points.append(Point(world, noise, method, number, value, spent, promised))
             on_real = replace(at, sim=real).search(
                 below / "real" / name / "optimize", NoGrounding(), start, seed, console
             )
             value = self._value(at, below / "real" / name / "evaluate", on_real, seed, console)
             steps = self.further.taken if isinstance(self.further, Trpo) else None
-            points.append(Point(world, noise, REFERENCE, number, value, steps))
+            points.append(Point(world, noise, REFERENCE, number, value, steps, on_real.metrics["best_value_sim"]))
         return points
 
     @property
@@ -183,13 +188,29 @@ class NoiseStudy:
             apart = mean_interval(np.subtract(values["sgat"], values["gat"])) if known else None
             between = f"{apart.mean:+.0f} ({apart.lower:+.0f} to {apart.upper:+.0f})" if apart else "-"
             spent = self._spent(points, world, noise)
-            rows.append((world, f"{noise:g}", *(f"{mean:.0f} ± {error:.0f}" for mean, error in means), between, spent))
+            told = (f"{mean:.0f}" + f" ± {error:.0f}" * (self.trials > 1) for mean, error in means)
+            rows.append((world, f"{noise:g}", *told, between, spent))
         below = [
-            f"Mean ± standard error over {self.trials} trials; real steps are the median and range of what learned",
-            f"groundings saw; the reference learned from {self._reference}.",
+            f"Mean ± standard error over {several(self.trials, 'trial')}; real steps are the median and range of",
+            f"what learned groundings saw; the reference learned from {self._reference}.",
         ]
         titles = ("real world", "noise", *self._shown.values(), "sgat - gat (95 %)", "real steps")
-        return "\n".join([markdown(titles, rows), *below, "", *self._differences(points)])
+        return "\n".join([markdown(titles, rows), *below, "", *self._differences(points), *self._promises(points)])
+
+    def _promises(self, points: Sequence[Point]) -> list[str]:
+        """Return the lines of a table of what policies were worth where they were learned, and in real."""
+        if any(one.promised is None for one in points):
+            return []
+        rows = []
+        for world, noise in self._places:
+            own = [[one for one in points if one[:3] == (world, noise, method)] for method in self.methods]
+            pairs = [
+                (np.mean([one.promised or 0.0 for one in each]), np.mean([one.value for one in each])) for each in own
+            ]
+            rows.append((world, f"{noise:g}", *(f"{promised:.0f} -> {value:.0f}" for promised, value in pairs)))
+        shown = [name for method, name in self._shown.items() if method != REFERENCE]
+        below = "Mean return where a policy was learned, of a few episodes, and in real."
+        return [markdown(("real world", "noise", *shown), rows), below, ""]
 
     def _differences(self, points: Sequence[Point]) -> list[str]:
         """Return the lines of a table of what learned groundings are above methods that know nothing, by trial."""

@@ -37,7 +37,7 @@ def seconds(study: Compare) -> float:
     sim = sum(_rollout(study, world, SIM) for world in sims.values()) / len(sims)
     searched = iterate.optimizer.generations * iterate.optimizer.candidates * budget.rollouts
     measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
-    collected = budget.real_episodes + budget.real_neighbours, budget.sim_episodes + budget.sim_neighbours
+    collected = sum(budget.real), sum(budget.sim)
     rounds, worlds = iterate.iterations * len(study.worlds), len(study.worlds)
     flights = {
         name: one.method for name, one in study.methods.items() if isinstance(one, DiagnosedEffects) and not one.effects

@@ -14,6 +14,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
 from gsl.errors import TrajectoryError
 from gsl.robots.catalogue import names, robot
+from gsl.stages.headline import several
 from gsl.storage.references import resolve
 from gsl.storage.trajectories import read
 from gsl.storage.trajectory_contract import suggestion
@@ -21,6 +22,7 @@ from gsl.tasks.task import SIM
 
 DATA = "trajectories.parquet"
 PI0 = "pi0"
+FEWEST, WHY = 3, "to fit, to stop, to hold out"  # trajectories of a model
 FALLS = "pi0_falls"  # share of its real episodes, told beside the trajectories that are held out
 
 
@@ -56,8 +58,8 @@ def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
     """
     batch = _of_role(path, other)
     _check_joints(path, batch)
-    if len(batch) < 3:
-        raise TrajectoryError(path, f"holds {len(batch)} episodes; three are the least: to fit, to stop, to hold out")
+    if len(batch) < FEWEST:
+        raise TrajectoryError(path, f"holds {several(len(batch), 'episode')}; {FEWEST} are the least: {WHY}")
     return parted(batch, share, seed)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from gsl.stages.headline import Unit
+
 
 class Cell(NamedTuple):
     """What is compared: a method in a pair of worlds, after some iterations."""
@@ -112,11 +114,11 @@ class Trial(NamedTuple):
         """What was tried."""
         return Cell(self.simulator, self.world, self.method, self.iteration)
 
-    @property
-    def told(self) -> str:
-        """The trial in a few words."""
-        gained = "" if self.improvement is None else f", {self.improvement:+.1f} %"
-        return f"{self.returned}{gained}, {self.stable} of {self.winners} winners stable"
+    def told(self, unit: Unit) -> str:
+        """Return the trial in a few words."""
+        gained = "" if self.improvement is None else f" ({self.improvement:+.1f} %)"
+        winners = f", {self.stable} of {self.winners} winners stable" if unit.falls else ""
+        return f"{self.returned}, {unit.shown(self.value)}{gained}{winners}"
 
     @property
     def without(self) -> bool:

@@ -53,6 +53,12 @@ class GymnasiumWorld:
             problem = "is a chance where actions are choices, 1 at most"
             raise ConfigError("action_noise", problem, given=f"{self.action_noise:g}")
 
+    @property
+    def told(self) -> str:
+        """The environment and what sets it apart from another of the same id, in a few words."""
+        arguments = ", ".join(f"{name}={value}" for name, value in self.kwargs.items())
+        return f"{self.env_id} ({arguments})" if arguments else self.env_id
+
     @cached_property
     def layout(self) -> Layout:
         """What an observation holds; building the environment tells."""
@@ -110,7 +116,8 @@ class StateEnv(gymnasium.Env):
         self._rng = np.random.default_rng()
         self.observation_space = Box(-np.inf, np.inf, (states,), dtype=np.float64)
         names = tuple(map(str, range(size)))
-        self.layout = Layout(names, {"state": states}, _period(env), cells, choices)
+        ranges = () if choices else tuple(zip(self._low.tolist(), self._high.tolist(), strict=True))
+        self.layout = Layout(names, {"state": states}, _period(env), cells, choices, ranges)
 
     @property
     def unwrapped_env(self) -> Any:
@@ -136,7 +143,7 @@ class StateEnv(gymnasium.Env):
         sent: Any = np.asarray(action, dtype=float)
         meant = sent
         if not np.isfinite(sent).all():
-            raise GslError(f"{self.world.env_id}: the action {sent.tolist()} is not finite: a policy must give numbers")
+            raise GslError(f"{self.world.told}: the action {sent.tolist()} is not finite: a policy must give numbers")
         noise = self.world.action_noise
         if self.layout.choices:
             other = noise > 0.0 and self._rng.random() < noise
@@ -152,7 +159,7 @@ class StateEnv(gymnasium.Env):
             observation, reward, ended, cut, info = self._env.step(given)
         reward = float(reward)
         if not np.isfinite(reward):
-            raise GslError(f"{self.world.env_id}: the reward is {reward}; its dynamics or its reward are broken")
+            raise GslError(f"{self.world.told}: the reward is {reward}; its dynamics or its reward are broken")
         info = {**info, "carried_out": sent}
         if noise and self.charged:
             reward = self.charged.corrected(reward, meant, sent, info)
@@ -170,17 +177,17 @@ class StateEnv(gymnasium.Env):
         except (KeyboardInterrupt, GslError):
             raise
         except Exception as error:
-            raise GslError(f"{self.world.env_id}: fails by itself: {type(error).__name__}: {_line(error)}") from error
+            raise GslError(f"{self.world.told}: fails by itself: {type(error).__name__}: {_line(error)}") from error
 
     def _state(self, observation: Any) -> np.ndarray:
         state = np.array(observation, dtype=float).ravel() - self._lowest
         if len(state) != self.layout.states:
             problem = f"observes {len(state)} numbers, but its space has {self.layout.states}"
-            raise GslError(f"{self.world.env_id}: {problem}")
+            raise GslError(f"{self.world.told}: {problem}")
         if not np.isfinite(state).all():
             place = int(np.argmin(np.isfinite(state)))
             problem = f"state.{place} is {state[place]}; its dynamics are broken, or its time step is too long"
-            raise GslError(f"{self.world.env_id}: {problem}")
+            raise GslError(f"{self.world.told}: {problem}")
         return state
 
 
@@ -195,7 +202,8 @@ def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
         with without_remarks(), _without_gymnasiums_warnings():
             env = make(**kwargs)
     except gymnasium.error.DependencyNotInstalled as error:
-        raise ConfigError("env_id", f"{_line(error)}; MuJoCo's are in gsl[mujoco]", given=name) from error
+        needs = "needs MuJoCo: pip install 'gsl[mujoco]'" if "mujoco" in str(error).lower() else _line(error)
+        raise ConfigError("env_id", needs, given=name) from error
     except gymnasium.error.Error as error:
         hint = "" if ":" in name else "; one that a module of yours registers is module:id"
         raise ConfigError("env_id", f"there is no such environment: {_line(error)}{hint}", given=name) from error
@@ -221,12 +229,14 @@ def _maker(name: str) -> Callable[..., Any]:
             importlib.import_module(str(gymnasium.spec(name).entry_point).partition(":")[0])
         return partial(gymnasium.make, name, disable_env_checker=True)
     try:
-        return getattr(importlib.import_module(place), attribute)
-    except (ImportError, ValueError, AttributeError) as error:
-        raise ConfigError("env_id", f"there is no such environment: {_line(error)}", given=name) from error
+        module = importlib.import_module(place)
     except Exception as error:
-        told = f"its module cannot be imported: {type(error).__name__}: {_line(error)}"
-        raise ConfigError("env_id", told, given=name) from error
+        absent = isinstance(error, ModuleNotFoundError) and error.name and f"{place}.".startswith(f"{error.name}.")
+        problem = "there is no such environment" if absent else "its module cannot be imported"
+        raise ConfigError("env_id", f"{problem}: {type(error).__name__}: {_line(error)}", given=name) from error
+    if not hasattr(module, attribute):
+        raise ConfigError("env_id", f"there is no such environment: {place} has no {attribute}", given=name)
+    return getattr(module, attribute)
 
 
 @contextmanager
@@ -262,7 +272,7 @@ def _action_size(world: GymnasiumWorld, space: gymnasium.Space[Any]) -> int:
     if isinstance(space, Discrete):
         return 1
     if not isinstance(space, Box) or len(space.shape) != 1:
-        problem = f"its actions are a {type(space).__name__}; gsl needs a Box of one dimension or a Discrete"
+        problem = f"its actions are a {type(space).__name__}; gsl needs a Box that is a vector, or a Discrete"
         raise ConfigError("env_id", problem, given=world.env_id)
     if not np.issubdtype(space.dtype, np.floating) or np.any(space.low >= space.high):
         raise ConfigError("env_id", "its actions have no room: the space is of integers or empty", given=world.env_id)
