@@ -20,6 +20,7 @@ from gsl.commandline.config_errors import instantiation_error, missing, resoluti
 from gsl.commandline.known_settings import declared
 from gsl.commandline.overrides import COMMAND_KEYS, file_of
 from gsl.console import Console
+from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.core.validation import make
 from gsl.errors import ConfigError
@@ -128,7 +129,9 @@ def prepared(config: Mapping[str, Any]) -> tuple[Any, dict[str, Any], CommandSet
     settings = {key: value for key, value in config.items() if key not in dropped}
     for path in _missing(settings, ""):
         raise missing(path)
-    return _instantiated(settings), settings, own
+    stage = _instantiated(settings)
+    described(stage)  # refuses what could not be written down afterwards
+    return stage, settings, own
 
 
 def resolved(composition: Composition) -> dict[str, Any]:

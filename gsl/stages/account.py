@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.markdown import in_unit
 from gsl.stages.diagnosis_files import report_of
-from gsl.stages.headline import Unit, unit_of
+from gsl.stages.headline import Unit, several, unit_of
 from gsl.stages.measured import cells, columns
 from gsl.storage.artifact import Artifact
 
@@ -165,7 +165,8 @@ def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 
 def _compare(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     below = f"differences and every trial: {folder.as_posix()}/table.md"
-    return Told(f"{metrics['summaries'][0]['trials']} trials of each method", *_markdown(folder / "table.md"), below)
+    trials = several(metrics["summaries"][0]["trials"], "trial")
+    return Told(f"{trials} of each method", *_markdown(folder / "table.md"), below)
 
 
 def _reproduce(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
@@ -173,7 +174,9 @@ def _reproduce(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
         figures = ", ".join(sorted(path.name for path in folder.glob("*.png")))
         return Told("what came out", *_markdown(folder / "table.md"), f"figures: {folder.as_posix()}/ ({figures})")
     below = f"every trial: {folder.as_posix()}/trials.json, tables: {folder.as_posix()}/table.md"
-    return Told(f"ours, and the paper's ({metrics['trials']} trials)", *_markdown(folder / "table.md"), below)
+    return Told(
+        f"ours, and the paper's ({several(metrics['trials'], 'trial')})", *_markdown(folder / "table.md"), below
+    )
 
 
 def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:

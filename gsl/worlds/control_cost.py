@@ -16,10 +16,7 @@ from gsl.core.setting import component, setting
 from gsl.errors import GslError
 
 KEYS = ("reward_ctrl", "reward_quadctrl")
-FREE = (
-    "InvertedPendulumEnv",
-    "InvertedDoublePendulumEnv",
-)  # of gymnasium's MuJoCo, which charge nothing and say nothing
+FREE = ("InvertedPendulumEnv", "InvertedDoublePendulumEnv")  # of gymnasium: charge nothing, and say nothing
 SMALL = 1e-6  # share of a full action's square, below which a step tells no price
 SAME = 0.01  # relative difference of two steps' prices that are one
 
