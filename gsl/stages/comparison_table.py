@@ -23,7 +23,8 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
     figure = "improvement" if as_shares else "value"
     shown = f"{figure} in real [%]" if as_shares else in_unit(f"{figure} in real", unit.name)
 
-    def several(interval: Interval) -> tuple[str, str]:
+    def difference(other: Summary) -> tuple[str, str]:
+        interval = differences(trials, Cell(*other[:4]), first, figure)
         if as_shares:
             return f"{interval.mean:+.1f}", told(interval)
         return unit.shown(interval.mean, sign=True), unit.interval([interval.lower, interval.upper])
@@ -37,8 +38,7 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
         ]
         single.append((one.world, one.method, ", ".join(values)))
         if one.method != first:
-            difference = several(differences(trials, Cell(*one[:4]), first, figure))
-            paired.append((one.world, f"{one.method} - {first}", *difference))
+            paired.append((one.world, f"{one.method} - {first}", *difference(one)))
     return "\n".join(
         [
             table(tuple(columns), list(zip(*columns.values(), strict=True))),

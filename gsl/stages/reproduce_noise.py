@@ -172,8 +172,10 @@ class NoiseStudy:
     def _value(self, chain: Chain, place: Path, policy: Any, seed: int, console: Any) -> float:
         return float(chain.measure(place, policy, seed, console, only=BEST).metrics["last"]["value"])
 
-    def _values(self, points: Sequence[Point], world: str, noise: float, method: str) -> list[float]:
-        return [one.value for one in points if one[:3] == (world, noise, method)]
+    def _values(
+        self, points: Sequence[Point], world: str, noise: float, method: str, figure: str = "value"
+    ) -> list[float]:
+        return [getattr(one, figure) for one in points if one[:3] == (world, noise, method)]
 
     def _means(self, points: Sequence[Point], world: str, method: str) -> list[tuple[float, float]]:
         """Return mean and standard error at each noise."""
@@ -203,11 +205,11 @@ class NoiseStudy:
             return []
         rows = []
         for world, noise in self._places:
-            own = [[one for one in points if one[:3] == (world, noise, method)] for method in self.methods]
-            pairs = [
-                (np.mean([one.promised or 0.0 for one in each]), np.mean([one.value for one in each])) for each in own
+            each = [
+                [np.mean(self._values(points, world, noise, method, figure)) for figure in ("promised", "value")]
+                for method in self.methods
             ]
-            rows.append((world, f"{noise:g}", *(f"{promised:.0f} -> {value:.0f}" for promised, value in pairs)))
+            rows.append((world, f"{noise:g}", *(f"{promised:.0f} -> {value:.0f}" for promised, value in each)))
         shown = [name for method, name in self._shown.items() if method != REFERENCE]
         below = "Mean return where a policy was learned, of a few episodes, and in real."
         return [markdown(("real world", "noise", *shown), rows), below, ""]
