@@ -1,7 +1,7 @@
 """A cart is to stop at a mark; the real rail is not level, which the simulator does not know.
 
 gsl iterate experiment=gymnasium name=cart optimizer=cma_es optimizer.sigma=0.5 'policy.hidden=[]' \
-    sim.env_id=examples.cart:Cart real.env_id=examples.cart:Cart 'real.kwargs={slope: 2.0}'
+    sim.env_id=examples.cart:Cart real.env_id=examples.cart:Cart real.kwargs.slope=2
 """
 
 import gymnasium

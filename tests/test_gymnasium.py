@@ -31,11 +31,12 @@ from gsl.models.states import NearestChoice, StateForward, StateInverse
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.mlp import Mlp
 from gsl.policies.policy import sized
-from gsl.stages.grounding_states import ValueReport, uncharged, value_report
+from gsl.stages.grounding_states import ValueReport, value_report
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.simulator import GroundedSimulator
 from gsl.stages.train_states import forward_of_states, inverse_of_states
 from gsl.stages.training import Parts
+from gsl.stages.uncharged import uncharged
 from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.storage.trajectories import read, write
 from gsl.tasks.own_reward import OwnReward
@@ -357,7 +358,7 @@ def test_trpo_learns_and_goes_on_from_what_it_learned(tmp_path: Path, monkeypatc
 
 def test_the_example_of_the_docs_wins_by_its_grounding(tmp_path: Path) -> None:
     few = ("budget.rollouts=6", "budget.episodes=5", "optimizer.candidates=10", "optimizer.generations=8", "workers=1")
-    worlds = ("sim.env_id=examples.cart:Cart", "real.env_id=examples.cart:Cart", "real.kwargs={slope: 2.0}")
+    worlds = ("sim.env_id=examples.cart:Cart", "real.env_id=examples.cart:Cart", "real.kwargs.slope=2")
     search = ("optimizer=cma_es", "optimizer.sigma=0.5", "policy.hidden=[]")
     done("iterate", "experiment=gymnasium", "name=cart", *search, *worlds, *few, "beside=true", folder=tmp_path)
     metrics = json.loads((tmp_path / "runs/cart/iterate/metrics.json").read_text())
@@ -370,7 +371,7 @@ def test_groundings_of_environments_are_compared(tmp_path: Path) -> None:
     search = ("optimizer@iterate.optimizer=cma_es", "iterate.policy.hidden=[]", "iterate.optimizer.sigma=0.5")
     few = ("trials=2", "preset=toy", "~methods.ane_02", "~methods.ane_05", "~methods.sgat")
     few += tuple(f"iterate.budget.{name}=4" for name in ("real_episodes", "sim_episodes", "episodes", "confirmation"))
-    slope = ("worlds.real.kwargs={slope: 2.0}", "iterate.workers=1")
+    slope = ("worlds.real.kwargs.slope=2", "iterate.workers=1")
     said = done("compare", "experiment=environments", "name=e", *few, *worlds, *slope, *search, folder=tmp_path)
     home = tmp_path / "runs/e"
     collected = (home / "real/gat/trial_01/collect_real/config.yaml").read_text()
@@ -478,6 +479,16 @@ def test_environments_that_charge_nothing_are_known() -> None:
     pytest.importorskip("mujoco")
     told = ("InvertedPendulum-v5", "InvertedDoublePendulum-v5", "HalfCheetah-v5", "Pendulum-v1", "examples.cart:Cart")
     assert [uncharged(GymnasiumWorld(env_id=name)) for name in told] == [False, False, False, True, False]
+
+
+def test_noise_that_may_be_charged_for_is_told_where_a_real_value_is(tmp_path: Path) -> None:
+    line = ("name=p", "world=gymnasium", "world.env_id=Pendulum-v1", "task=own_reward", "policy=mlp")
+    few = ("optimizer.generations=1", "optimizer.candidates=4", "rollouts=1", "workers=1")
+    done("optimize", *line, *few, "grounding=none", folder=tmp_path)
+    measured = ("evaluate", *line, "episodes=1", "check=1", "confirmation=2", "workers=1")
+    warning = "the reward may charge for the world's noise instead of the agent's action; real.control_cost="
+    assert warning not in done(*measured, folder=tmp_path).err
+    assert warning in done(*measured, "world.action_noise=0.5", "force=true", folder=tmp_path).err
 
 
 def test_worlds_that_no_policy_fits_both_of_are_refused(tmp_path: Path) -> None:

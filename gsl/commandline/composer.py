@@ -154,7 +154,7 @@ def _check_effects(composition: Composition) -> None:
 
 
 def _added_where_declared(command: str, overrides: list[str], multirun: bool) -> Composition:
-    """Compose, adding settings that only the class names: its default is in the signature, not in the yaml."""
+    """Compose, adding settings that only the class names, and what it lets the user name."""
     while True:
         first, swept = _first_values(overrides) if multirun else (overrides, ())
         try:
@@ -172,7 +172,11 @@ def _added_where_declared(command: str, overrides: list[str], multirun: bool) ->
 def _declares(command: str, overrides: list[str], key: str) -> bool:
     parent, _, name = key.rpartition(".")
     config = _composed(command, _first_values(_of_choices(overrides))[0])
-    return name in declared(plain(OmegaConf.select(config, parent) if parent else config))
+    if name in declared(plain(OmegaConf.select(config, parent) if parent else config)):
+        return True
+    above, _, mapping = parent.rpartition(".")
+    around = declared(plain(OmegaConf.select(config, above) if above else config))
+    return mapping in around and around[mapping].named
 
 
 def _of_choices(overrides: Sequence[str]) -> list[str]:

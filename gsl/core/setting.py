@@ -12,7 +12,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, dataclass_transform, get_type_hints
+from typing import Any, dataclass_transform, get_args, get_origin, get_type_hints
 
 from pydantic import ConfigDict, Field, ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass as validated_dataclass
@@ -78,6 +78,7 @@ class Setting:
         lower: Lower end of the documented range, or else the least possible value, or None.
         upper: Upper end, likewise.
         most: Greatest possible value, or None.
+        named: Whether it is a mapping whose names nobody declares, such as the arguments of an environment.
     """
 
     name: str
@@ -88,6 +89,7 @@ class Setting:
     lower: float | None = None
     upper: float | None = None
     most: float | None = None
+    named: bool = False
 
     @property
     def neutral(self) -> float | None:
@@ -134,6 +136,7 @@ def _described(parameter: inspect.Parameter, field: FieldInfo | None) -> Setting
         _first(extra.get("lower"), _bound(field, "ge"), _bound(field, "gt")),
         _first(extra.get("upper"), _bound(field, "le"), _bound(field, "lt")),
         _bound(field, "le"),
+        get_origin(field.annotation) is Mapping and get_args(field.annotation)[1] in (Any, float),
     )
 
 

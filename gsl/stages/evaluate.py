@@ -19,6 +19,7 @@ from gsl.stages.measured import falls, gain, mean, row, summary
 from gsl.stages.population import Episode, Job, Workers, episodes
 from gsl.stages.real_robot import Errand, Order, answer_parents, asked
 from gsl.stages.rollout import Scenario
+from gsl.stages.uncharged import warn_uncharged
 from gsl.storage.documents import write_json
 from gsl.storage.policies import PolicyRecord, write_policies
 from gsl.storage.references import resolve
@@ -78,6 +79,8 @@ class Evaluate:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the table of all policies and the chosen one."""
+        if getattr(self.world, "action_noise", 0.0):
+            warn_uncharged(self.world, console, REAL, "the world's noise")
         found = records(self.policy, self.policies)
         checks = 1 + CHALLENGERS if self.tolerated else 1
         total = self.episodes * len(found) + self.check * checks + 2 * self.confirmation

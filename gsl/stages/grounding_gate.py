@@ -24,16 +24,19 @@ from gsl.stages.grounding_check import ALPHAS, REPLAYS, TITLES, allowed_falls, c
 from gsl.stages.grounding_joints import fewest
 from gsl.stages.grounding_replay import places
 from gsl.stages.grounding_states import TITLES as VALUE_TITLES
-from gsl.stages.grounding_states import uncharged, value_report
+from gsl.stages.grounding_states import value_report
 from gsl.stages.rollout import Scenario
 from gsl.stages.train_forward import HELDOUT, VALIDATION
 from gsl.stages.training import of_policy
+from gsl.stages.uncharged import warn_uncharged
 from gsl.storage.documents import write_json
 from gsl.storage.models import model_file, read_forward_model, read_inverse_model
 from gsl.storage.references import resolve
 from gsl.storage.trajectories import read
+from gsl.tasks.task import SIM
 
 REPORT, FIGURE = "grounding.json", "grounding.png"
+_WHAT = "the grounded action"
 
 
 def grounding_parents(grounding: Any, path: str = "grounding") -> Mapping[str, Path]:
@@ -94,8 +97,8 @@ class Gate:
             return self._transformed(scenario, scenario.grounding)
         if isinstance(scenario.grounding, RandomisedEffects):
             return self._randomised(scenario, scenario.grounding)
-        if scenario.world.layout.states and not isinstance(scenario.grounding, NoGrounding):
-            self._charged(scenario)
+        if not isinstance(scenario.grounding, NoGrounding):
+            warn_uncharged(scenario.world, self.console, SIM, _WHAT)
         return scenario, {}
 
     def _randomised(self, scenario: Scenario, settings: RandomisedEffects) -> tuple[Scenario, Mapping[str, Any]]:
@@ -155,7 +158,7 @@ class Gate:
 
     def _of_states(self, ready: Scenario, heldout: Batch) -> tuple[Scenario, Mapping[str, Any]]:
         """Compare what π0 is worth with held-out real episodes."""
-        self._charged(ready)
+        warn_uncharged(ready.world, self.console, SIM, _WHAT)
         real = of_policy(heldout, pi0=True) or heldout.episodes
         noise = exploration(heldout.metadata.get("action_noise", 0.0), ready.world.layout)
         report = value_report(ready, self.parameters, real, noise, derived_seed(self.seed, "check"))
@@ -163,16 +166,6 @@ class Gate:
         self.console.table("π0 in the grounded simulator", VALUE_TITLES, report.rows(), report.told)
         self._judge(report.problems, "Collect more data")
         return ready, {"grounding_acceptable": not report.problems}
-
-    def _charged(self, scenario: Scenario) -> None:
-        """Warn where nobody knows whose action the reward charges for."""
-        if uncharged(scenario.world):
-            problem = "the reward may charge for the grounded action instead of the agent's"
-            price = "'{_target_: gsl.worlds.control_cost.Quadratic, weight: 0.1}'"
-            advice = f"sim.control_cost={price} says what it charges, weight: 0 that it does not"
-            self.console.status(
-                f"warning: {problem}; {advice} (world.control_cost in optimize; real. where it is noisy)"
-            )
 
     def _chosen(self, scenario: Scenario, loaded: LoadedTransformation, validation: Batch) -> tuple[str, ...]:
         """Return the joints to ground, and tell them."""

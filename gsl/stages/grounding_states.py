@@ -16,7 +16,6 @@ from gsl.grounding.grounding import Grounding, GroundingRun
 from gsl.grounding.none import NoGrounding
 from gsl.stages.headline import Unit
 from gsl.stages.rollout import Scenario, rollout
-from gsl.worlds.control_cost import FREE, KEYS
 
 EPISODES = 10  # of π0 in either simulator
 TITLES = ("where", "value of π0", "95 % interval", "steps")
@@ -135,19 +134,6 @@ def value_report(
     values = {name: np.array([one.value for one in done]) for name, done in episodes.items()}
     steps = {name: np.array([float(len(one)) for one in done]) for name, done in episodes.items()}
     return ValueReport(values, steps)
-
-
-def uncharged(world: Any) -> bool:
-    """Whether nobody knows what a world's reward charges for an action, so that a grounded or noisy one is charged."""
-    if world.layout.choices or getattr(world, "control_cost", None) is not None:
-        return False
-    env = world.make()
-    inside = type(env.unwrapped_env)
-    env.reset(seed=0)
-    info = env.step(np.zeros(len(world.layout.joints)))[-1]
-    env.close()
-    free = inside.__name__ in FREE and inside.__module__.startswith("gymnasium.")
-    return not free and not any(key in info for key in KEYS)
 
 
 def _episodes(scenario: Scenario, parameters: np.ndarray, seed: int) -> list[Trajectory]:
