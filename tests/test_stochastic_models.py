@@ -102,6 +102,20 @@ def test_a_gaussian_learns_where_it_is_noisy_and_a_linear_one_how_noisy_it_is() 
     assert np.exp(flat.predict_many(x)[0, 1]) == pytest.approx((y - x).std(), rel=0.05)
 
 
+def test_beta_keeps_a_gaussian_s_mean_where_the_likelihood_takes_it_for_noise() -> None:
+    rng = np.random.default_rng(0)
+    inputs = rng.uniform(-1.0, 1.0, (3000, 1))
+    targets = np.where(inputs > 0.0, np.sin(5.0 * inputs), 0.05 * inputs)  # hard on the right, easy on the left
+    left = {}
+    for beta in (0.0, 0.5):
+        config = ModelConfig(family="mlp", likelihood="gaussian", hidden=(32, 32), beta=beta)
+        parts = (inputs[:2400], targets[:2400]), (inputs[2400:], targets[2400:])
+        network = fit_network(*parts, config, seed=1, head=config.head)
+        errors = config.head.expected(network.predict_many(inputs[2400:])) - targets[2400:]
+        left[beta] = errors.var() / targets[2400:].var()
+    assert left[0.5] < 0.01 < 0.5 < left[0.0]
+
+
 def forked(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     return rng.normal(size=(count, 1)), np.sign(rng.normal(size=(count, 1))) + 0.05 * rng.normal(size=(count, 1))

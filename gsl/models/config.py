@@ -44,6 +44,16 @@ class ModelConfig:
         Literal["diagonal", "full"],
         setting("of a Gaussian: variables drawn each alone, or as they err together (of environments)"),
     ] = "diagonal"
+    beta: Annotated[
+        float,
+        setting(
+            "of a Gaussian's fit: 0 is the likelihood, which neglects means where they are hard to tell; towards 1 all "
+            "errors count alike",
+            source="Seitzer et al. 2022, beta-NLL",
+            ge=0,
+            le=1,
+        ),
+    ] = 0.0
     components: Annotated[int, setting("Gaussians of a mixture", ge=2, le=10)] = 3
     members: Annotated[int, setting("forward models of an ensemble, each of its own draw of trajectories", ge=1)] = 1
     hidden: Annotated[

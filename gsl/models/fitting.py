@@ -20,7 +20,8 @@ LEAST_LOG_SD = -5.0  # in units of the targets' spread: where data are all but e
 def fit_mlp(training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT) -> Network:
     """Return the network of the epoch with the least loss on `validation`; the same seed, the same weights.
 
-    The loss is the squared error of a point, the negative log likelihood of a distribution.
+    The loss is the squared error of a point, the negative log likelihood of a distribution; a Gaussian's fit weights
+    each term by its variance to the power of `config.beta`.
 
     The caller's number of threads and torch's random state are as before afterwards.
     """
@@ -38,25 +39,27 @@ def _fitted(training: Samples, validation: Samples, config: ModelConfig, head: H
     given, wanted = scaling(training[0]), scaling(training[1])
     known, unseen = ((_tensor(given.apply(x)), _tensor(wanted.apply(y))) for x, y in (training, validation))
     network = _network((training[0].shape[1], *config.hidden, head.width(training[1].shape[1])))
-    _descend(network, known, unseen, config, _surprise(head) if head.draws else torch.nn.functional.mse_loss)
+    loss = _surprise(head) if head.draws else torch.nn.functional.mse_loss
+    weighted = _surprise(head, config.beta) if head.likelihood == "gaussian" else loss
+    _descend(network, known, unseen, config, weighted, loss)
     affine = [layer for layer in network if isinstance(layer, torch.nn.Linear)]
     layers = [(_array(layer.weight), _array(layer.bias)) for layer in affine]
     return unscaled(layers, given, head.scaling(wanted))
 
 
 def _descend(
-    network: torch.nn.Sequential, training: Pair, validation: Pair, config: ModelConfig, loss_of: Loss
+    network: torch.nn.Sequential, training: Pair, validation: Pair, config: ModelConfig, descended: Loss, judged: Loss
 ) -> None:
-    """Leave the network with the weights of its best epoch."""
+    """Leave the network with the weights of its best epoch: of the least `judged` on `validation`."""
     adam = torch.optim.Adam(network.parameters(), lr=config.rate, weight_decay=config.decay)
     best, weights, without_progress = np.inf, {}, 0
     for _ in range(config.epochs):
         for chosen in torch.split(torch.randperm(len(training[0])), config.batch):
             adam.zero_grad()
-            loss_of(network(training[0][chosen]), training[1][chosen]).backward()  # type: ignore[no-untyped-call]
+            descended(network(training[0][chosen]), training[1][chosen]).backward()  # type: ignore[no-untyped-call]
             adam.step()
         with torch.no_grad():
-            loss = loss_of(network(validation[0]), validation[1]).item()
+            loss = judged(network(validation[0]), validation[1]).item()
         without_progress += 1
         if loss < best:
             best, without_progress = loss, 0
@@ -66,14 +69,15 @@ def _descend(
     network.load_state_dict(weights or network.state_dict())
 
 
-def _surprise(head: Head) -> Loss:
-    """The negative log likelihood of scaled targets, per output."""
+def _surprise(head: Head, beta: float = 0.0) -> Loss:
+    """The negative log likelihood of scaled targets, per output, weighted by its variance to the power of `beta`."""
     k, logits = head.components, head.logits
 
     def loss(raw: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
         means, logs = raw[:, logits:].reshape(len(raw), 2, k, -1).unbind(1)
         normal = torch.distributions.Normal(means, logs.clamp(min=LEAST_LOG_SD).exp())
-        each = normal.log_prob(targets[:, None]).sum(dim=2)  # type: ignore[no-untyped-call]
+        each = normal.log_prob(targets[:, None])  # type: ignore[no-untyped-call]
+        each = (each * normal.scale.detach() ** (2.0 * beta)).sum(dim=2)
         if logits:
             each = each + torch.log_softmax(raw[:, :logits], dim=1)
         return -torch.logsumexp(each, dim=1).mean() / targets.shape[1]
