@@ -41,6 +41,7 @@ from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.storage.trajectories import read, write
 from gsl.tasks.own_reward import OwnReward
 from gsl.worlds.control_cost import Charged, Quadratic
+from gsl.worlds.environments import own_module
 from gsl.worlds.gymnasium import GymnasiumWorld
 
 CART = GymnasiumWorld(env_id="examples.cart:Cart")
@@ -467,6 +468,60 @@ def test_a_setting_without_settings_of_its_own_is_refused(tmp_path: Path) -> Non
     place = ("world=gymnasium", "world.env_id=examples.cart:Cart", "task=own_reward", "policy=mlp", "role=sim")
     said = refused("collect", *place, cost, "episodes=3", "neighbours=0", folder=tmp_path)
     assert said.startswith("_target_ = PlainCost: is no dataclass") and said.endswith("put @dataclass above it")
+
+
+class Faulty(gymnasium.Env):
+    """Whose step or reset is wrong in one way."""
+
+    observation_space, action_space = gymnasium.spaces.Box(-9.0, 9.0, (2,)), gymnasium.spaces.Box(-1.0, 1.0, (1,))
+
+    def __init__(self, way: str = "") -> None:
+        self.way = way
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+        return np.zeros(2) if self.way == "reset" else (np.zeros(2), {})
+
+    def step(self, action: np.ndarray) -> Any:
+        if self.way == "raise":
+            raise RuntimeError("no power")
+        reward: Any = {"none": None, "word": "much", "array": np.ones(1)}.get(self.way, 1.0)
+        return (np.zeros(2), reward, True, False, {})[: 4 if self.way == "four" else 5]
+
+
+@pytest.mark.parametrize(
+    ("way", "problem"),
+    [
+        ("reset", "its reset() returns no (observation, info)"),
+        ("four", "its step() returns no (observation, reward, terminated, truncated, info)"),
+        ("none", "the reward is None, no finite number; its dynamics or its reward are broken"),
+        ("word", "the reward is much, no finite number; its dynamics or its reward are broken"),
+        ("array", "the reward is [1.], no finite number; its dynamics or its reward are broken"),
+        ("raise", "fails by itself: RuntimeError: no power"),
+    ],
+)
+def test_an_environment_that_fails_is_told_before_anything_is_learned(way: str, problem: str, tmp_path: Path) -> None:
+    place = (f"sim.env_id={__name__}:Faulty", f"real.env_id={__name__}:Faulty", f"real.kwargs.way={way}")
+    said = refused("iterate", "experiment=gymnasium", *place, "optimizer=cma_es", folder=tmp_path)
+    assert said == f"real.env_id = {__name__}:Faulty (way={way}): {problem}"
+
+
+def test_effects_are_refused_where_there_are_none_before_anything_is_learned(tmp_path: Path) -> None:
+    place = ("sim.env_id=examples.cart:Cart", "real.env_id=examples.cart:Cart", "optimizer=cma_es")
+    said = refused("iterate", "experiment=gymnasium", *place, "grounding=effects", folder=tmp_path)
+    assert said == "grounding: this world has no effects to switch on; take another grounding"
+
+
+def test_a_change_of_one_s_own_environment_makes_another_world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (Path(__file__).parents[1] / "examples/cart.py").read_text()
+    (tmp_path / "own_cart.py").write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    line = ("collect", "role=sim", "name=c", "world=gymnasium", "world.env_id=own_cart:Cart", "task=own_reward")
+    line += ("policy=mlp", "episodes=3", "neighbours=0", "workers=1")
+    done(*line, folder=tmp_path)
+    assert "unchanged" in done(*line, folder=tmp_path).out
+    (tmp_path / "own_cart.py").write_text(text + "\n")
+    assert "changed: the data of world.env_id" in refused(*line, folder=tmp_path)
+    assert own_module("gsl.worlds.cliff_walking:CliffWalking") is own_module("HalfCheetah-v5") is None
 
 
 def test_too_few_episodes_are_refused_before_anything_is_collected(tmp_path: Path) -> None:

@@ -133,6 +133,9 @@ def test_a_ledger_only_grows(tmp_path: Path) -> None:
     assert after.take("a") and after.figures == [{"number": 1, "value": 1.0}, {"number": 2, "value": 3.0}]
     with pytest.raises(ArtifactError, match="is what this study writes"):
         Ledger(path, {"known": path}, FIELDS, Silent())
+    given.write_text(path.read_text().replace("3.0", "NaN"))
+    with pytest.raises(ArtifactError, match="NaN is no figure"):
+        Ledger(tmp_path / "new.json", {"known": given}, FIELDS, Silent())
     given.write_text(json.dumps([*json.loads(path.read_text()), json.loads(path.read_text())[0]]))
     with pytest.raises(ArtifactError, match="row 4 is of a trial that the file has already"):
         Ledger(tmp_path / "new.json", {"known": given}, FIELDS, Silent())

@@ -27,6 +27,8 @@ from gsl.core.validation import did_you_mean
 from gsl.effects import __path__ as effects_path
 from gsl.errors import ConfigError, InputError
 
+REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
+
 
 @dataclass(frozen=True)
 class Composition:
@@ -95,6 +97,7 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
         words = _with_choices(command, arguments, vocabulary)
         raise unfit(command, arguments, unknown_key(error)) or translated(error, words) from error
     _check_effects(composition)
+    _check_referred(command, composition)
     config = plain(composition.config)
     strangers = config.keys() - declared(config).keys() - plain(base).keys() - {*COMMAND_KEYS}
     if misfit := unfit(command, arguments, min(strangers, default=None)):
@@ -151,6 +154,18 @@ def _check_effects(composition: Composition) -> None:
         node = OmegaConf.select(composition.config, path)
         if not (isinstance(node, DictConfig) and "_target_" in node):
             raise ConfigError(path, f"no such effect{did_you_mean(name, effects())}")
+
+
+def _check_referred(command: str, composition: Composition) -> None:
+    """Refuse a value of a recipe or preset that nothing of this command refers to: it would do nothing."""
+    told = OmegaConf.to_yaml(composition.config)
+    for key in map(key_of, composition.overrides):
+        if key.startswith(REFERRED) and f"${{{key}}}" not in told:
+            last = key.rpartition(".")[2]
+            keys = [one for one in known_keys(composition.config) if not one.startswith(REFERRED)]
+            others = [one for one in keys if one.rpartition(".")[2] == last]
+            hint = f"; did you mean {' or '.join(others[:3])}?" if others else ""
+            raise ConfigError(key, f"nothing in gsl {command} refers to it here{hint}")
 
 
 def _added_where_declared(command: str, overrides: list[str], multirun: bool) -> Composition:

@@ -35,13 +35,15 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str)
     """Return the figure.
 
     Args:
-        panels: By real world.
-        reference: The method that is drawn as a line.
+        panels: By real world, which is called `environment, what is different`.
+        reference: The method that is drawn as a line, its error as a band.
         title: What there is to see.
     """
     with look():
         whole = figure(3.8)
-        for axes, (name, bars) in zip(whole.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
+        alike = len({name.partition(",")[0] for name in panels}) == 1  # returns of one environment are of one size
+        grid = whole.subplots(1, len(panels), squeeze=False, sharey=alike)
+        for axes, (name, bars) in zip(grid[0], panels.items(), strict=True):
             methods = [method for method in bars.values if method != reference]
             places, width = np.arange(len(bars.noises)), 0.8 / max(1, len(methods))
             noisy = [method for method in methods if method.startswith("ane")]
@@ -54,12 +56,13 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str)
                 axes.bar(
                     x, means, 0.92 * width, yerr=errors, color=colour, hatch=hatch, edgecolor="white", label=method
                 )
-            for place, (mean, _) in zip(places, bars.values.get(reference, ()), strict=False):
-                label = reference if place == 0 else None
-                axes.hlines(mean, place - 0.45, place + 0.45, color=REAL, linestyle="--", linewidth=1.4, label=label)
+            for place, (mean, error) in zip(places, bars.values.get(reference, ()), strict=False):
+                label, ends = reference if place == 0 else None, (place - 0.45, place + 0.45)
+                axes.fill_between(ends, mean - error, mean + error, color=REAL, alpha=0.15, linewidth=0)
+                axes.hlines(mean, *ends, color=REAL, linestyle="--", linewidth=1.4, label=label)
             axes.set_xticks(places, [f"{noise:g}" for noise in bars.noises])
             axes.set_xlabel("sd of action noise in real [half ranges]")
-            axes.set_ylabel("return in real")
+            axes.set_ylabel("" if alike and axes is not grid[0, 0] else "return in real")
             axes.set_title(name, loc="left", fontsize=10.5)
         whole.legend(*axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9)
         headline(whole, title)

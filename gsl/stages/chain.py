@@ -13,6 +13,7 @@ from gsl.grounding.effects import DiagnosedEffects, innermost, switched_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.randomised import RandomisedEffects
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.optimizer import Learner
@@ -93,8 +94,10 @@ class Chain:
         """Refuse what could not be trained, before anything is asked of the real robot.
 
         Raises:
-            ConfigError: A residual of an environment's states, or too few episodes.
+            ConfigError: Effects of a world that has none, a residual of an environment's states, or too few episodes.
         """
+        if isinstance(grounding, DiagnosedEffects | RandomisedEffects) and self.sim.layout.states:
+            raise ConfigError("grounding", "this world has no effects to switch on; take another grounding")
         inner = innermost(grounding)
         if not isinstance(inner, ActionTransformation):
             return

@@ -23,6 +23,7 @@ from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.trial import Cell, Trial
 from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
+from gsl.worlds.gymnasium import try_out
 from gsl.worlds.world import World
 
 TABLE, DATA = "table.md", "trials.json"
@@ -72,6 +73,8 @@ class Compare:
         home, simulators = folder.parent, self.simulators or {"": self.iterate.sim}
         for sim, real in product(simulators.values(), self.worlds.values()):
             check_alike(sim.layout, real.layout)
+        named = {f"simulators.{name}" if name else "iterate.sim": one for name, one in simulators.items()}
+        try_out({**named, **{f"worlds.{name}": one for name, one in self.worlds.items()}})
         ledger = Ledger(home / DATA, self.parents(), Trial._fields, console)
         cells = product(range(1, self.trials + 1), self.methods, simulators, self.worlds)
         for number, method, simulator, world in cells:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 from gsl.core.statistics import Interval
@@ -52,7 +53,7 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
 
 def told(interval: Interval) -> str:
     """Return the bounds of an interval for people."""
-    return f"{interval.lower:.1f} to {interval.upper:.1f}"
+    return f"{interval.lower:.1f} to {interval.upper:.1f}" if math.isfinite(interval.upper) else "-"
 
 
 def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]]:
@@ -66,7 +67,7 @@ def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]
         "improvement in real [%] (95 %)": lambda one: (
             "" if one.improvement is None else f"{one.improvement.mean:.1f} ({told(one.improvement)})"
         ),
-        "trials without": lambda one: f"{one.without} of {one.trials}",
+        "trials without a gain": lambda one: f"{one.without} of {one.trials}",
         "stable winners": lambda one: f"{one.stable} of {one.winners}",
         "improving winners": lambda one: f"{one.improving} of {one.winners}",
         "best generation": lambda one: f"{one.generation:.1f}",

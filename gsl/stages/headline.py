@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -40,7 +41,9 @@ class Unit(NamedTuple):
         return f"{self.factor * value:{'+' if sign else ''}.1f}"
 
     def interval(self, bounds: list[float | None], *, sign: bool = False) -> str:
-        """Return an interval without its unit."""
+        """Return an interval without its unit, `-` if it has no ends: one value tells none."""
+        if any(bound is not None and math.isinf(bound) for bound in bounds):
+            return "-"
         size = self.factor * max((abs(bound) for bound in bounds if bound is not None), default=0.0)
         return " to ".join(self.bare(bound, sign=sign, size=size) for bound in bounds)
 

@@ -36,6 +36,7 @@ from gsl.storage.trajectories import read
 from gsl.tasks.task import SIM, Task
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot
+from gsl.worlds.gymnasium import try_out
 from gsl.worlds.world import World
 
 FIRST = "iteration_01"
@@ -89,6 +90,7 @@ class Iterate:
             problem = "is for a grounding that learns from real trajectories, in two iterations or more"
             raise ConfigError("aggregate", problem, given="true")
         self.chain.check(self.grounding)
+        try_out({"sim": self.sim, "real": self.real})
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
         with console.live_table(in_unit("grounded simulation learning", self.task.unit), rounds.columns) as table:
             start = self.chain.pretrained(home / "pretrained", self.seed, console) if self.pretrained else None

@@ -122,7 +122,7 @@ def _effective(told: Any) -> Any:
 def _read(path: Path, fields: Sequence[str]) -> dict[str, list[dict[str, Any]]]:
     """Return the rows of each trial."""
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
+        rows = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_figure)
     except (ValueError, OSError) as error:
         raise ArtifactError(path, f"is no file of trials: {error}") from error
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
@@ -136,6 +136,10 @@ def _read(path: Path, fields: Sequence[str]) -> dict[str, list[dict[str, Any]]]:
         last = row[RECIPE]
         found.setdefault(last, []).append(row)
     return found
+
+
+def _no_figure(name: str) -> None:
+    raise ValueError(f"{name} is no figure")
 
 
 def _number(row: Mapping[str, Any]) -> int:

@@ -46,8 +46,8 @@ class Table2:
         found = summaries(trials)
         oracles = {_best_noise(found, world) for world in dict.fromkeys(one.world for one in found)}
         titles = (
-            *("real world", "grounding", "improvement [%]", "95 % interval", "trials without", "best generation"),
-            *("stable winners", f"π0 and returned [{task.unit}]", "falls", "rank", "real episodes"),
+            *("real world", "grounding", "improvement [%]", "95 % interval", "trials without a gain"),
+            *("best generation", "stable winners", f"π0 and returned [{task.unit}]", "falls", "rank", "real episodes"),
             *("paper: improvement [%]", "paper: without", "paper: best generation"),
         )
         rows = [

@@ -34,7 +34,7 @@ from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
 from gsl.tasks.task import REAL, SIM
-from gsl.worlds.gymnasium import GymnasiumWorld
+from gsl.worlds.gymnasium import GymnasiumWorld, try_out
 from gsl.worlds.world import World
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "figure.png"
@@ -96,6 +96,8 @@ class NoiseStudy:
             check_alike(self.sims.get(name, self.iterate.sim).layout, world.layout)
         for grounding in self.methods.values():
             self.iterate.chain.check(grounding)
+        named = {f"{group}.{name}": one for group in ("worlds", "sims") for name, one in getattr(self, group).items()}
+        try_out({"iterate.sim": self.iterate.sim, **named})
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point._fields, console)
         keys = {number: recipe(replace(self, trials=1, known=None), number) for number in range(1, self.trials + 1)}

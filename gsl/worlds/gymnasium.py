@@ -6,12 +6,11 @@ both are vectors of one number.
 
 from __future__ import annotations
 
-import importlib
-import logging
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import field
-from functools import cached_property, partial
+from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any
 
 import gymnasium
@@ -23,9 +22,9 @@ from gsl.core.setting import component, setting
 from gsl.core.table import Table
 from gsl.errors import ConfigError, GslError
 from gsl.worlds.control_cost import Charged, ControlCost
-from gsl.worlds.mujoco import change_masses, without_remarks
+from gsl.worlds.environments import line, made, own_module
+from gsl.worlds.mujoco import change_masses
 
-_log = logging.getLogger("gsl")
 _STREAM = 11  # sets the noise on actions apart from the environment's own randomness, whose seed is the same
 
 
@@ -59,6 +58,12 @@ class GymnasiumWorld:
         arguments = ", ".join(f"{name}={value}" for name, value in self.kwargs.items())
         return f"{self.env_id} ({arguments})" if arguments else self.env_id
 
+    @property
+    def read_files(self) -> Mapping[str, Path]:
+        """The module of an environment of the user's own: a change there makes another world."""
+        module = own_module(self.env_id)
+        return {"env_id": module} if module else {}
+
     @cached_property
     def layout(self) -> Layout:
         """What an observation holds; building the environment tells."""
@@ -88,6 +93,21 @@ class GymnasiumWorld:
         """Build the environment."""
         return StateEnv(self)
 
+    def try_out(self) -> None:
+        """Take one step, so that an environment that fails does it before anything is learned.
+
+        Raises:
+            ConfigError: It fails.
+        """
+        env = self.make()
+        try:
+            env.reset(seed=0)
+            env.step(np.zeros(len(env.layout.joints)))
+        except GslError as error:
+            raise ConfigError("env_id", str(error).removeprefix(f"{self.told}: "), given=self.told) from error
+        finally:
+            env.close()
+
 
 class StateEnv(gymnasium.Env):
     """An environment whose observations and actions are vectors; `info["carried_out"]` is the action, noise and all."""
@@ -96,7 +116,7 @@ class StateEnv(gymnasium.Env):
 
     def __init__(self, world: GymnasiumWorld) -> None:
         self.world = world
-        env = _made(world.env_id, world.kwargs)
+        env = made(world.env_id, world.kwargs)
         if world.mass:
             change_masses(env, world.mass)
         self.charged: Charged | None = None
@@ -131,8 +151,10 @@ class StateEnv(gymnasium.Env):
         if seed is not None:
             self._rng = np.random.default_rng([seed, _STREAM])
         with self._told():
-            observation, info = self._env.reset(seed=seed)
-        return self._state(observation), info
+            told = self._env.reset(seed=seed)
+        if not (isinstance(told, tuple) and len(told) == 2 and isinstance(told[1], Mapping)):
+            raise GslError(f"{self.world.told}: its reset() returns no (observation, info)")
+        return self._state(told[0]), dict(told[1])
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Act: an action beyond its range counts as its end.
@@ -156,10 +178,14 @@ class StateEnv(gymnasium.Env):
                 self._env.action_space.dtype
             )
         with self._told():
-            observation, reward, ended, cut, info = self._env.step(given)
-        reward = float(reward)
-        if not np.isfinite(reward):
-            raise GslError(f"{self.world.told}: the reward is {reward}; its dynamics or its reward are broken")
+            told = self._env.step(given)
+        if not (isinstance(told, tuple) and len(told) == 5 and isinstance(told[4], Mapping)):
+            five = "(observation, reward, terminated, truncated, info)"
+            raise GslError(f"{self.world.told}: its step() returns no {five}")
+        observation, value, ended, cut, info = told
+        if not np.isfinite(reward := _number(value)):
+            problem = f"the reward is {line(value)}, no finite number; its dynamics or its reward are broken"
+            raise GslError(f"{self.world.told}: {problem}")
         info = {**info, "carried_out": sent}
         if noise and self.charged:
             reward = self.charged.corrected(reward, meant, sent, info)
@@ -177,7 +203,7 @@ class StateEnv(gymnasium.Env):
         except (KeyboardInterrupt, GslError):
             raise
         except Exception as error:
-            raise GslError(f"{self.world.told}: fails by itself: {type(error).__name__}: {_line(error)}") from error
+            raise GslError(f"{self.world.told}: fails by itself: {type(error).__name__}: {line(error)}") from error
 
     def _state(self, observation: Any) -> np.ndarray:
         state = np.array(observation, dtype=float).ravel() - self._lowest
@@ -191,67 +217,25 @@ class StateEnv(gymnasium.Env):
         return state
 
 
-def _made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
-    """Return a registered environment, or an instance of an importable class.
+def try_out(worlds: Mapping[str, Any]) -> None:
+    """Take a step in every environment among some worlds, by the setting that names them.
 
     Raises:
-        ConfigError: It does not exist, cannot be imported, or refuses its arguments.
+        ConfigError: One fails.
     """
-    make = _maker(name)
+    for name, world in worlds.items():
+        if isinstance(world, GymnasiumWorld):
+            try:
+                world.try_out()
+            except ConfigError as error:
+                raise error.under(name) from error
+
+
+def _number(reward: Any) -> float:
     try:
-        with without_remarks(), _without_gymnasiums_warnings():
-            env = make(**kwargs)
-    except gymnasium.error.DependencyNotInstalled as error:
-        needs = "needs MuJoCo: pip install 'gsl[mujoco]'" if "mujoco" in str(error).lower() else _line(error)
-        raise ConfigError("env_id", needs, given=name) from error
-    except gymnasium.error.Error as error:
-        hint = "" if ":" in name else "; one that a module of yours registers is module:id"
-        raise ConfigError("env_id", f"there is no such environment: {_line(error)}{hint}", given=name) from error
-    except Exception as error:
-        told = f"cannot be made: {type(error).__name__}: {_line(error)}"
-        if not kwargs:
-            raise ConfigError("env_id", told, given=name) from error
-        raise ConfigError("kwargs", f"{name} {told}", given=str(dict(kwargs))) from error
-    if not isinstance(env, gymnasium.Env):
-        raise ConfigError("env_id", "is no gymnasium.Env", given=name)
-    if env.spec and env.spec.id not in name:
-        _log.info("%s is %s", name, env.spec.id)
-    for lacking in ("observation_space", "action_space"):
-        if not isinstance(getattr(env, lacking, None), gymnasium.Space):
-            raise ConfigError("env_id", f"has no {lacking}", given=name)
-    return env
-
-
-def _maker(name: str) -> Callable[..., Any]:
-    place, separator, attribute = name.partition(":")
-    if not separator or not attribute.isidentifier():
-        with suppress(Exception), _without_gymnasiums_warnings():  # what is wrong with it, gymnasium will tell
-            importlib.import_module(str(gymnasium.spec(name).entry_point).partition(":")[0])
-        return partial(gymnasium.make, name, disable_env_checker=True)
-    try:
-        module = importlib.import_module(place)
-    except Exception as error:
-        absent = isinstance(error, ModuleNotFoundError) and error.name and f"{place}.".startswith(f"{error.name}.")
-        problem = "there is no such environment" if absent else "its module cannot be imported"
-        raise ConfigError("env_id", f"{problem}: {type(error).__name__}: {_line(error)}", given=name) from error
-    if not hasattr(module, attribute):
-        raise ConfigError("env_id", f"there is no such environment: {place} has no {attribute}", given=name)
-    return getattr(module, attribute)
-
-
-@contextmanager
-def _without_gymnasiums_warnings() -> Iterator[None]:
-    """Have gymnasium say nothing of a registered id; it would with every environment that is made."""
-    before = gymnasium.logger.min_level
-    gymnasium.logger.min_level = gymnasium.logger.ERROR
-    try:
-        yield
-    finally:
-        gymnasium.logger.min_level = before
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split()).rstrip(".")
+        return float(reward) if np.ndim(reward) == 0 else np.nan
+    except (TypeError, ValueError):
+        return np.nan
 
 
 def _state_size(world: GymnasiumWorld, space: gymnasium.Space[Any]) -> int:
@@ -260,7 +244,8 @@ def _state_size(world: GymnasiumWorld, space: gymnasium.Space[Any]) -> int:
     if isinstance(space, Box) and len(space.shape) == 1:
         return int(space.shape[0])
     what = f"{type(space).__name__} of shape {space.shape}" if space.shape else type(space).__name__
-    problem = f"observes a {what}; gsl needs a vector: wrap it (images are beyond GAT, the paper's section 10.3)"
+    advice = "let a class of your own flatten it (images are beyond GAT, the paper's section 10.3)"
+    problem = f"observes a {what}; gsl needs a vector: {advice}"
     raise ConfigError("env_id", problem, given=world.env_id)
 
 
@@ -277,7 +262,7 @@ def _action_size(world: GymnasiumWorld, space: gymnasium.Space[Any]) -> int:
     if not np.issubdtype(space.dtype, np.floating) or np.any(space.low >= space.high):
         raise ConfigError("env_id", "its actions have no room: the space is of integers or empty", given=world.env_id)
     if not space.is_bounded():
-        problem = "its actions have no bounds; wrap it with gymnasium.wrappers.TransformAction or give the space some"
+        problem = "its actions have no bounds; give the space some, in a class of your own"
         raise ConfigError("env_id", problem, given=world.env_id)
     return int(space.shape[0])
 
