@@ -35,7 +35,7 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str)
     """Return the figure.
 
     Args:
-        panels: By real world, which is called `environment, what is different`.
+        panels: By real world; those of one environment are called `environment, what is different`.
         reference: The method that is drawn as a line, its error as a band.
         title: What there is to see.
     """
@@ -60,10 +60,11 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str)
                 label, ends = reference if place == 0 else None, (place - 0.45, place + 0.45)
                 axes.fill_between(ends, mean - error, mean + error, color=REAL, alpha=0.15, linewidth=0)
                 axes.hlines(mean, *ends, color=REAL, linestyle="--", linewidth=1.4, label=label)
-            axes.set_xticks(places, [f"{noise:g}" for noise in bars.noises])
-            axes.set_xlabel("sd of action noise in real [half ranges]")
+            axes.set_xticks(places, [f"{noise:g}" for noise in bars.noises] if any(bars.noises) else ["no noise"])
             axes.set_ylabel("" if alike and axes is not grid[0, 0] else "return in real")
             axes.set_title(name, loc="left", fontsize=10.5)
         whole.legend(*axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9)
+        if any(noise for bars in panels.values() for noise in bars.noises):
+            whole.supxlabel("sd of action noise in real [half ranges]", fontsize="medium")
         headline(whole, title)
     return whole

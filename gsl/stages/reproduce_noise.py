@@ -109,11 +109,13 @@ class NoiseStudy:
         made = ledger.close(folder / DATA)
         points = [Point(**row) for row in ledger.figures]
         (folder / TABLE).write_text(f"{self._table(points)}\n{made}\n", encoding="utf-8")
+        environments = {world.env_id for world in self.worlds.values()}
+        of = f"{min(environments)}, " if len(environments) == 1 else ""
         panels = {
-            f"{place.env_id}, {world.replace('_', ' ')}": Bars(
+            f"{of}{world.replace('_', ' ')}": Bars(
                 self.noises, {name: self._means(points, world, method) for method, name in self._shown.items()}
             )
-            for world, place in self.worlds.items()
+            for world in self.worlds
         }
         title = f"Return in real, mean ± standard error ({several(self.trials, 'trial')}); hatched: without real data"
         noise_bars(folder / FIGURE, panels, REFERENCE, title=title)
