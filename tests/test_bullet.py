@@ -1,5 +1,6 @@
 """The world as an environment: what it promises whoever acts in it."""
 
+import os
 import subprocess
 import sys
 import warnings
@@ -81,7 +82,7 @@ def test_another_process_computes_the_same_bytes(env: BulletEnv) -> None:
         capture_output=True,
         check=True,
         cwd=root,
-        env={"PYTHONPATH": f"{root}:{root.parent}"},
+        env={**os.environ, "PYTHONPATH": f"{root}:{root.parent}"},
     )
     assert process.stdout == walked(env, 1, SECONDS).tobytes()
 
