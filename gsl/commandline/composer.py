@@ -23,6 +23,7 @@ from yaml import YAMLError
 from gsl.commandline.config_errors import Vocabulary, translated, unfit, unknown_key
 from gsl.commandline.known_settings import declared, known_keys, plain
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
+from gsl.core.setting import Setting
 from gsl.core.validation import did_you_mean
 from gsl.effects import __path__ as effects_path
 from gsl.errors import ConfigError, InputError
@@ -158,9 +159,10 @@ def _check_effects(composition: Composition) -> None:
 
 def _check_referred(command: str, composition: Composition) -> None:
     """Refuse a value of a recipe or preset that nothing of this command refers to: it would do nothing."""
-    told = OmegaConf.to_yaml(composition.config)
-    for key in map(key_of, composition.overrides):
-        if key.startswith(REFERRED) and f"${{{key}}}" not in told:
+    typed = [key for key in map(key_of, composition.overrides) if key.startswith(REFERRED)]
+    told = OmegaConf.to_yaml(composition.config) if typed else ""
+    for key in typed:
+        if f"${{{key}}}" not in told:
             last = key.rpartition(".")[2]
             keys = [one for one in known_keys(composition.config) if not one.startswith(REFERRED)]
             others = [one for one in keys if one.rpartition(".")[2] == last]
@@ -187,11 +189,15 @@ def _added_where_declared(command: str, overrides: list[str], multirun: bool) ->
 def _declares(command: str, overrides: list[str], key: str) -> bool:
     parent, _, name = key.rpartition(".")
     config = _composed(command, _first_values(_of_choices(overrides))[0])
-    if name in declared(plain(OmegaConf.select(config, parent) if parent else config)):
+    if name in _declared_at(config, parent):
         return True
     above, _, mapping = parent.rpartition(".")
-    around = declared(plain(OmegaConf.select(config, above) if above else config))
+    around = _declared_at(config, above)
     return mapping in around and around[mapping].named
+
+
+def _declared_at(config: DictConfig, path: str) -> Mapping[str, Setting]:
+    return declared(plain(OmegaConf.select(config, path) if path else config))
 
 
 def _of_choices(overrides: Sequence[str]) -> list[str]:

@@ -100,19 +100,29 @@ class DiagnosedEffects:
         raise ConfigError("grounding", "its effects are not switched on; a stage that uses it has to do that")
 
 
+def having_effects(world: World) -> Any:
+    """Return a world in which effects can be switched on.
+
+    Raises:
+        ConfigError: It has none.
+    """
+    if not is_dataclass(world) or isinstance(world, type) or not hasattr(world, "effects"):
+        raise ConfigError("grounding", "this world has no effects to switch on; take another grounding")
+    return world
+
+
 def switched_on(world: World, found: Diagnosis) -> World:
     """Return the world with what it lacks.
 
     Raises:
         ConfigError: It is not the simulator that was diagnosed.
     """
-    if not is_dataclass(world) or isinstance(world, type) or not hasattr(world, "effects"):
-        raise ConfigError("grounding", "this world has no effects to switch on; take another grounding")
-    settings = described(world)
+    simulator = having_effects(world)
+    settings = described(simulator)
     if found.verdict != "given" and (settings["robot"], settings["effects"]) != (found.robot, found.simulated):
         other = f"the {found.robot} with {', '.join(found.simulated) or 'no effects'}"
         raise ConfigError("grounding.diagnosis", f"is of another simulator: {other}; take this one")
-    return replace(world, effects=together([settings["effects"], found.effects]))
+    return replace(simulator, effects=together([settings["effects"], found.effects]))
 
 
 def innermost(grounding: Grounding) -> Grounding:

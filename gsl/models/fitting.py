@@ -77,7 +77,9 @@ def _surprise(head: Head, beta: float = 0.0) -> Loss:
         means, logs = raw[:, logits:].reshape(len(raw), 2, k, -1).unbind(1)
         normal = torch.distributions.Normal(means, logs.clamp(min=LEAST_LOG_SD).exp())
         each = normal.log_prob(targets[:, None])  # type: ignore[no-untyped-call]
-        each = (each * normal.scale.detach() ** (2.0 * beta)).sum(dim=2)
+        if beta:
+            each = each * normal.scale.detach() ** (2.0 * beta)
+        each = each.sum(dim=2)
         if logits:
             each = each + torch.log_softmax(raw[:, :logits], dim=1)
         return -torch.logsumexp(each, dim=1).mean() / targets.shape[1]

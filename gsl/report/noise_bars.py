@@ -26,22 +26,22 @@ class Bars(NamedTuple):
     values: Mapping[str, Sequence[tuple[float, float]]]
 
 
-def noise_bars(path: Path, panels: Mapping[str, Bars], reference: str, *, title: str) -> None:
+def noise_bars(path: Path, panels: Mapping[str, Bars], reference: str, *, title: str, alike: bool = False) -> None:
     """Write the figure as a PNG file; arguments as those of `noise_bars_figure`."""
-    save(noise_bars_figure(panels, reference, title=title), path)
+    save(noise_bars_figure(panels, reference, title=title, alike=alike), path)
 
 
-def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str) -> Figure:
+def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str, alike: bool = False) -> Figure:
     """Return the figure.
 
     Args:
-        panels: By real world; those of one environment are called `environment, what is different`.
+        panels: By real world.
         reference: The method that is drawn as a line, its error as a band.
         title: What there is to see.
+        alike: Whether the panels share their scale, as the returns of one environment do.
     """
     with look():
         whole = figure(3.8)
-        alike = len({name.partition(",")[0] for name in panels}) == 1  # returns of one environment are of one size
         grid = whole.subplots(1, len(panels), squeeze=False, sharey=alike)
         for axes, (name, bars) in zip(grid[0], panels.items(), strict=True):
             methods = [method for method in bars.values if method != reference]

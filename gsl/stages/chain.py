@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects, innermost, switched_on
+from gsl.grounding.effects import DiagnosedEffects, having_effects, innermost, switched_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
@@ -96,8 +96,8 @@ class Chain:
         Raises:
             ConfigError: Effects of a world that has none, a residual of an environment's states, or too few episodes.
         """
-        if isinstance(grounding, DiagnosedEffects | RandomisedEffects) and self.sim.layout.states:
-            raise ConfigError("grounding", "this world has no effects to switch on; take another grounding")
+        if isinstance(grounding, DiagnosedEffects | RandomisedEffects):
+            having_effects(self.sim)
         inner = innermost(grounding)
         if not isinstance(inner, ActionTransformation):
             return

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 
 from gsl.core.statistics import Interval
@@ -11,6 +10,7 @@ from gsl.stages.comparison import Summary, differences
 from gsl.stages.headline import Unit
 from gsl.stages.trial import Cell, Trial
 
+SHARE = Unit(name="%")
 BY_FALLS = ("stable winners", "falls in fresh episodes")
 
 
@@ -22,24 +22,21 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
     first, columns = found[0].method, _columns(found, unit)
     as_shares = all(trial.improvement is not None for trial in trials)
     figure = "improvement" if as_shares else "value"
-    shown = f"{figure} in real [%]" if as_shares else in_unit(f"{figure} in real", unit.name)
-
-    def difference(other: Summary) -> tuple[str, str]:
-        interval = differences(trials, Cell(*other[:4]), first, figure)
-        if as_shares:
-            return f"{interval.mean:+.1f}", told(interval)
-        return unit.shown(interval.mean, sign=True), unit.interval([interval.lower, interval.upper])
+    own = SHARE if as_shares else unit
+    shown = in_unit(f"{figure} in real", own.name)
 
     single, paired = [], []
     for one in found:
         values = [
-            (f"{trial.improvement:.1f}" if as_shares else unit.bare(trial.value)) + "*" * trial.without
+            own.bare(trial.improvement if as_shares else trial.value) + "*" * trial.without
             for trial in trials
             if trial.cell == one[:4]
         ]
         single.append((one.world, one.method, ", ".join(values)))
         if one.method != first:
-            paired.append((one.world, f"{one.method} - {first}", *difference(one)))
+            apart = differences(trials, Cell(*one[:4]), first, figure)
+            bounds = own.interval([apart.lower, apart.upper])
+            paired.append((one.world, f"{one.method} - {first}", own.bare(apart.mean, sign=True), bounds))
     return "\n".join(
         [
             table(tuple(columns), list(zip(*columns.values(), strict=True))),
@@ -53,7 +50,7 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
 
 def told(interval: Interval) -> str:
     """Return the bounds of an interval for people."""
-    return f"{interval.lower:.1f} to {interval.upper:.1f}" if math.isfinite(interval.upper) else "-"
+    return SHARE.interval([interval.lower, interval.upper])
 
 
 def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]]:

@@ -36,7 +36,6 @@ from gsl.storage.trajectories import read
 from gsl.tasks.task import SIM
 
 REPORT, FIGURE = "grounding.json", "grounding.png"
-_WHAT = "the grounded action"
 
 
 def grounding_parents(grounding: Any, path: str = "grounding") -> Mapping[str, Path]:
@@ -97,8 +96,7 @@ class Gate:
             return self._transformed(scenario, scenario.grounding)
         if isinstance(scenario.grounding, RandomisedEffects):
             return self._randomised(scenario, scenario.grounding)
-        if not isinstance(scenario.grounding, NoGrounding):
-            warn_uncharged(scenario.world, self.console, SIM, _WHAT)
+        self._charged(scenario)
         return scenario, {}
 
     def _randomised(self, scenario: Scenario, settings: RandomisedEffects) -> tuple[Scenario, Mapping[str, Any]]:
@@ -158,7 +156,7 @@ class Gate:
 
     def _of_states(self, ready: Scenario, heldout: Batch) -> tuple[Scenario, Mapping[str, Any]]:
         """Compare what π0 is worth with held-out real episodes."""
-        warn_uncharged(ready.world, self.console, SIM, _WHAT)
+        self._charged(ready)
         real = of_policy(heldout, pi0=True) or heldout.episodes
         noise = exploration(heldout.metadata.get("action_noise", 0.0), ready.world.layout)
         report = value_report(ready, self.parameters, real, noise, derived_seed(self.seed, "check"))
@@ -166,6 +164,10 @@ class Gate:
         self.console.table("π0 in the grounded simulator", VALUE_TITLES, report.rows(), report.told)
         self._judge(report.problems, "Collect more data")
         return ready, {"grounding_acceptable": not report.problems}
+
+    def _charged(self, scenario: Scenario) -> None:
+        if not isinstance(scenario.grounding, NoGrounding):
+            warn_uncharged(scenario.world, self.console, SIM, "the grounded action")
 
     def _chosen(self, scenario: Scenario, loaded: LoadedTransformation, validation: Batch) -> tuple[str, ...]:
         """Return the joints to ground, and tell them."""

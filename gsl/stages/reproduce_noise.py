@@ -110,7 +110,8 @@ class NoiseStudy:
         points = [Point(**row) for row in ledger.figures]
         (folder / TABLE).write_text(f"{self._table(points)}\n{made}\n", encoding="utf-8")
         environments = {world.env_id for world in self.worlds.values()}
-        of = f"{min(environments)}, " if len(environments) == 1 else ""
+        alike = len(environments) == 1
+        of = f"{min(environments)}, " if alike else ""
         panels = {
             f"{of}{world.replace('_', ' ')}": Bars(
                 self.noises, {name: self._means(points, world, method) for method, name in self._shown.items()}
@@ -118,7 +119,7 @@ class NoiseStudy:
             for world in self.worlds
         }
         title = f"Return in real, mean ± standard error ({several(self.trials, 'trial')}); hatched: without real data"
-        noise_bars(folder / FIGURE, panels, REFERENCE, title=title)
+        noise_bars(folder / FIGURE, panels, REFERENCE, title=title, alike=alike)
         return {"points": len(points)}
 
     @property

@@ -73,10 +73,9 @@ def _maker(name: str) -> Callable[..., Any]:
 def own_module(name: str) -> Path | None:
     """Return the file of the module in `module:Class`; None of what is installed, or is gsl's own."""
     module, separator, _ = name.partition(":")
-    try:
+    found = None
+    with suppress(Exception):  # what is wrong with a package around it, `made` tells
         found = importlib.util.find_spec(module) if separator else None
-    except (ImportError, ValueError):
-        return None
     if found is None or not found.has_location or found.origin is None:
         return None
     path = Path(found.origin)
