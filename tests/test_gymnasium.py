@@ -647,7 +647,9 @@ def test_the_other_studies_of_environments_are_one_command(figure: str, worlds: 
     pytest.importorskip("sb3_contrib")
     few = ("trials=1", "workers=1", "iterate.budget.real_episodes=3", "iterate.budget.sim_episodes=3", "~methods.sgat")
     few += ("iterate.budget.episodes=1", "iterate.budget.rollouts=1")
-    left = ("noises=[0.6]", "~methods.ane_02", "~methods.ane_06") if figure == "fig13" else ("~methods.ane",)
+    left = ("noises=[0.6]", "~methods.ane_02", "~methods.ane_06")
+    if chosen := figure == "garat":
+        left = ("~methods.ane", "further.generations=2", "further.steps=1024", "iterate.budget.confirmation=2")
     done("reproduce", figure, "preset=toy", *few, *left, folder=tmp_path)
     folder = tmp_path / f"runs/{figure}/reproduce"
     points = json.loads((folder / "points.json").read_text())
@@ -655,6 +657,7 @@ def test_the_other_studies_of_environments_are_one_command(figure: str, worlds: 
     assert all(one["real_steps"] > 0 and np.isfinite(one["promised"]) for one in points if one["method"] != "none")
     table = (folder / "table.md").read_text()
     assert "±" not in table.splitlines()[2] and " -> " in table  # one trial has no standard error
+    assert ("chosen on 1 real episode each" in table and "\n2 others" in table) == chosen
     assert (folder / "figure.png").stat().st_size > 10_000
 
 

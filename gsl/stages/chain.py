@@ -88,7 +88,8 @@ class Chain:
 
     def after(self, place: Path) -> Chain:
         """Return the links of the round after the one below `place`, which keep its real trajectories if so wanted."""
-        return replace(self, earlier=(*self.earlier, str(place / "collect_real"))) if self.aggregate else self
+        data = self.shared.get(REAL, place) / "collect_real"
+        return replace(self, earlier=(*self.earlier, str(data))) if self.aggregate else self
 
     def check(self, grounding: Grounding | ActionTransformation) -> None:
         """Refuse what could not be trained, before anything is asked of the real robot.

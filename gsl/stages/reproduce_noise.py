@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -47,7 +47,7 @@ class Point(NamedTuple):
     Attributes:
         value: Mean return of its policy in the real world.
         real_steps: In the real world, that it learned from; None of a search there, whose steps nobody counts.
-        promised: Mean return of its policy where that was learned; None of trials that were made before this was kept.
+        promised: Best mean return where its policy was learned; None of trials that were made before this was kept.
     """
 
     world: str
@@ -64,7 +64,7 @@ class NoiseStudy:
     """Every trial begins with a policy from the plain simulator, and goes on from it with each method.
 
     The same effort for each; without grounding and with action noise it is the same search for all real worlds. The
-    reference learns in the real world itself.
+    reference learns in the real world itself. Where the real world chooses, a further round goes on from its choice.
     """
 
     kind: ClassVar[str] = "reproduce"
@@ -78,13 +78,17 @@ class NoiseStudy:
     sims: Annotated[Mapping[str, GymnasiumWorld], setting("simulators of worlds that have one of their own")] = field(
         default_factory=dict
     )
+    choice: Annotated[Literal["sim", "real"], setting("where the best of a search's generations is chosen")] = "sim"
     workers: Workers = -1
     known: Known = None
 
     def __post_init__(self) -> None:
-        """Refuse what only several iterations know."""
-        if self.iterate.aggregate:
+        """Refuse what only several iterations know, and those of what nothing real has chosen."""
+        rounds = self.iterate.iterations
+        if self.iterate.aggregate and rounds == 1:
             raise ConfigError("iterate.aggregate", "is for several iterations; a trial here has one", given="true")
+        if rounds > 1 and self.choice == SIM:
+            raise ConfigError("iterate.iterations", "several need choice=real, to go on from", given=str(rounds))
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -149,33 +153,71 @@ class NoiseStudy:
             for method, grounding in self.methods.items():
                 learned = isinstance(innermost(grounding), ActionTransformation)
                 place = (below if learned else alone) / method / name
-                ready = at.ready(place, grounding, start, seed, console)
-                policy = at.search(place / "optimize", ready, start, seed, console)
-                value = self._value(at, below / method / name / "evaluate", policy, seed, console)
-                spent, promised = _steps(shared[REAL]) if learned else 0, policy.metrics["best_value_sim"]
-                points.append(Point(world, noise, method, number, value, spent, promised))
-            on_real = replace(at, sim=real).search(
-                below / "real" / name / "optimize", NoGrounding(), start, seed, console
-            )
-            value = self._value(at, below / "real" / name / "evaluate", on_real, seed, console)
-            steps = self.further.taken if isinstance(self.further, Trpo) else None
-            points.append(Point(world, noise, REFERENCE, number, value, steps, on_real.metrics["best_value_sim"]))
+                one = self._rounds(at, place, below / method / name, grounding, start, seed, console)
+                points.append(Point(world, noise, method, number, *one))
+            place = below / "real" / name
+            one = self._rounds(replace(at, sim=real), place, place, NoGrounding(), start, seed, console)
+            points.append(Point(world, noise, REFERENCE, number, *one)._replace(real_steps=self._taken))
         return points
+
+    def _rounds(
+        self,
+        chain: Chain,
+        first: Path,
+        place: Path,
+        grounding: Grounding | ActionTransformation,
+        start: str,
+        seed: int,
+        console: Any,
+    ) -> tuple[float, int, float]:
+        """Return the value of a method's policy, the real steps that it learned from, and what was promised.
+
+        The first search is built below `first`, which may serve several real worlds; all else below `place`.
+        """
+        only, chosen = (BEST, "last") if self.choice == SIM else ("", "returned")
+        learned, spent = isinstance(innermost(grounding), ActionTransformation), 0
+        home, out = first, place
+        for number in range(1, self.iterate.iterations + 1):
+            if number > 1:
+                home = out = place / f"iteration_{number:02d}"
+            ready = chain.ready(home, grounding, start, seed, console)
+            found = chain.search(home / "optimize", ready, start, seed, console)
+            measured = chain.measure(out / "evaluate", found, seed, console, only=only)
+            spent += _steps(chain.shared.get(REAL, home)) if learned else 0
+            start, chain, seed = str(measured.folder), replace(chain.after(home), shared={}), seed + 1000
+        value = measured.metrics[chosen]["value"]
+        return float(value), spent, found.metrics["best_value_sim"]
+
+    @property
+    def _taken(self) -> int | None:
+        """Real steps of the reference; None of a search there, whose steps nobody counts."""
+        return self.iterate.iterations * self.further.taken if isinstance(self.further, Trpo) else None
 
     @property
     def _reference(self) -> str:
         """How much of the real world the reference learned from."""
         if isinstance(self.further, Trpo):
-            return f"{self.further.taken:,} steps"
-        return f"{self.further.generations * self.further.candidates * self.iterate.budget.rollouts:,} episodes"
+            return f"{self._taken:,} steps"
+        each = self.further.generations * self.further.candidates * self.iterate.budget.rollouts
+        return f"{self.iterate.iterations * each:,} episodes"
+
+    @property
+    def _chosen(self) -> list[str]:
+        """What a choice in the real world took."""
+        if self.choice == SIM:
+            return []
+        budget, rounds = self.iterate.budget, self.iterate.iterations
+        each = several(budget.episodes, "real episode")
+        return [
+            f"{several(rounds, 'round')}; in each the best of {self.further.generations + 1} policies, the",
+            f"generations and what they began with, was chosen on {each} each, the reference's too;",
+            f"values are of {budget.confirmation} others.",
+        ]
 
     def _chain(self, sim: World) -> Chain:
         """Return the links in a simulator, for whose sizes the policy is made anew."""
         policy = sized(self.iterate.policy, sim)
         return replace(self.iterate.chain, sim=sim, policy=policy, workers=1, accept=True)
-
-    def _value(self, chain: Chain, place: Path, policy: Any, seed: int, console: Any) -> float:
-        return float(chain.measure(place, policy, seed, console, only=BEST).metrics["last"]["value"])
 
     def _values(
         self, points: Sequence[Point], world: str, noise: float, method: str, figure: str = "value"
@@ -200,6 +242,7 @@ class NoiseStudy:
         below = [
             f"Mean ± standard error over {several(self.trials, 'trial')}; real steps are the median and range of",
             f"what learned groundings saw; the reference learned from {self._reference}.",
+            *self._chosen,
         ]
         titles = ("real world", "noise", *self._shown.values(), "sgat - gat (95 %)", "real steps")
         return "\n".join([markdown(titles, rows), *below, "", *self._differences(points), *self._promises(points)])
@@ -216,7 +259,8 @@ class NoiseStudy:
             ]
             rows.append((world, f"{noise:g}", *(f"{promised:.0f} -> {value:.0f}" for promised, value in each)))
         shown = [name for method, name in self._shown.items() if method != REFERENCE]
-        below = "Mean return where a policy was learned, of a few episodes, and in real."
+        best = "" if self.choice == SIM else "the best "
+        below = f"Mean return {best}where a policy was learned, of a few episodes, and in real."
         return [markdown(("real world", "noise", *shown), rows), below, ""]
 
     def _differences(self, points: Sequence[Point]) -> list[str]:
