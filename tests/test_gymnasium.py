@@ -657,7 +657,7 @@ def test_the_other_studies_of_environments_are_one_command(figure: str, worlds: 
     assert all(one["real_steps"] > 0 and np.isfinite(one["promised"]) for one in points if one["method"] != "none")
     table = (folder / "table.md").read_text()
     assert "±" not in table.splitlines()[2] and " -> " in table  # one trial has no standard error
-    assert ("chosen on 1 real episode each" in table and "\n2 others" in table) == chosen
+    assert ("chosen on 1 real episode each" in table and "values are of 2 others" in table) == chosen
     assert (folder / "figure.png").stat().st_size > 10_000
 
 
