@@ -151,7 +151,7 @@ def test_a_method_has_one_colour_in_all_figures() -> None:
     budget = budget_curve_figure({"p": {name: Line((1, 2), one) for name in ("sgat", "gat")}}, {}, "t").axes[0]
     noise = noise_curve_figure({name: Curve((0.1, 0.2), one) for name in ("gat", "sgat")}, {}, "t").axes[0]
     values = {name: [(1.0, 0.1)] for name in ("gat", "sgat")}
-    bars = noise_bars_figure({"w": Bars((0.5,), values)}, "none", title="t").axes[0]
+    bars = noise_bars_figure({"w": Bars(("0.5",), values)}, "none", title="t", along="noise").axes[0]
     drawn = [line.get_color() for axes in (budget, noise) for line in axes.lines if line.get_marker() == "o"]
     assert drawn == [SGAT, GAT, GAT, SGAT]
     assert [to_hex(one.patches[0].get_facecolor()) for one in bars.containers if hasattr(one, "patches")] == [GAT, SGAT]
@@ -159,7 +159,7 @@ def test_a_method_has_one_colour_in_all_figures() -> None:
 
 def test_bars_tell_widths_of_noise_apart() -> None:
     values = {name: [(1.0, 0.1)] for name in ("none", "ane 0.2", "ane 0.4", "gat", "trained on real")}
-    (axes,) = noise_bars_figure({"a world": Bars((0.5,), values)}, "trained on real", title="t").axes
+    (axes,) = noise_bars_figure({"a world": Bars(("0.5",), values)}, "trained on real", title="t", along="noise").axes
     hatches = {bars.get_label(): bars.patches[0].get_hatch() for bars in axes.containers if hasattr(bars, "patches")}
     assert hatches["ane 0.2"] != hatches["ane 0.4"] and not hatches["gat"]
     assert "trained on real" not in hatches

@@ -109,7 +109,7 @@ def test_what_is_for_several_iterations_is_refused_where_there_is_one(tmp_path: 
         said = refused("iterate", "aggregate=true", *asked, folder=tmp_path)
         assert said.startswith("aggregate = true: is for a grounding that learns from real trajectories")
     said = gsl("reproduce", "fig12", "iterate.aggregate=true", folder=tmp_path)
-    assert said.code == 2 and "iterate.aggregate = true: is for several iterations" in said.lines[-1]
+    assert said.code == 2 and "iterate.aggregate = true: is for a grounding that learns" in said.lines[-1]
 
 
 @pytest.mark.parametrize(("method", "bound"), [("regression", 0.03), ("solve", 0.6)])

@@ -1,6 +1,6 @@
-"""Return at each noise of the real world: bars with standard errors, and a line for what training there gives.
+"""Return at each noise of the real world, or after each round: bars with standard errors, a line for training there.
 
-As the paper's figures 12 and 13: striped bars used no real data.
+As the paper's figures 12 and 13: models of striped bars knew no real data.
 """
 
 from __future__ import annotations
@@ -20,24 +20,29 @@ HATCHES = ("///", "...", "xxx")  # of what uses no real data: of several widths 
 
 
 class Bars(NamedTuple):
-    """Means and standard errors of each method at each noise."""
+    """Means and standard errors of each method at each tick."""
 
-    noises: Sequence[float]
+    ticks: Sequence[str]
     values: Mapping[str, Sequence[tuple[float, float]]]
 
 
-def noise_bars(path: Path, panels: Mapping[str, Bars], reference: str, *, title: str, alike: bool = False) -> None:
+def noise_bars(
+    path: Path, panels: Mapping[str, Bars], reference: str, *, title: str, along: str, alike: bool = False
+) -> None:
     """Write the figure as a PNG file; arguments as those of `noise_bars_figure`."""
-    save(noise_bars_figure(panels, reference, title=title, alike=alike), path)
+    save(noise_bars_figure(panels, reference, title=title, along=along, alike=alike), path)
 
 
-def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str, alike: bool = False) -> Figure:
+def noise_bars_figure(
+    panels: Mapping[str, Bars], reference: str, *, title: str, along: str, alike: bool = False
+) -> Figure:
     """Return the figure.
 
     Args:
         panels: By real world.
         reference: The method that is drawn as a line, its error as a band.
         title: What there is to see.
+        along: What the ticks are.
         alike: Whether the panels share their scale, as the returns of one environment do.
     """
     with look():
@@ -45,7 +50,7 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str,
         grid = whole.subplots(1, len(panels), squeeze=False, sharey=alike)
         for axes, (name, bars) in zip(grid[0], panels.items(), strict=True):
             methods = [method for method in bars.values if method != reference]
-            places, width = np.arange(len(bars.noises)), 0.8 / max(1, len(methods))
+            places, width = np.arange(len(bars.ticks)), 0.8 / max(1, len(methods))
             noisy = [method for method in methods if method.startswith("ane")]
             for k, method in enumerate(methods):
                 means, errors = np.array(bars.values[method]).T
@@ -60,11 +65,11 @@ def noise_bars_figure(panels: Mapping[str, Bars], reference: str, *, title: str,
                 label, ends = reference if place == 0 else None, (place - 0.45, place + 0.45)
                 axes.fill_between(ends, mean - error, mean + error, color=REAL, alpha=0.15, linewidth=0)
                 axes.hlines(mean, *ends, color=REAL, linestyle="--", linewidth=1.4, label=label)
-            axes.set_xticks(places, [f"{noise:g}" for noise in bars.noises] if any(bars.noises) else ["no noise"])
+            axes.set_xticks(places, bars.ticks)
             axes.set_ylabel("" if alike and axes is not grid[0, 0] else "return in real")
             axes.set_title(name, loc="left", fontsize=10.5)
         whole.legend(*axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9)
-        if any(noise for bars in panels.values() for noise in bars.noises):
-            whole.supxlabel("sd of action noise in real [half ranges]", fontsize="medium")
+        if along:
+            whole.supxlabel(along, fontsize="medium")
         headline(whole, title)
     return whole

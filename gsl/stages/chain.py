@@ -55,6 +55,11 @@ class Budget:
     confirmation: Annotated[int, setting("fresh real episodes of the chosen policy", ge=2)]
     tolerated: Annotated[float, setting("share of falls up to which a policy counts as stable", ge=0, le=1)] = 0.0
 
+    def __post_init__(self) -> None:
+        """Refuse a single episode as the check of a policy that may fall."""
+        if self.tolerated and self.check < 2:
+            raise ConfigError("check", "needs two episodes at least where falls are tolerated", given=str(self.check))
+
     @property
     def real(self) -> tuple[int, int]:
         """Real episodes of the policy and of its neighbours that models learn from."""

@@ -18,7 +18,7 @@ from gsl.stages.comparison import summaries
 from gsl.stages.comparison_table import markdown
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.headline import Unit
-from gsl.stages.iterate import Iterate
+from gsl.stages.iterate import Iterate, check_aggregate
 from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.trial import Cell, Trial
 from gsl.stages.values import ranked
@@ -70,6 +70,7 @@ class Compare:
         """Return all trials, built beside `folder` and told as they end, and who made them; write them down."""
         for grounding in self.methods.values():
             self.iterate.chain.check(grounding)
+        check_aggregate(self.iterate, self.methods.values(), "iterate.aggregate")
         home, simulators = folder.parent, self.simulators or {"": self.iterate.sim}
         for sim, real in product(simulators.values(), self.worlds.values()):
             check_alike(sim.layout, real.layout)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -86,9 +86,7 @@ class Iterate:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run the iterations, write the policy they end with, the table and the plots."""
-        if self.aggregate and not (self.learned and self.iterations > 1):
-            problem = "is for a grounding that learns from real trajectories, in two iterations or more"
-            raise ConfigError("aggregate", problem, given="true")
+        check_aggregate(self, [self.grounding], "aggregate")
         self.chain.check(self.grounding)
         try_out({"sim": self.sim, "real": self.real})
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
@@ -174,6 +172,18 @@ class Iterate:
             return  # there are no joints to draw, or nobody knows where the body was
         write_trace(folder, scenario.world, scenario.grounding, walk)
         walk_strip(scenario.world.plant.robot, walk, folder / "walk.png")
+
+
+def check_aggregate(iterate: Iterate, groundings: Iterable[Grounding | ActionTransformation], name: str) -> None:
+    """Refuse to keep real trajectories for an f that is fitted once, or never.
+
+    Raises:
+        ConfigError: Under the name of the setting.
+    """
+    learned = any(isinstance(innermost(one), ActionTransformation) for one in groundings)
+    if iterate.aggregate and not (learned and iterate.iterations > 1):
+        problem = "is for a grounding that learns from real trajectories, in two iterations or more"
+        raise ConfigError(name, problem, given="true")
 
 
 def _iteration(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from itertools import product
 from pathlib import Path
@@ -28,8 +28,9 @@ from gsl.policies.policy import sized
 from gsl.report.markdown import table as markdown
 from gsl.report.noise_bars import Bars, noise_bars
 from gsl.stages.chain import Chain
+from gsl.stages.evaluate import TABLE as EVALUATION
 from gsl.stages.headline import several
-from gsl.stages.iterate import Iterate
+from gsl.stages.iterate import Iterate, check_aggregate
 from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
@@ -41,30 +42,56 @@ TABLE, DATA, FIGURE = "table.md", "points.json", "figure.png"
 REFERENCE, BOTH = "trained on real", {"gat", "sgat"}
 
 
+class Round(NamedTuple):
+    """What a round of a method came to; attributes as those of `Point`."""
+
+    round: int
+    value: float
+    real_steps: int | None
+    choice_steps: int
+    promised: float | None
+
+
+class Place(NamedTuple):
+    """Where methods are compared: in a real world, at a noise of it, after a round of grounding."""
+
+    world: str
+    noise: float
+    round: int
+
+
 class Point(NamedTuple):
-    """One method, once, in one real world.
+    """One method, once, in one real world, after one round.
 
     Attributes:
         value: Mean return of its policy in the real world.
-        real_steps: In the real world, that it learned from; None of a search there, whose steps nobody counts.
-        promised: Best mean return where its policy was learned; None of trials that were made before this was kept.
+        real_steps: In the real world, that it learned from so far; None of a search there, whose steps nobody counts.
+        choice_steps: In the real world, that chose its policy so far.
+        promised: Mean return of its policy where that was learned; None of the policy that all begin with.
     """
 
     world: str
     noise: float
     method: str
     trial: int
+    round: int
     value: float
     real_steps: int | None
+    choice_steps: int
     promised: float | None
+
+    @property
+    def place(self) -> Place:
+        """Where it was measured."""
+        return Place(self.world, self.noise, self.round)
 
 
 @component
 class NoiseStudy:
     """Every trial begins with a policy from the plain simulator, and goes on from it with each method.
 
-    The same effort for each; without grounding and with action noise it is the same search for all real worlds. The
-    reference learns in the real world itself. Where the real world chooses, a further round goes on from its choice.
+    The same effort for each; without grounding and with action noise the first search is the same for all real worlds.
+    The reference learns in the real world itself. A further round goes on from the policy that the real world chose.
     """
 
     kind: ClassVar[str] = "reproduce"
@@ -83,12 +110,11 @@ class NoiseStudy:
     known: Known = None
 
     def __post_init__(self) -> None:
-        """Refuse what only several iterations know, and those of what nothing real has chosen."""
-        rounds = self.iterate.iterations
-        if self.iterate.aggregate and rounds == 1:
-            raise ConfigError("iterate.aggregate", "is for several iterations; a trial here has one", given="true")
-        if rounds > 1 and self.choice == SIM:
-            raise ConfigError("iterate.iterations", "several need choice=real, to go on from", given=str(rounds))
+        """Refuse what only several rounds know, and rounds that go on from what nothing real has chosen."""
+        check_aggregate(self.iterate, self.methods.values(), "iterate.aggregate")
+        if self.iterate.iterations > 1 and self.choice == SIM:
+            given = str(self.iterate.iterations)
+            raise ConfigError("iterate.iterations", "several need choice=real, to go on from", given=given)
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -113,18 +139,28 @@ class NoiseStudy:
         made = ledger.close(folder / DATA)
         points = [Point(**row) for row in ledger.figures]
         (folder / TABLE).write_text(f"{self._table(points)}\n{made}\n", encoding="utf-8")
+        self._draw(folder / FIGURE, points)
+        return {"points": len(points)}
+
+    def _draw(self, path: Path, points: Sequence[Point]) -> None:
+        """Draw the returns against the noise, or against the rounds if there are several of these and one noise."""
         environments = {world.env_id for world in self.worlds.values()}
         alike = len(environments) == 1
         of = f"{min(environments)}, " if alike else ""
-        panels = {
-            f"{of}{world.replace('_', ' ')}": Bars(
-                self.noises, {name: self._means(points, world, method) for method, name in self._shown.items()}
-            )
-            for world in self.worlds
-        }
-        title = f"Return in real, mean ± standard error ({several(self.trials, 'trial')}); hatched: without real data"
-        noise_bars(folder / FIGURE, panels, REFERENCE, title=title, alike=alike)
-        return {"points": len(points)}
+        last = self._rounds[-1]
+        if by_round := len(self.noises) == 1 and last > 1:
+            ticks, along = [f"{one}" for one in self._rounds], "rounds"
+        else:
+            ticks = [f"{noise:g}" for noise in self.noises] if any(self.noises) else ["no noise"]
+            along = "sd of action noise in real [half ranges]" if any(self.noises) else ""
+        panels = {}
+        for world in self.worlds:
+            where = [Place(*one) for one in product([world], self.noises, self._rounds if by_round else [last])]
+            means = {name: [_mean(_values(points, at, method)) for at in where] for method, name in self._shown.items()}
+            panels[f"{of}{world.replace('_', ' ')}"] = Bars(ticks, means)
+        hatched = "without real data" if self.choice == SIM else "models of no real data"
+        title = f"Return in real, mean ± standard error ({several(self.trials, 'trial')}); hatched: {hatched}"
+        noise_bars(path, panels, REFERENCE, title=title, along=along, alike=alike)
 
     @property
     def _shown(self) -> dict[str, str]:
@@ -136,14 +172,18 @@ class NoiseStudy:
         return {**told, REFERENCE: REFERENCE}
 
     @property
-    def _places(self) -> list[tuple[str, float]]:
-        return list(product(self.worlds, self.noises))
+    def _rounds(self) -> range:
+        return range(1, self.iterate.iterations + 1)
+
+    @property
+    def _places(self) -> list[Place]:
+        return [Place(*one) for one in product(self.worlds, self.noises, self._rounds)]
 
     def trial(self, number: int, home: Path) -> list[Point]:
         """Return all points of a trial, built below `home`."""
         seed, console = self.iterate.seed + number - 1, Console(json=True)
         name, points = f"trial_{number:02d}", []
-        for world, noise in self._places:
+        for world, noise in product(self.worlds, self.noises):
             real, sim = replace(self.worlds[world], action_noise=noise), self.sims.get(world)
             chain = self._chain(sim or self.iterate.sim)
             alone, below = home / (f"{world}_sim" if sim else "sim"), home / f"{world}_{noise:g}"
@@ -151,67 +191,60 @@ class NoiseStudy:
             shared = {SIM: alone / "models" / name, REAL: below / "models" / name}
             at = replace(chain, real=real, optimizer=self.further, shared=shared)
             for method, grounding in self.methods.items():
-                learned = isinstance(innermost(grounding), ActionTransformation)
-                place = (below if learned else alone) / method / name
-                one = self._rounds(at, place, below / method / name, grounding, start, seed, console)
-                points.append(Point(world, noise, method, number, *one))
+                place = below / method / name
+                first = place if _learned(grounding) else alone / method / name
+                for one in self._carried_out(at, grounding, first, place, start, seed):
+                    points.append(Point(world, noise, method, number, *one))
             place = below / "real" / name
-            one = self._rounds(replace(at, sim=real), place, place, NoGrounding(), start, seed, console)
-            points.append(Point(world, noise, REFERENCE, number, *one)._replace(real_steps=self._taken))
+            for one in self._carried_out(replace(at, sim=real), NoGrounding(), place, place, start, seed):
+                spent = one.round * self.further.taken if isinstance(self.further, Trpo) else None
+                points.append(Point(world, noise, REFERENCE, number, *one._replace(real_steps=spent)))
         return points
 
-    def _rounds(
+    def _carried_out(
         self,
         chain: Chain,
+        grounding: Grounding | ActionTransformation,
         first: Path,
         place: Path,
-        grounding: Grounding | ActionTransformation,
         start: str,
         seed: int,
-        console: Any,
-    ) -> tuple[float, int, float]:
-        """Return the value of a method's policy, the real steps that it learned from, and what was promised.
-
-        The first search is built below `first`, which may serve several real worlds; all else below `place`.
-        """
-        only, chosen = (BEST, "last") if self.choice == SIM else ("", "returned")
-        learned, spent = isinstance(innermost(grounding), ActionTransformation), 0
-        home, out = first, place
-        for number in range(1, self.iterate.iterations + 1):
+    ) -> Iterator[Round]:
+        """Yield the rounds of a method, built at `place`, but the first search at `first`, which worlds may share."""
+        home, console, spent, choice, promised = place, Console(json=True), 0, 0, None
+        for number in self._rounds:
             if number > 1:
-                home = out = place / f"iteration_{number:02d}"
-            ready = chain.ready(home, grounding, start, seed, console)
-            found = chain.search(home / "optimize", ready, start, seed, console)
-            measured = chain.measure(out / "evaluate", found, seed, console, only=only)
-            spent += _steps(chain.shared.get(REAL, home)) if learned else 0
-            start, chain, seed = str(measured.folder), replace(chain.after(home), shared={}), seed + 1000
-        value = measured.metrics[chosen]["value"]
-        return float(value), spent, found.metrics["best_value_sim"]
-
-    @property
-    def _taken(self) -> int | None:
-        """Real steps of the reference; None of a search there, whose steps nobody counts."""
-        return self.iterate.iterations * self.further.taken if isinstance(self.further, Trpo) else None
+                first = place = home / f"iteration_{number:02d}"
+            ready = chain.ready(first, grounding, start, seed, console)
+            found = chain.search(first / "optimize", ready, start, seed, console)
+            spent += _steps(chain.shared.get(REAL, first)) if _learned(grounding) else 0
+            if self.choice == SIM:
+                measured = chain.measure(place / "evaluate", found, seed, console, only=BEST)
+                value, promised = measured.metrics["last"]["value"], found.metrics["best_value_sim"]
+            else:
+                measured = chain.measure(place / "evaluate", found, seed, console)
+                value, choice = measured.metrics["returned"]["value"], choice + _choice_steps(measured.folder)
+                promised = measured.metrics["returned_value_sim"] if measured.metrics["best_generation"] else promised
+            yield Round(number, float(value), spent, choice, promised)
+            start, chain, seed = str(measured.folder), replace(chain.after(first), shared={}), seed + 1000
 
     @property
     def _reference(self) -> str:
-        """How much of the real world the reference learned from."""
+        """How much of the real world the reference learned from, in a round."""
         if isinstance(self.further, Trpo):
-            return f"{self._taken:,} steps"
-        each = self.further.generations * self.further.candidates * self.iterate.budget.rollouts
-        return f"{self.iterate.iterations * each:,} episodes"
+            return f"{self.further.taken:,} steps"
+        return f"{self.further.generations * self.further.candidates * self.iterate.budget.rollouts:,} episodes"
 
     @property
     def _chosen(self) -> list[str]:
         """What a choice in the real world took."""
         if self.choice == SIM:
             return []
-        budget, rounds = self.iterate.budget, self.iterate.iterations
+        budget = self.iterate.budget
         each = several(budget.episodes, "real episode")
         return [
-            f"{several(rounds, 'round')}; in each the best of {self.further.generations + 1} policies, the",
-            f"generations and what they began with, was chosen on {each} each, the reference's too;",
-            f"values are of {budget.confirmation} others.",
+            f"In each round the real world chose the best of {self.further.generations + 1} policies, those of the",
+            f"generations and the one it began with, by {each} each; values are of {budget.confirmation} others.",
         ]
 
     def _chain(self, sim: World) -> Chain:
@@ -219,73 +252,94 @@ class NoiseStudy:
         policy = sized(self.iterate.policy, sim)
         return replace(self.iterate.chain, sim=sim, policy=policy, workers=1, accept=True)
 
-    def _values(
-        self, points: Sequence[Point], world: str, noise: float, method: str, figure: str = "value"
-    ) -> list[float]:
-        return [getattr(one, figure) for one in points if one[:3] == (world, noise, method)]
+    def _titled(self, *titles: str) -> list[str]:
+        return ["real world", "noise", *(["round"] if len(self._rounds) > 1 else []), *titles]
 
-    def _means(self, points: Sequence[Point], world: str, method: str) -> list[tuple[float, float]]:
-        """Return mean and standard error at each noise."""
-        return [_mean(self._values(points, world, noise, method)) for noise in self.noises]
+    def _row(self, place: Place, *cells: str) -> list[str]:
+        return [place.world, f"{place.noise:g}", *([str(place.round)] if len(self._rounds) > 1 else []), *cells]
 
     def _table(self, points: Sequence[Point]) -> str:
         rows = []
-        for world, noise in self._places:
-            values = {method: self._values(points, world, noise, method) for method in self._shown}
+        for place in self._places:
+            values = {method: _values(points, place, method) for method in self._shown}
             means = [_mean(found) for found in values.values()]
             known = values.keys() >= BOTH and self.trials > 1
-            apart = mean_interval(np.subtract(values["sgat"], values["gat"])) if known else None
-            between = f"{apart.mean:+.0f} ({apart.lower:+.0f} to {apart.upper:+.0f})" if apart else "-"
-            spent = self._spent(points, world, noise)
+            apart = _difference(values["sgat"], values["gat"]) if known else "-"
             told = (f"{mean:.0f}" + f" ± {error:.0f}" * (self.trials > 1) for mean, error in means)
-            rows.append((world, f"{noise:g}", *told, between, spent))
+            here = [one for one in points if one.place == place]
+            spent = [_spent(one.real_steps for one in here if one.method != REFERENCE)]
+            spent += [_spent(one.choice_steps for one in here)] if self.choice == REAL else []
+            rows.append(self._row(place, *told, apart, *spent))
+        each = " in each round" if len(self._rounds) > 1 else ""
         below = [
             f"Mean ± standard error over {several(self.trials, 'trial')}; real steps are the median and range of",
-            f"what learned groundings saw; the reference learned from {self._reference}.",
+            f"what learned groundings saw; the reference learned from {self._reference}{each}.",
             *self._chosen,
         ]
-        titles = ("real world", "noise", *self._shown.values(), "sgat - gat (95 %)", "real steps")
+        titles = self._titled(*self._shown.values(), "sgat - gat (95 %)", "real steps")
+        titles += ["real steps of the choice"] if self.choice == REAL else []
         return "\n".join([markdown(titles, rows), *below, "", *self._differences(points), *self._promises(points)])
 
     def _promises(self, points: Sequence[Point]) -> list[str]:
         """Return the lines of a table of what policies were worth where they were learned, and in real."""
-        if any(one.promised is None for one in points):
-            return []
-        rows = []
-        for world, noise in self._places:
-            each = [
-                [np.mean(self._values(points, world, noise, method, figure)) for figure in ("promised", "value")]
-                for method in self.methods
-            ]
-            rows.append((world, f"{noise:g}", *(f"{promised:.0f} -> {value:.0f}" for promised, value in each)))
+        rows = [
+            self._row(place, *(_kept(_at(points, place, method)) for method in self.methods)) for place in self._places
+        ]
         shown = [name for method, name in self._shown.items() if method != REFERENCE]
-        best = "" if self.choice == SIM else "the best "
-        below = f"Mean return {best}where a policy was learned, of a few episodes, and in real."
-        return [markdown(("real world", "noise", *shown), rows), below, ""]
+        start = "" if self.choice == SIM else " In brackets trials that are where they began."
+        below = f"Mean return where a policy was learned, of a few episodes, and in real.{start}"
+        return [markdown(self._titled(*shown), rows), below, ""]
 
     def _differences(self, points: Sequence[Point]) -> list[str]:
         """Return the lines of a table of what learned groundings are above methods that know nothing, by trial."""
-        learned = [name for name, one in self.methods.items() if isinstance(innermost(one), ActionTransformation)]
+        learned = [name for name, one in self.methods.items() if _learned(one)]
         noisy = [name for name, one in self.methods.items() if isinstance(one, ActionNoise)]
         if self.trials < 2 or not learned:
             return []
         rows = []
-        for world, noise in self._places:
-            values = {method: np.array(self._values(points, world, noise, method)) for method in self.methods}
-            best = max(noisy, key=lambda name: values[name].mean(), default=None)
+        for place in self._places:
+            values = {method: _values(points, place, method) for method in self.methods}
+            best = max(noisy, key=lambda name: np.mean(values[name]), default=None)
             others = [name for name in ("none", best) if name in values]
-            found = (mean_interval(values[name] - values[other]) for other in others for name in learned)
-            told = (f"{one.mean:+.0f} ({one.lower:+.0f} to {one.upper:+.0f})" for one in found)
-            rows.append((world, f"{noise:g}", *told, *([self._shown[best]] if best else [])))
+            told = [_difference(values[name], values[other]) for other in others for name in learned]
+            rows.append(self._row(place, *told, *([self._shown[best]] if best else [])))
         others = [*(["none"] if "none" in self.methods else []), *(["best ane"] if noisy else [])]
         titles = [f"{name} - {other}" for other in others for name in learned]
         below = "Paired differences with 95 % intervals, which know nothing of the choice of the best width."
-        return [markdown(("real world", "noise", *titles, *(["best ane"] if noisy else [])), rows), below, ""]
+        return [markdown(self._titled(*titles, *(["best ane"] if noisy else [])), rows), below, ""]
 
-    def _spent(self, points: Sequence[Point], world: str, noise: float) -> str:
-        steps = [one.real_steps for one in points if one[:2] == (world, noise) and one.method != REFERENCE]
-        learned = [one for one in steps if one]
-        return f"{np.median(learned):,.0f} ({min(learned):,} to {max(learned):,})" if learned else "-"
+
+def _learned(grounding: Grounding | ActionTransformation) -> bool:
+    return isinstance(innermost(grounding), ActionTransformation)
+
+
+def _at(points: Sequence[Point], place: Place, method: str) -> list[Point]:
+    return [one for one in points if (one.place, one.method) == (place, method)]
+
+
+def _values(points: Sequence[Point], place: Place, method: str) -> list[float]:
+    return [one.value for one in _at(points, place, method)]
+
+
+def _difference(values: Sequence[float], others: Sequence[float]) -> str:
+    """Return the mean of paired differences with its interval, of values that are all the same none."""
+    differences = np.subtract(values, others)
+    if not differences.any():
+        return "-"
+    found = mean_interval(differences)
+    return f"{found.mean:+.0f} ({found.lower:+.0f} to {found.upper:+.0f})"
+
+
+def _kept(trials: Sequence[Point]) -> str:
+    """Return what policies promised and what the real world gave, and how many were what all began with."""
+    promised = [one.promised for one in trials if one.promised is not None]
+    value, start = np.mean([one.value for one in trials]), len(trials) - len(promised)
+    return (f"{np.mean(promised):.0f} -> " if promised else "") + f"{value:.0f}" + (f" ({start})" if start else "")
+
+
+def _spent(steps: Iterable[int | None]) -> str:
+    counted = [one for one in steps if one]
+    return f"{np.median(counted):,.0f} ({min(counted):,} to {max(counted):,})" if counted else "-"
 
 
 def _mean(values: Sequence[float]) -> tuple[float, float]:
@@ -296,6 +350,11 @@ def _mean(values: Sequence[float]) -> tuple[float, float]:
 
 def _steps(place: Path) -> int:
     return int(json.loads((place / "collect_real" / "metrics.json").read_text(encoding="utf-8"))["steps"])
+
+
+def _choice_steps(evaluation: Path) -> int:
+    told = json.loads((evaluation / EVALUATION).read_text(encoding="utf-8"))
+    return round(sum(one["episodes"] * one["outcome"]["steps"] for one in [*told["policies"], *told["check"]]))
 
 
 def _trial(frozen: bytes, job: tuple[int, Path]) -> list[Point]:
