@@ -158,7 +158,7 @@ class NoiseStudy:
             where = [Place(*one) for one in product([world], self.noises, self._rounds if by_round else [last])]
             means = {name: [_mean(_values(points, at, method)) for at in where] for method, name in self._shown.items()}
             panels[f"{of}{world.replace('_', ' ')}"] = Bars(ticks, means)
-        hatched = "without real data" if self.choice == SIM else "real data for the choice alone"
+        hatched = "without real data" if self.choice == SIM else "no model of real"
         title = f"Return in real, mean ± standard error ({several(self.trials, 'trial')}); hatched: {hatched}"
         noise_bars(path, panels, REFERENCE, title=title, along=along, alike=alike)
 
