@@ -33,7 +33,7 @@ from gsl.optimizers.trpo import Trpo
 from gsl.policies.mlp import Mlp
 from gsl.policies.policy import sized
 from gsl.stages.grounding_states import ValueReport, value_report
-from gsl.stages.reproduce_noise import Point
+from gsl.stages.noise_table import Point
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.simulator import GroundedSimulator
 from gsl.stages.train_states import forward_of_states, inverse_of_states

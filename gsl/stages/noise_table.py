@@ -1,0 +1,183 @@
+"""Tables of a study of environments: what methods came to, how they differ, what simulators promised."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from gsl.core.statistics import mean_interval
+from gsl.report.markdown import table as markdown
+
+REFERENCE, BOTH = "trained on real", {"gat", "sgat"}
+
+
+class Round(NamedTuple):
+    """What a round of a method came to; attributes as those of `Point`."""
+
+    round: int
+    value: float
+    real_steps: int | None
+    choice_steps: int
+    promised: float | None
+
+
+class Place(NamedTuple):
+    """Where methods are compared: in a real world, at a noise of it, after a round of grounding."""
+
+    world: str
+    noise: float
+    round: int
+
+
+class Point(NamedTuple):
+    """One method, once, in one real world, after one round.
+
+    Attributes:
+        value: Mean return of its policy in the real world.
+        real_steps: In the real world, that it learned from so far; None of a search there, whose steps nobody counts.
+        choice_steps: In the real world, that chose its policy so far.
+        promised: Mean return of its policy where that was learned; None of the policy that all begin with.
+    """
+
+    world: str
+    noise: float
+    method: str
+    trial: int
+    round: int
+    value: float
+    real_steps: int | None
+    choice_steps: int
+    promised: float | None
+
+    @property
+    def place(self) -> Place:
+        """Where it was measured."""
+        return Place(self.world, self.noise, self.round)
+
+
+@dataclass(frozen=True)
+class NoiseTable:
+    """The points of a study and what it is to say of them.
+
+    Attributes:
+        points: Of all trials, in their order.
+        places: A row of the tables each.
+        shown: Names for people of all methods, the reference's too.
+        learned: Methods that learn from the real world.
+        noisy: Methods that put noise on actions.
+        trials: How many there are.
+        chosen: Whether the real world chose among generations.
+    """
+
+    points: Sequence[Point]
+    places: Sequence[Place]
+    shown: Mapping[str, str]
+    learned: Sequence[str]
+    noisy: Sequence[str]
+    trials: int
+    chosen: bool
+
+    @property
+    def methods(self) -> list[str]:
+        """All methods but the reference."""
+        return [method for method in self.shown if method != REFERENCE]
+
+    def means(self, places: Sequence[Place]) -> dict[str, list[tuple[float, float]]]:
+        """Return mean and standard error of each method, by its name for people, at some places."""
+        return {
+            name: [_mean(_values(self.points, place, method)) for place in places]
+            for method, name in self.shown.items()
+        }
+
+    def told(self, *below: str) -> str:
+        """Return what all methods came to, with lines below that, their differences, and what simulators promised."""
+        rows = []
+        for place in self.places:
+            values = {method: _values(self.points, place, method) for method in self.shown}
+            means = [_mean(found) for found in values.values()]
+            known = values.keys() >= BOTH and self.trials > 1
+            apart = _difference(values["sgat"], values["gat"]) if known else "-"
+            told = (f"{mean:.0f}" + f" ± {error:.0f}" * (self.trials > 1) for mean, error in means)
+            here = [one for one in self.points if one.place == place]
+            spent = [_spent(one.real_steps for one in here if one.method != REFERENCE)]
+            spent += [_spent(one.choice_steps for one in here)] if self.chosen else []
+            rows.append(self._row(place, *told, apart, *spent))
+        titles = self._titled(*self.shown.values(), "sgat - gat (95 %)", "real steps")
+        titles += ["real steps of the choice"] if self.chosen else []
+        return "\n".join([markdown(titles, rows), *below, "", *self._differences(), *self._promises()])
+
+    def _promises(self) -> list[str]:
+        """Return the lines of a table of what policies were worth where they were learned, and in real."""
+        rows = [
+            self._row(place, *(_kept(_at(self.points, place, method)) for method in self.methods))
+            for place in self.places
+        ]
+        shown = [self.shown[method] for method in self.methods]
+        start = " In brackets trials that are where they began." if self.chosen else ""
+        below = f"Mean return where a policy was learned, of a few episodes, and in real.{start}"
+        return [markdown(self._titled(*shown), rows), below, ""]
+
+    def _differences(self) -> list[str]:
+        """Return the lines of a table of what learned groundings are above methods that know nothing, by trial."""
+        learned, noisy = self.learned, self.noisy
+        if self.trials < 2 or not learned:
+            return []
+        rows = []
+        for place in self.places:
+            values = {method: _values(self.points, place, method) for method in self.methods}
+            best = max(noisy, key=lambda name: np.mean(values[name]), default=None)
+            others = [name for name in ("none", best) if name in values]
+            told = [_difference(values[name], values[other]) for other in others for name in learned]
+            rows.append(self._row(place, *told, *([self.shown[best]] if best else [])))
+        others = [*(["none"] if "none" in self.methods else []), *(["best ane"] if noisy else [])]
+        titles = [f"{name} - {other}" for other in others for name in learned]
+        below = "Paired differences with 95 % intervals, which know nothing of the choice of the best width."
+        return [markdown(self._titled(*titles, *(["best ane"] if noisy else [])), rows), below, ""]
+
+    @property
+    def _several(self) -> bool:
+        return any(place.round > 1 for place in self.places)
+
+    def _titled(self, *titles: str) -> list[str]:
+        return ["real world", "noise", *(["round"] if self._several else []), *titles]
+
+    def _row(self, place: Place, *cells: str) -> list[str]:
+        return [place.world, f"{place.noise:g}", *([str(place.round)] if self._several else []), *cells]
+
+
+def _at(points: Sequence[Point], place: Place, method: str) -> list[Point]:
+    return [one for one in points if (one.place, one.method) == (place, method)]
+
+
+def _values(points: Sequence[Point], place: Place, method: str) -> list[float]:
+    return [one.value for one in _at(points, place, method)]
+
+
+def _difference(values: Sequence[float], others: Sequence[float]) -> str:
+    """Return the mean of paired differences with its interval, of values that are all the same none."""
+    differences = np.subtract(values, others)
+    if not differences.any():
+        return "-"
+    found = mean_interval(differences)
+    return f"{found.mean:+.0f} ({found.lower:+.0f} to {found.upper:+.0f})"
+
+
+def _kept(trials: Sequence[Point]) -> str:
+    """Return what policies promised and what the real world gave, and how many were what all began with."""
+    promised = [one.promised for one in trials if one.promised is not None]
+    value, start = np.mean([one.value for one in trials]), len(trials) - len(promised)
+    return (f"{np.mean(promised):.0f} -> " if promised else "") + f"{value:.0f}" + (f" ({start})" if start else "")
+
+
+def _spent(steps: Iterable[int | None]) -> str:
+    counted = [one for one in steps if one]
+    return f"{np.median(counted):,.0f} ({min(counted):,} to {max(counted):,})" if counted else "-"
+
+
+def _mean(values: Sequence[float]) -> tuple[float, float]:
+    """Return mean and standard error, 0 of a single value."""
+    error = np.std(values, ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0
+    return float(np.mean(values)), float(error)
