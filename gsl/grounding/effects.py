@@ -130,3 +130,8 @@ def innermost(grounding: Grounding) -> Grounding:
     while isinstance(grounding, DiagnosedEffects):
         grounding = grounding.inner
     return grounding
+
+
+def learned(grounding: Grounding) -> bool:
+    """Whether a grounding has models that learn from real trajectories."""
+    return isinstance(innermost(grounding), ActionTransformation)

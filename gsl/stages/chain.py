@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
@@ -21,7 +21,7 @@ from gsl.policies.policy import Policy
 from gsl.stages.collect import Collect
 from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.diagnosis_plan import DiagnosisPlan
-from gsl.stages.evaluate import Evaluate
+from gsl.stages.evaluate import Evaluate, check_tolerated
 from gsl.stages.headline import several
 from gsl.stages.link import built
 from gsl.stages.optimize import BEST, Optimize
@@ -57,8 +57,7 @@ class Budget:
 
     def __post_init__(self) -> None:
         """Refuse a single episode as the check of a policy that may fall."""
-        if self.tolerated and self.check < 2:
-            raise ConfigError("check", "needs two episodes at least where falls are tolerated", given=str(self.check))
+        check_tolerated(self.tolerated, self.check)
 
     @property
     def real(self) -> tuple[int, int]:
@@ -69,6 +68,14 @@ class Budget:
     def sim(self) -> tuple[int, int]:
         """The same of the simulator."""
         return self.sim_episodes, self.sim_neighbours
+
+
+class Round(NamedTuple):
+    """What a round has made: the grounding with its models, what the search found in it, its measurement in real."""
+
+    ready: Grounding
+    found: Artifact
+    measured: Artifact
 
 
 @dataclass(frozen=True)
@@ -113,6 +120,22 @@ class Chain:
             if count < FEWEST:
                 problem = f"{several(count, 'episode')} with neighbours; {FEWEST} are the least for a model: {WHY}"
                 raise ConfigError(f"budget.{role}_episodes", problem)
+
+    def round(
+        self,
+        place: Path,
+        grounding: Grounding,
+        previous: str | None,
+        seed: int,
+        console: Any,
+        *,
+        search: Path | None = None,
+        only: str = "",
+    ) -> Round:
+        """Ground, optimise and measure below `place`, from the previous policy; a search that is shared, elsewhere."""
+        ready = self.ready(place, grounding, previous, seed, console)
+        found = self.search((search or place) / "optimize", ready, previous, seed, console)
+        return Round(ready, found, self.measure(place / "evaluate", found, seed, console, only=only))
 
     def pretrained(self, place: Path, seed: int, console: Any) -> str:
         """Improve the policy's start values in the plain simulator at `place`; return the file of the best."""
@@ -213,6 +236,11 @@ class Chain:
             seed=seed,
         )
         return built(stage, out, console)
+
+
+def round_seed(seed: int, number: int) -> int:
+    """Return the seed of a round, the first being 1."""
+    return seed + 1000 * (number - 1)
 
 
 def as_needed(model: ModelConfig, grounding: ActionTransformation) -> ModelConfig:

@@ -10,10 +10,10 @@ from typing import Annotated, Any, ClassVar
 
 from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
-from gsl.grounding.effects import innermost
+from gsl.grounding.effects import learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
-from gsl.stages.chain import Chain
+from gsl.stages.chain import Chain, round_seed
 from gsl.stages.comparison import summaries
 from gsl.stages.comparison_table import markdown
 from gsl.stages.diagnosis_plan import flown
@@ -101,15 +101,13 @@ class Compare:
         spent, first, previous = flight.episodes if flight else 0, None, None
         if self.iterate.pretrained:
             previous = chain.pretrained(below / "sim" / "pretrained" / name, seed, console)
-        learned = isinstance(innermost(grounding), ActionTransformation)
         for iteration in range(1, self.iterate.iterations + 1):
             place = below / cell.world / cell.method / name / (f"iteration_{iteration:02d}" if iteration > 1 else "")
-            apart = learned or flight is not None or iteration > 1
-            spent += sum(self.iterate.budget.real) if learned else 0
-            ready = chain.ready(place, grounding, previous, seed, console)
+            apart = learned(grounding) or flight is not None or iteration > 1
+            spent += sum(self.iterate.budget.real) if learned(grounding) else 0
             out = place if apart else below / "sim" / cell.method / name
-            found = chain.search(out / "optimize", ready, previous, seed, console)
-            measured = chain.measure(place / "evaluate", found, seed, console)
+            at = round_seed(seed, iteration)
+            ready, found, measured = chain.round(place, grounding, previous, at, console, search=out)
             rank = self._ranked(chain, below / cell.world, out, ready, found, console) if iteration == 1 else None
             trial = Trial.of(
                 cell._replace(iteration=iteration),
@@ -123,7 +121,6 @@ class Compare:
             yield trial
             spent, previous, first = trial.real_episodes, str(measured.folder), first or measured.metrics
             chain = chain.after(place)
-            seed += 1000
 
     def _ranked(
         self, chain: Chain, world: Path, out: Path, ready: Grounding, found: Artifact, console: Any

@@ -69,8 +69,7 @@ class Evaluate:
 
     def __post_init__(self) -> None:
         """Tell the policy its world; refuse a single episode as the check of a policy that may fall."""
-        if self.tolerated and self.check < 2:
-            raise ConfigError("check", "needs two episodes at least where falls are tolerated", given=str(self.check))
+        check_tolerated(self.tolerated, self.check)
         object.__setattr__(self, "policy", sized(self.policy, self.world))
 
     def parents(self) -> Mapping[str, Path]:
@@ -164,6 +163,16 @@ class Evaluate:
             done = episodes(scenario, jobs, workers=self.workers, progress=progress)
         groups = [list(done[first : first + count]) for first in range(0, len(done), count)]
         return [_until_fall(group, to_the_end=to_the_end) for group in groups]
+
+
+def check_tolerated(tolerated: float, check: int) -> None:
+    """Refuse a single episode as the check of a policy that may fall.
+
+    Raises:
+        ConfigError: It is one.
+    """
+    if tolerated and check < 2:
+        raise ConfigError("check", "needs two episodes at least where falls are tolerated", given=str(check))
 
 
 def _ahead(done: Sequence[Episode], other: Sequence[Episode]) -> bool:

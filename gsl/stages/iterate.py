@@ -10,7 +10,7 @@ from gsl.core.layout import check_alike
 from gsl.core.observation import placed
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.grounding.effects import innermost
+from gsl.grounding.effects import learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
@@ -20,7 +20,7 @@ from gsl.optimizers.optimizer import Learner
 from gsl.policies.policy import Policy, sized
 from gsl.report.markdown import in_unit
 from gsl.report.render import walk_strip
-from gsl.stages.chain import Budget, Chain
+from gsl.stages.chain import Budget, Chain, round_seed
 from gsl.stages.choices import FILE, policies, record
 from gsl.stages.diagnosis_plan import DiagnosisPlan, flown
 from gsl.stages.grounding_gate import settled
@@ -96,11 +96,10 @@ class Iterate:
             chain = self.chain
             for number in range(1, self.iterations + 1):
                 place = home / f"iteration_{number:02d}"
-                seed = self.seed + 1000 * (number - 1)
-                evaluation, ready = _iteration(chain, place, grounding, rounds.last or start, seed, console)
+                done = chain.round(place, grounding, rounds.last or start, round_seed(self.seed, number), console)
                 chain = chain.after(place)
-                first = ready if number == 1 else first
-                for row in rounds.add(evaluation, self._collected_real):
+                first = done.ready if number == 1 else first
+                for row in rounds.add(done.measured, self._collected_real):
                     table.row(*row)
                 if not rounds.rising:
                     break
@@ -123,7 +122,7 @@ class Iterate:
     @property
     def learned(self) -> bool:
         """Whether the grounding has models to train."""
-        return isinstance(innermost(self.grounding), ActionTransformation)
+        return learned(self.grounding)
 
     @property
     def chain(self) -> Chain:
@@ -180,16 +179,6 @@ def check_aggregate(iterate: Iterate, groundings: Iterable[Grounding | ActionTra
     Raises:
         ConfigError: Under the name of the setting.
     """
-    learned = any(isinstance(innermost(one), ActionTransformation) for one in groundings)
-    if iterate.aggregate and not (learned and iterate.iterations > 1):
+    if iterate.aggregate and not (any(map(learned, groundings)) and iterate.iterations > 1):
         problem = "is for a grounding that learns from real trajectories, in two iterations or more"
         raise ConfigError(name, problem, given="true")
-
-
-def _iteration(
-    chain: Chain, place: Path, grounding: Grounding, previous: str | None, seed: int, console: Any
-) -> tuple[Artifact, Grounding]:
-    """Return the evaluation that ends one iteration, and the grounding with its models."""
-    ready = chain.ready(place, grounding, previous, seed, console)
-    found = chain.search(place / "optimize", ready, previous, seed, console)
-    return chain.measure(place / "evaluate", found, seed, console), ready

@@ -14,16 +14,6 @@ from gsl.report.markdown import table as markdown
 REFERENCE, BOTH = "trained on real", {"gat", "sgat"}
 
 
-class Round(NamedTuple):
-    """What a round of a method came to; attributes as those of `Point`."""
-
-    round: int
-    value: float
-    real_steps: int | None
-    choice_steps: int
-    promised: float | None
-
-
 class Place(NamedTuple):
     """Where methods are compared: in a real world, at a noise of it, after a round of grounding."""
 

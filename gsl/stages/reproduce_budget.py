@@ -11,7 +11,7 @@ from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import mean_interval
 from gsl.errors import ConfigError
-from gsl.grounding.effects import innermost
+from gsl.grounding.effects import learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
@@ -77,7 +77,7 @@ class Budget:
             ConfigError: A grounding learns nothing from trajectories.
         """
         for name, grounding in self.methods.items():
-            if not isinstance(innermost(grounding), ActionTransformation):
+            if not learned(grounding):
                 raise ConfigError(f"methods.{name}", "learns nothing from real trajectories; take gat or sgat")
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point._fields, console)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -15,7 +16,7 @@ from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
-from gsl.grounding.effects import innermost
+from gsl.grounding.effects import learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
@@ -23,12 +24,12 @@ from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.policy import sized
 from gsl.report.noise_bars import Bars, noise_bars
-from gsl.stages.chain import Chain
+from gsl.stages.chain import Chain, round_seed
 from gsl.stages.evaluate import TABLE as EVALUATION
 from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate, check_aggregate
 from gsl.stages.ledger import Known, Ledger, known_parent, recipe
-from gsl.stages.noise_table import REFERENCE, NoiseTable, Place, Point, Round
+from gsl.stages.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
 from gsl.tasks.task import REAL, SIM
@@ -94,7 +95,7 @@ class NoiseStudy:
             points,
             places=[Place(*one) for one in product(self.worlds, self.noises, self._rounds)],
             shown=self._shown,
-            learned=[name for name, one in self.methods.items() if _learned(one)],
+            learned=[name for name, one in self.methods.items() if learned(one)],
             noisy=[name for name, one in self.methods.items() if isinstance(one, ActionNoise)],
             trials=self.trials,
             chosen=self.choice == REAL,
@@ -138,7 +139,7 @@ class NoiseStudy:
     def trial(self, number: int, home: Path) -> list[Point]:
         """Return all points of a trial, built below `home`."""
         seed, console = self.iterate.seed + number - 1, Console(json=True)
-        name, points = f"trial_{number:02d}", []
+        name, points = f"trial_{number:02d}", list[Point]()
         for world, noise in product(self.worlds, self.noises):
             real, sim = replace(self.worlds[world], action_noise=noise), self.sims.get(world)
             chain = self._chain(sim or self.iterate.sim)
@@ -148,41 +149,41 @@ class NoiseStudy:
             at = replace(chain, real=real, optimizer=self.further, shared=shared)
             for method, grounding in self.methods.items():
                 place = below / method / name
-                first = place if _learned(grounding) else alone / method / name
-                for one in self._carried_out(at, grounding, first, place, start, seed):
-                    points.append(Point(world, noise, method, number, *one))
-            place = below / "real" / name
-            for one in self._carried_out(replace(at, sim=real), NoGrounding(), place, place, start, seed):
+                first = place if learned(grounding) else alone / method / name
+                of = partial(Point, world, noise, method, number)
+                points += self._carried_out(of, at, grounding, first, place, start, seed)
+            of, place = partial(Point, world, noise, REFERENCE, number), below / "real" / name
+            for one in self._carried_out(of, replace(at, sim=real), NoGrounding(), place, place, start, seed):
                 spent = one.round * self.further.taken if isinstance(self.further, Trpo) else None
-                points.append(Point(world, noise, REFERENCE, number, *one._replace(real_steps=spent)))
+                points.append(one._replace(real_steps=spent))
         return points
 
     def _carried_out(
         self,
+        of: Callable[..., Point],
         chain: Chain,
         grounding: Grounding | ActionTransformation,
         first: Path,
         place: Path,
         start: str,
         seed: int,
-    ) -> Iterator[Round]:
+    ) -> Iterator[Point]:
         """Yield the rounds of a method, built at `place`, but the first search at `first`, which worlds may share."""
         home, console, spent, choice, promised = place, Console(json=True), 0, 0, None
         for number in self._rounds:
             if number > 1:
                 first = place = home / f"iteration_{number:02d}"
-            ready = chain.ready(first, grounding, start, seed, console)
-            found = chain.search(first / "optimize", ready, start, seed, console)
-            spent += _steps(chain.shared.get(REAL, first)) if _learned(grounding) else 0
+            at, only = round_seed(seed, number), BEST if self.choice == SIM else ""
+            _, found, measured = chain.round(place, grounding, start, at, console, search=first, only=only)
+            spent += _steps(chain.shared.get(REAL, place)) if learned(grounding) else 0
+            told = measured.metrics
             if self.choice == SIM:
-                measured = chain.measure(place / "evaluate", found, seed, console, only=BEST)
-                value, promised = measured.metrics["last"]["value"], found.metrics["best_value_sim"]
+                value, promised = told["last"]["value"], found.metrics["best_value_sim"]
             else:
-                measured = chain.measure(place / "evaluate", found, seed, console)
-                value, choice = measured.metrics["returned"]["value"], choice + _choice_steps(measured.folder)
-                promised = measured.metrics["returned_value_sim"] if measured.metrics["best_generation"] else promised
-            yield Round(number, float(value), spent, choice, promised)
-            start, chain, seed = str(measured.folder), replace(chain.after(first), shared={}), seed + 1000
+                value, choice = told["returned"]["value"], choice + _choice_steps(measured.folder)
+                promised = told["returned_value_sim"] if told["best_generation"] else promised
+            yield of(number, float(value), spent, choice, promised)
+            start, chain = str(measured.folder), replace(chain.after(place), shared={})
 
     @property
     def _reference(self) -> str:
@@ -213,10 +214,6 @@ class NoiseStudy:
         """Return the links in a simulator, for whose sizes the policy is made anew."""
         policy = sized(self.iterate.policy, sim)
         return replace(self.iterate.chain, sim=sim, policy=policy, workers=1, accept=True)
-
-
-def _learned(grounding: Grounding | ActionTransformation) -> bool:
-    return isinstance(innermost(grounding), ActionTransformation)
 
 
 def _steps(place: Path) -> int:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import time
 
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects, innermost
-from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
 from gsl.stages.compare import Compare
@@ -44,12 +43,11 @@ def seconds(study: Compare) -> float:
     }
     rolled = fitted = 0.0
     for name, method in study.methods.items():
-        learned = isinstance(innermost(method), ActionTransformation)
-        apart = learned or name in flights
+        apart = learned(method) or name in flights
         searches = rounds if apart else rounds - worlds + 1  # what knows no world searches first for all of them
-        rolled += searches * searched * sim * (LEARNED if learned else 1.0) + rounds * measured * real
+        rolled += searches * searched * sim * (LEARNED if learned(method) else 1.0) + rounds * measured * real
         rolled += (worlds if apart else 1) * Values.count * sim if study.rank else 0.0
-        if learned:
+        if learned(method):
             rolled += rounds * (collected[0] * real + collected[1] * sim)
             fitted += rounds * APART
     flown = len(iterate.diagnosis.excitation.motions) * iterate.diagnosis.excitation.duration if flights else 0.0
