@@ -87,6 +87,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     }
     if what == "table4":
         assert learned["iteration_02"] > learned["trial_01"]  # it knows what the first iteration has collected
+        assert len([*folder.parent.rglob("collect_real")]) == 3  # methods begin with the same, and go on with their own
 
 
 def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) -> None:

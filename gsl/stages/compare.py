@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 
 from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
-from gsl.grounding.effects import learned
+from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.stages.chain import Chain, round_seed
@@ -23,6 +23,7 @@ from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.trial import Cell, Trial
 from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
+from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import try_out
 from gsl.worlds.world import World
 
@@ -37,7 +38,7 @@ class Compare:
 
     A search in a simulator that knows nothing of the real world (no grounding, noise, randomisation) is done once a
     trial and measured in every world: columns of such a method are not independent of each other. Methods with effects
-    share the excitation of their trial and world; each of them pays for it.
+    share the excitation of their trial and world, those that learn its first real episodes; each of them pays for it.
 
     A further iteration goes on from the policy that the one before returned, whether it gained or not.
     """
@@ -99,6 +100,8 @@ class Compare:
         grounding = chain.diagnosed(below / cell.world / "diagnosis" / name, method, seed, console)
         flight = flown(below / cell.world / "diagnosis" / name, method, grounding)
         spent, first, previous = flight.episodes if flight else 0, None, None
+        data = {REAL: below / cell.world / "data" / name, SIM: below / "sim" / "data" / name}
+        chain = replace(chain, shared={REAL: data[REAL]} if isinstance(grounding, DiagnosedEffects) else data)
         if self.iterate.pretrained:
             previous = chain.pretrained(below / "sim" / "pretrained" / name, seed, console)
         for iteration in range(1, self.iterate.iterations + 1):
@@ -120,7 +123,7 @@ class Compare:
             )
             yield trial
             spent, previous, first = trial.real_episodes, str(measured.folder), first or measured.metrics
-            chain = chain.after(place)
+            chain = replace(chain.after(place), shared={})
 
     def _ranked(
         self, chain: Chain, world: Path, out: Path, ready: Grounding, found: Artifact, console: Any
