@@ -53,7 +53,7 @@ OFFERED = {
     "table2": ALL,
     "table2-paper": ("none", "ane_02", "gat"),
     "table3": ("gat", "effects"),
-    "table4": ("none", "ane_02", "gat", "sgat"),
+    "table4": ("none", "ane_02", "gat", "sgat", "sgat_005"),
     "linear-walk": ("none", "ane_02", "gat", "gat_residual"),
     "fig5": ("none", "ane_02", "gat"),
     "worlds": ("none", "ane_02", "gat", "effects"),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from scipy import stats
 
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
@@ -30,7 +31,7 @@ from gsl.worlds.world import World
 TABLE = "evaluation.json"
 _CHOICE, _CHECK, _REPORT = "choice", "check", "report"  # their seeds never meet
 CHALLENGERS = 2  # that are checked, at most, where falls are tolerated
-AHEAD = 1.64  # standard errors of a difference: above 0 at 95 %, one-sided
+SURE = 0.95  # that a policy is ahead, one-sided
 _UNTIL_FALL = {
     _CHOICE: "To choose a policy: {} of them, {} episodes each, of one that falls none after its fall.",
     _CHECK: "To check the fastest policy that did not fall: {1} episodes more, until it falls.",
@@ -48,9 +49,9 @@ class Evaluate:
 
     Choice: `episodes` of each policy; one that falls is unstable, and what would have followed is thrown away. Check:
     the fastest stable policy walks `check` episodes more; if it falls, the next best one does. Where falls are
-    tolerated the baseline walks `check` episodes too, and a policy, one of two at most, has to be above it in these,
-    surely. Report: the policy that is left, or the baseline (the first of the file) if none is,
-    is measured on `confirmation` fresh episodes beside the baseline, and these figures, falls and all, are what is
+    tolerated the baseline walks `check` episodes too, and a policy, one of two at most, has to be above it in these:
+    surely, or with surely fewer falls. Report: the policy that is left, or the baseline (the first of the file) if none
+    is, is measured on `confirmation` fresh episodes beside the baseline, and these figures, falls and all, are what is
     reported: they took no part in the choice.
     """
 
@@ -176,10 +177,12 @@ def check_tolerated(tolerated: float, check: int) -> None:
 
 
 def _ahead(done: Sequence[Episode], other: Sequence[Episode]) -> bool:
-    """Whether the mean of some episodes is surely above that of others, two of each at least."""
+    """Whether some episodes have a higher mean than others, and surely so or with surely fewer falls; two of each."""
     values = [np.array([episode.value for episode in one]) for one in (done, other)]
-    error = np.sqrt(sum(one.var(ddof=1) / len(one) for one in values))
-    return bool(values[0].mean() - values[1].mean() > AHEAD * error)
+    difference, error = values[0].mean() - values[1].mean(), np.sqrt(sum(one.var(ddof=1) / len(one) for one in values))
+    fallen = [(falls(one), len(one) - falls(one)) for one in (done, other)]
+    fewer = stats.fisher_exact(fallen, alternative="less").pvalue < 1.0 - SURE
+    return bool(difference > 0.0 and (difference > stats.norm.ppf(SURE) * error or fewer))
 
 
 def _until_fall(done: Sequence[Episode | None], *, to_the_end: bool) -> list[Episode]:
