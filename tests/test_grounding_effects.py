@@ -139,5 +139,5 @@ def test_a_grounding_names_what_is_missing(tmp_path: Path) -> None:
 
 def test_effects_and_a_transformation_are_one_choice() -> None:
     conf = Path(__file__).parents[1] / "conf/grounding/effects_gat.yaml"
-    assert yaml.safe_load(conf.read_text())["defaults"] == ["effects", "gat@inner", "_self_"]
+    assert yaml.safe_load(conf.read_text())["defaults"] == ["effects", "gat_residual@inner", "_self_"]
     assert innermost(DiagnosedEffects(effects=LATE, inner=DiagnosedEffects(effects=DRY))) == NoGrounding()

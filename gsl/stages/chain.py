@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -31,10 +32,12 @@ from gsl.stages.training import FEWEST, WHY
 from gsl.stages.values import Values
 from gsl.storage.artifact import Artifact
 from gsl.tasks.task import REAL, SIM, Task
+from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import asking
 from gsl.worlds.world import World
 
 MEMBERS = 5  # of the ensemble behind a gate, where nothing else is said
+SLIGHT = 0.25  # ticks of a delay that leave an action most of its effect
 SHRINKING = 1.0  # least ridge of a residual: in directions that the data hardly show it is no correction
 
 
@@ -183,12 +186,15 @@ class Chain:
             )
             built(stage, data[role], console)
         method: Method = "solve" if grounding.residual else self.inverse_method
-        inverse = TrainInverse(str(data[SIM]), self.inverse_model, method=method, seed=seed)
+        horizon = horizon_of(self.sim)
+        inverse_model = replace(self.inverse_model, horizon=max(self.inverse_model.horizon, horizon))
+        inverse = TrainInverse(str(data[SIM]), inverse_model, method=method, seed=seed)
         f_inverse = built(inverse, places[SIM] / inverse.kind, console)
         needed, base = as_needed(self.forward_model, grounding), None
+        needed = replace(needed, horizon=max(needed.horizon, horizon))
         if grounding.residual:
-            history, horizon = f_inverse.metrics["history"], self.inverse_model.horizon
-            needed, base = replace(needed, history=history, horizon=horizon), str(f_inverse.folder)
+            needed = replace(needed, history=f_inverse.metrics["history"], horizon=inverse_model.horizon)
+            base = str(f_inverse.folder)
         forward = TrainForward(str(data[REAL]), needed, base, seed=seed, earlier=self.earlier)
         f = built(forward, home / forward.kind, console)
         return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))
@@ -241,6 +247,12 @@ class Chain:
 def round_seed(seed: int, number: int) -> int:
     """Return the seed of a round, the first being 1."""
     return seed + 1000 * (number - 1)
+
+
+def horizon_of(sim: World) -> int:
+    """Return how many ticks ahead models look: in fewer an action of a late simulator has little effect."""
+    servo = sim.plant.servo if isinstance(sim, BulletWorld) else None
+    return 1 if servo is None else 1 + math.ceil(servo.delay.max() / sim.layout.control_period - SLIGHT)
 
 
 def as_needed(model: ModelConfig, grounding: ActionTransformation) -> ModelConfig:
