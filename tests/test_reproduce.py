@@ -225,6 +225,7 @@ def test_table_2_marks_the_noise_that_only_real_figures_choose() -> None:
     assert "ane_01 (best by real)" in text and "ane_02 (best" not in text
     assert "best by real" not in Table2().markdown([one for one in trials if one.method != "ane_01"], Walk())
     assert "| 18.9 | 5 of 10 | 6.6 |" in next(line for line in text.splitlines() if line.startswith("| w | ane_02"))
+    assert "| w | ane_02 | +4.0 (4.0 to 4.0) |  |" in text and "| w | none |  | -4.0 (-4.0 to -4.0) |" in text
     assert "| w | ane_01 - none |" not in text  # their order is not what is tested
     assert "| w | gat - none |" in Table2().markdown([*trials, a_trial("gat", 1), a_trial("gat", 2)], Walk())
 

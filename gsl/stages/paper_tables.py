@@ -16,7 +16,7 @@ from gsl.core.statistics import Interval, mean_interval, wilson
 from gsl.report.markdown import table
 from gsl.stages.comparison import Summary, differences, orders, summaries
 from gsl.stages.comparison_table import told
-from gsl.stages.trial import Trial
+from gsl.stages.trial import Cell, Trial
 from gsl.tasks.task import Task
 
 TABLE_2 = {"none": ("11.1", "7 of 10", "1.3"), "ane": ("18.9", "5 of 10", "6.6"), "gat": ("22.5", "1 of 10", "2.7")}
@@ -42,23 +42,27 @@ class Table2:
     against: Annotated[tuple[str, ...], setting("methods that they are tested against")] = ("none", "ane_02")
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
-        """Return the table, the test of the order, and the single trials."""
+        """Return the table, differences paired by trial, the test of the order, and the single trials."""
         found = summaries(trials)
         oracles = {_best_noise(found, world) for world in dict.fromkeys(one.world for one in found)}
         titles = (
             *("real world", "grounding", "improvement [%]", "95 % interval", "trials without a gain"),
-            *("best generation", "stable winners", f"π0 and returned [{task.unit}]", "falls", "rank", "real episodes"),
-            *("paper: improvement [%]", "paper: without", "paper: best generation"),
+            *("best generation", "stable winners", f"π0 and returned [{task.unit}]", "falls", "refused", "rank"),
+            *("real episodes", "paper: improvement [%]", "paper: without", "paper: best generation"),
         )
         rows = [
             (one.world, one.method + (" (best by real)" if (one.world, one.method) in oracles else ""))
             + (*_improvement(one), f"{one.without} of {one.trials}", f"{one.generation:.1f}")
-            + (f"{one.stable} of {one.winners}", _speeds(trials, one, task), str(one.falls))
+            + (f"{one.stable} of {one.winners}", _speeds(trials, one, task), str(one.falls), str(one.refused))
             + ("" if one.rank is None else f"{one.rank.mean:.2f}", f"{one.real_episodes:.0f}")
             + TABLE_2.get("ane" if one.method == "ane_02" else one.method, NOTHING)
             for one in found
         ]
         parts = [table(titles, rows)]
+        apart = [(one.world, one.method, *(_apart(trials, one, other) for other in self.against)) for one in found]
+        if any(any(cells) for _, _, *cells in apart):
+            parts.append("How much larger the improvement is, paired by trial [percentage points] (95 % interval):\n")
+            parts.append(table(("real world", "grounding", *(f"than {other}" for other in self.against)), apart))
         tested = [
             (world, f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
             for world in dict.fromkeys(one.world for one in found)
@@ -213,6 +217,16 @@ def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *,
     counted = ("falls of a trial", "95 % interval") if falls else ()
     titles = ("real world", "difference", "iteration", f"in real [{task.unit}]", "95 % interval, paired by trial")
     return table((*titles, *counted), rows)
+
+
+def _apart(trials: Sequence[Trial], one: Summary, other: str) -> str:
+    """Return by how much a method's improvement is above another's, nothing where there is none to be set against."""
+    pair = [trial for trial in trials if trial.world == one.world and trial.method in (one.method, other)]
+    tried = {trial.method for trial in pair}
+    if one.method == other or other not in tried or any(trial.improvement is None for trial in pair):
+        return ""
+    found = differences(trials, Cell(*one[:4]), other)
+    return f"{found.mean:+.1f} ({told(found)})"
 
 
 def _share_of_falls(trials: Sequence[Trial]) -> Interval:
