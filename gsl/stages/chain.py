@@ -38,6 +38,7 @@ from gsl.worlds.world import World
 
 MEMBERS = 5  # of the ensemble behind a gate, where nothing else is said
 SLIGHT = 0.25  # ticks of a delay that leave an action most of its effect
+FARTHEST = 10  # ticks that a model looks ahead
 SHRINKING = 1.0  # least ridge of a residual: in directions that the data hardly show it is no correction
 
 
@@ -186,12 +187,13 @@ class Chain:
             )
             built(stage, data[role], console)
         method: Method = "solve" if grounding.residual else self.inverse_method
-        horizon = horizon_of(self.sim)
-        inverse_model = replace(self.inverse_model, horizon=max(self.inverse_model.horizon, horizon))
+        late, inverse_model = lateness(self.sim), looking_ahead(self.inverse_model, self.sim)
+        if late:
+            console.status(f"the simulator acts {late} ticks late: models look {inverse_model.horizon} ticks ahead")
         inverse = TrainInverse(str(data[SIM]), inverse_model, method=method, seed=seed)
-        f_inverse = built(inverse, places[SIM] / inverse.kind, console)
-        needed, base = as_needed(self.forward_model, grounding), None
-        needed = replace(needed, horizon=max(needed.horizon, horizon))
+        alike = method == self.inverse_method
+        f_inverse = built(inverse, (places[SIM] if alike else home) / inverse.kind, console)
+        needed, base = looking_ahead(as_needed(self.forward_model, grounding), self.sim), None
         if grounding.residual:
             needed = replace(needed, history=f_inverse.metrics["history"], horizon=inverse_model.horizon)
             base = str(f_inverse.folder)
@@ -249,10 +251,19 @@ def round_seed(seed: int, number: int) -> int:
     return seed + 1000 * (number - 1)
 
 
-def horizon_of(sim: World) -> int:
-    """Return how many ticks ahead models look: in fewer an action of a late simulator has little effect."""
-    servo = sim.plant.servo if isinstance(sim, BulletWorld) else None
-    return 1 if servo is None else 1 + math.ceil(servo.delay.max() / sim.layout.control_period - SLIGHT)
+def lateness(sim: World) -> int:
+    """Return after how many ticks more than one a robot's encoders tell what an action does in a simulator."""
+    if not isinstance(sim, BulletWorld):
+        return 0
+    servo = sim.plant.servo
+    return max(0, math.ceil((servo.delay + servo.sensor_delay).max() / sim.layout.control_period - SLIGHT))
+
+
+def looking_ahead(model: ModelConfig, sim: World) -> ModelConfig:
+    """Return a model that looks as far ahead as a late simulator needs, and back over the actions on their way."""
+    horizon = max(model.horizon, min(1 + lateness(sim), FARTHEST))
+    history = model.history if model.history == "auto" else max(model.history, horizon - 1)
+    return model if horizon == model.horizon else replace(model, horizon=horizon, history=history)
 
 
 def as_needed(model: ModelConfig, grounding: ActionTransformation) -> ModelConfig:

@@ -53,7 +53,8 @@ class Table2:
         rows = [
             (one.world, one.method + (" (best by real)" if (one.world, one.method) in oracles else ""))
             + (*_improvement(one), f"{one.without} of {one.trials}", f"{one.generation:.1f}")
-            + (f"{one.stable} of {one.winners}", _speeds(trials, one, task), str(one.falls), str(one.refused))
+            + (f"{one.stable} of {one.winners}", _speeds(trials, one, task), str(one.falls))
+            + (f"{one.refused} of {one.trials}",)
             + ("" if one.rank is None else f"{one.rank.mean:.2f}", f"{one.real_episodes:.0f}")
             + TABLE_2.get("ane" if one.method == "ane_02" else one.method, NOTHING)
             for one in found
@@ -61,7 +62,7 @@ class Table2:
         parts = [table(titles, rows)]
         apart = [(one.world, one.method, *(_apart(trials, one, other) for other in self.against)) for one in found]
         if any(any(cells) for _, _, *cells in apart):
-            parts.append("How much larger the improvement is, paired by trial [percentage points] (95 % interval):\n")
+            parts.append("Improvement against others, paired by trial [percentage points] (95 %, each for itself):\n")
             parts.append(table(("real world", "grounding", *(f"than {other}" for other in self.against)), apart))
         tested = [
             (world, f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
@@ -123,7 +124,7 @@ class Table3:
 class Table4:
     """Speed and falls on uneven ground after each grounding step."""
 
-    against: Annotated[tuple[str, ...], setting("methods that the others are set against")] = ("none", "gat")
+    against: Annotated[tuple[str, ...], setting("methods that the others are set against")] = ("none", "gat", "sgat")
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
@@ -221,11 +222,12 @@ def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *,
 
 def _apart(trials: Sequence[Trial], one: Summary, other: str) -> str:
     """Return by how much a method's improvement is above another's, nothing where there is none to be set against."""
-    pair = [trial for trial in trials if trial.world == one.world and trial.method in (one.method, other)]
+    cell = Cell(*one[:4])
+    pair = [trial for trial in trials if trial.cell in (cell, cell._replace(method=other))]
     tried = {trial.method for trial in pair}
     if one.method == other or other not in tried or any(trial.improvement is None for trial in pair):
         return ""
-    found = differences(trials, Cell(*one[:4]), other)
+    found = differences(trials, cell, other)
     return f"{found.mean:+.1f} ({told(found)})"
 
 

@@ -14,12 +14,14 @@ from gsl.core.history import windows
 from gsl.core.observation import observations, sensed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
+from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.models.ensemble import Forward
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.markdown import table
+from gsl.stages.chain import lateness
 from gsl.stages.grounding_replay import PAST, Place, replay
 from gsl.stages.iterate import Iterate
 from gsl.stages.rollout import Scenario, rollout
@@ -87,7 +89,10 @@ class Figure7:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Train the grounding, walk in real, replay in simulation, draw."""
-        iterate, loaded = self.iterate, trained(self.iterate, folder.parent, console)
+        iterate = self.iterate
+        if lateness(iterate.sim):
+            raise ConfigError("iterate.sim", "acts late: f looks several ticks ahead there and draws no trace")
+        loaded = trained(iterate, folder.parent, console)
         walk = _walked(iterate)
         layout = iterate.sim.layout
         index, period = layout.joints.index(self.joint), layout.control_period
@@ -103,7 +108,10 @@ class Figure7:
         predicted = _predicted(loaded.forward, walk, tick, ticks)[:, index]
         shown = slice(tick + 1, tick + 1 + ticks)
         plain = Traces(walk.time[shown], walk.action[tick : tick + ticks, index], walk.position[shown, index], bare)
-        joint_trace(folder / "figure_7a.png", plain._replace(grounded=predicted, name="forward model"), self.joint)
+        far = [f"{degrees(trace - plain.real):.1f}°" for trace in (predicted, bare)]
+        title = f"{self.joint}: as f predicts it {far[0]} from the real robot, in simulation {far[1]} (RMS)"
+        foreseen = plain._replace(grounded=predicted, name="forward model")
+        joint_trace(folder / "figure_7a.png", foreseen, self.joint, title=title)
         joint_trace(folder / "figure_7b.png", plain._replace(grounded=grounded), self.joint)
         found = {"ungrounded": bare, "forward model": predicted, "grounded": grounded}
         return _told(folder, self.joint, plain.real, found)

@@ -48,8 +48,11 @@ def seconds(study: Compare) -> float:
         rolled += searches * searched * sim * (LEARNED if learned(method) else 1.0) + rounds * measured * real
         rolled += (worlds if apart else 1) * Values.count * sim if study.rank else 0.0
         if learned(method):
-            rolled += rounds * (collected[0] * real + collected[1] * sim)
+            further = rounds - worlds  # whose data are a method's own; in the first simulators with effects are
+            rolled += further * collected[0] * real + (rounds if name in flights else further) * collected[1] * sim
             fitted += rounds * APART
+    if any(map(learned, study.methods.values())):
+        rolled += worlds * collected[0] * real + collected[1] * sim
     flown = len(iterate.diagnosis.excitation.motions) * iterate.diagnosis.excitation.duration if flights else 0.0
     fitted += worlds * flown * sum(DIAGNOSED[method] for method in set(flights.values()))
     return (rolled / workers + fitted) * study.trials * len(sims)
