@@ -377,7 +377,7 @@ def test_groundings_of_environments_are_compared(tmp_path: Path) -> None:
     slope = ("worlds.real.kwargs.slope=2", "iterate.workers=1")
     said = done("compare", "experiment=environments", "name=e", *few, *worlds, *slope, *search, folder=tmp_path)
     home = tmp_path / "runs/e"
-    collected = (home / "real/gat/trial_01/collect_real/config.yaml").read_text()
+    collected = (home / "real/data/trial_01/collect_real/config.yaml").read_text()
     assert "initial: runs/e/sim/pretrained/trial_01/best_in_simulation.json" in collected
     trials = json.loads((home / "compare/trials.json").read_text())
     assert [(one["method"], one["number"]) for one in trials] == [("none", 1), ("gat", 1), ("none", 2), ("gat", 2)]
