@@ -23,9 +23,9 @@ from gsl.grounding.effects import DiagnosedEffects, Diagnosis, innermost, switch
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.models.config import ModelConfig
-from gsl.stages.chain import looking_ahead
 from gsl.stages.effects_check import check_effects
 from gsl.stages.grounding_gate import Gate, grounding_parents
+from gsl.stages.needed_model import looking_ahead
 from gsl.stages.rollout import Scenario, rollout
 from gsl.storage.policies import read_policies
 from gsl.worlds.bullet import BulletWorld

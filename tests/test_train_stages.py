@@ -16,7 +16,7 @@ from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.models.config import HISTORIES, ModelConfig
 from gsl.models.ensemble import Ensemble
 from gsl.models.linear import fit_linear
-from gsl.stages.chain import as_needed
+from gsl.stages.needed_model import as_needed
 from gsl.stages.train_forward import HELDOUT, TrainForward
 from gsl.stages.train_inverse import TrainInverse
 from gsl.stages.training import labels

@@ -14,6 +14,7 @@ from gsl.models.head import Head, Likelihood
 
 Sensor = Literal["gyro", "tilt", "foot_force"]
 HISTORIES = (1, 2, 3, 5, 8)  # that `auto` tries
+FARTHEST = 10  # ticks ahead that a model looks, at most
 
 
 @component
@@ -31,7 +32,7 @@ class ModelConfig:
     ] = 3
     sensors: Annotated[tuple[Sensor, ...], setting("body sensors a forward model sees besides")] = ()
     sensor_ticks: Annotated[int, setting("ticks of each sensor, the present one included", ge=1, le=20)] = 2
-    horizon: Annotated[int, setting("ticks ahead it looks", ge=1, le=10)] = 1
+    horizon: Annotated[int, setting("ticks ahead it looks", ge=1, le=FARTHEST)] = 1
     encoding: Annotated[Encoding, setting("angles as they are, or as sine and cosine")] = "plain"
     ridge: Annotated[float, setting("penalty on the weights of the linear model, scaled inputs", ge=1e-9)] = 1e-2
     variables: Annotated[

@@ -12,6 +12,7 @@ from scipy import stats
 
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
+from gsl.core.statistics import difference_interval
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.policy import Policy, sized
@@ -178,11 +179,11 @@ def check_tolerated(tolerated: float, check: int) -> None:
 
 def _ahead(done: Sequence[Episode], other: Sequence[Episode]) -> bool:
     """Whether some episodes have a higher mean than others, and surely so or with surely fewer falls; two of each."""
-    values = [np.array([episode.value for episode in one]) for one in (done, other)]
-    difference, error = values[0].mean() - values[1].mean(), np.sqrt(sum(one.var(ddof=1) / len(one) for one in values))
+    values = (np.array([episode.value for episode in one]) for one in (done, other))
+    difference = difference_interval(*values, confidence=2.0 * SURE - 1.0)
     fallen = [(falls(one), len(one) - falls(one)) for one in (done, other)]
     fewer = stats.fisher_exact(fallen, alternative="less").pvalue < 1.0 - SURE
-    return bool(difference > 0.0 and (difference > stats.norm.ppf(SURE) * error or fewer))
+    return bool(difference.lower > 0.0 or (difference.mean > 0.0 and fewer))
 
 
 def _until_fall(done: Sequence[Episode | None], *, to_the_end: bool) -> list[Episode]:

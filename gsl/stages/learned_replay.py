@@ -28,7 +28,7 @@ from gsl.models.free_run import shortest
 from gsl.models.inverse import Solver
 from gsl.models.linear import fit_linear
 from gsl.stages import train_forward, train_inverse
-from gsl.stages.chain import SHRINKING
+from gsl.stages.needed_model import SHRINKING
 from gsl.stages.train_inverse import Damping
 from gsl.stages.training import parted
 from gsl.worlds.bullet import BulletEnv, BulletWorld

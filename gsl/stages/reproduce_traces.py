@@ -21,9 +21,9 @@ from gsl.grounding.none import NoGrounding
 from gsl.models.ensemble import Forward
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.markdown import table
-from gsl.stages.chain import lateness
 from gsl.stages.grounding_replay import PAST, Place, replay
 from gsl.stages.iterate import Iterate
+from gsl.stages.needed_model import lateness
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.training import degrees
 from gsl.storage.models import read_forward_model, read_inverse_model
