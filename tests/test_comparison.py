@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 import pytest
 
 from gsl.stages.comparison import differences, orders, summaries
@@ -54,7 +56,7 @@ def test_real_episodes_of_models_are_counted_and_refusals_told() -> None:
 
 
 def test_differences_are_paired_by_trial() -> None:
-    difference = differences(TRIALS, Cell("", "nao_worn", "gat", 1), "none")
+    difference = differences(TRIALS, Cell("", "nao_worn", "gat", 1), "none", attrgetter("improvement"))
     assert difference.mean == pytest.approx((20.0 - 0.0 + 10.0 + 5.0) / 2)
 
 
@@ -69,6 +71,8 @@ def test_the_tables_show_every_method_and_every_trial() -> None:
     assert "20.0, 10.0" in text and "0.0*, -5.0*" in text
     assert "| nao_worn | gat - none | +17.5 |" in text and "falls in fresh episodes" in text
     assert "| nao_worn | gat | 28.7 (" in text  # cm/s
+    alone = [trial for trial in TRIALS if trial.method == "gat"]
+    assert "paired by trial" not in markdown(summaries(alone), alone, Unit.of(Walk))
 
 
 def test_without_falls_and_percentages_the_tables_tell_returns() -> None:

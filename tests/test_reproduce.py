@@ -17,7 +17,8 @@ from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
 from gsl.stages.ledger import Ledger, recipe
-from gsl.stages.paper_tables import Figure5, LinearWalkTable, Table2, Table3, Table4
+from gsl.stages.paper_table_2 import Table2
+from gsl.stages.paper_tables import Figure5, LinearWalkTable, Table3, Table4
 from gsl.stages.study_effort import told
 from gsl.stages.trial import Cell, Trial
 from gsl.tasks.arm import Arm
@@ -228,6 +229,18 @@ def test_table_2_marks_the_noise_that_only_real_figures_choose() -> None:
     assert "| w | ane_02 | +4.0 (4.0 to 4.0) |  |" in text and "| w | none |  | -4.0 (-4.0 to -4.0) |" in text
     assert "| w | ane_01 - none |" not in text  # their order is not what is tested
     assert "| w | gat - none |" in Table2().markdown([*trials, a_trial("gat", 1), a_trial("gat", 2)], Walk())
+    assert "nothing real has chosen" not in text  # these tell no speed
+
+
+def test_table_2_tells_what_the_last_generation_is_worth_to_whom_nothing_real_has_chosen() -> None:
+    trials = [
+        a_trial(method, k, last={"speed [cm/s]": speed + k})
+        for method, speed in (("none", 7.0), ("gat", 15.0))
+        for k in (1, 2)
+    ]
+    lines = Table2().markdown(trials, Walk()).splitlines()
+    assert "| w | gat | 16.5 | 10.1 to 22.9 | +8.0 (8.0 to 8.0) |  |" in lines
+    assert "| w | none | 8.5 | 2.1 to 14.9 |  |  |" in lines
 
 
 def test_table_3_counts_where_chains_stop() -> None:

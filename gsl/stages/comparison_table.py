@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from operator import attrgetter
 
 from gsl.core.statistics import Interval
 from gsl.report.markdown import in_unit, table
@@ -34,18 +35,15 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
         ]
         single.append((one.world, one.method, ", ".join(values)))
         if one.method != first:
-            apart = differences(trials, Cell(*one[:4]), first, figure)
+            apart = differences(trials, Cell(*one[:4]), first, attrgetter(figure))
             bounds = own.interval([apart.lower, apart.upper])
             paired.append((one.world, f"{one.method} - {first}", own.bare(apart.mean, sign=True), bounds))
-    return "\n".join(
-        [
-            table(tuple(columns), list(zip(*columns.values(), strict=True))),
-            f"Differences of the {shown}, paired by trial{' (percentage points)' * as_shares}:\n",
-            table(("real world", "difference", "mean", "95 % interval"), paired),
-            f"The {shown} of each trial, in their order; * without a stable improvement:\n",
-            table(("real world", "grounding", "trials"), single),
-        ]
-    )
+    parts = [table(tuple(columns), list(zip(*columns.values(), strict=True)))]
+    if paired:
+        parts.append(f"Differences of the {shown}, paired by trial{' (percentage points)' * as_shares}:\n")
+        parts.append(table(("real world", "difference", "mean", "95 % interval"), paired))
+    parts.append(f"The {shown} of each trial, in their order; * without a stable improvement:\n")
+    return "\n".join([*parts, table(("real world", "grounding", "trials"), single)])
 
 
 def told(interval: Interval) -> str:

@@ -1,0 +1,113 @@
+"""The paper's table 2, groundings on the walk: its figures, and ours beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+from typing import Annotated
+
+import numpy as np
+
+from gsl.core.setting import component, setting
+from gsl.core.statistics import mean_interval
+from gsl.report.markdown import table
+from gsl.stages.comparison import Summary, differences, orders, summaries
+from gsl.stages.comparison_table import told
+from gsl.stages.paper_cells import NOTHING, SPEED, every_trial, improvement_cells, worth
+from gsl.stages.trial import Cell, Trial
+from gsl.tasks.task import Task
+
+TABLE_2 = {"none": ("11.1", "7 of 10", "1.3"), "ane": ("18.9", "5 of 10", "6.6"), "gat": ("22.5", "1 of 10", "2.7")}
+
+
+@component
+class Table2:
+    """Improvement over π0 in real, trials without a stable improvement, best generation; and what we add to it.
+
+    Action noise is told for every width; the best of them by real figures knows what no user knows beforehand.
+    """
+
+    tested: Annotated[tuple[str, ...], setting("methods whose order is tested")] = ("gat", "sgat")
+    against: Annotated[tuple[str, ...], setting("methods that they are tested against")] = ("none", "ane_02")
+
+    def markdown(self, trials: Sequence[Trial], task: Task) -> str:
+        """Return the table, differences paired by trial, the test of the order, and the single trials."""
+        found = summaries(trials)
+        oracles = {_best_noise(found, world) for world in dict.fromkeys(one.world for one in found)}
+        titles = (
+            *("real world", "grounding", "improvement [%]", "95 % interval", "trials without a gain"),
+            *("best generation", "stable winners", f"π0 and returned [{task.unit}]", "falls", "refused", "rank"),
+            *("real episodes", "paper: improvement [%]", "paper: without", "paper: best generation"),
+        )
+        rows = [
+            (one.world, one.method + (" (best by real)" if (one.world, one.method) in oracles else ""))
+            + (*improvement_cells(one), f"{one.without} of {one.trials}", f"{one.generation:.1f}")
+            + (f"{one.stable} of {one.winners}", _speeds(trials, one, task), str(one.falls))
+            + (f"{one.refused} of {one.trials}",)
+            + ("" if one.rank is None else f"{one.rank.mean:.2f}", f"{one.real_episodes:.0f}")
+            + TABLE_2.get("ane" if one.method == "ane_02" else one.method, NOTHING)
+            for one in found
+        ]
+        parts = [table(titles, rows)]
+        gained = attrgetter("improvement")
+        apart = [
+            (one.world, one.method, *(_apart(trials, one, other, gained) for other in self.against)) for one in found
+        ]
+        if any(any(cells) for _, _, *cells in apart):
+            parts.append("Improvement against others, paired by trial [percentage points] (95 %, each alone):\n")
+            parts.append(table(("real world", "grounding", *(f"than {other}" for other in self.against)), apart))
+        if all(SPEED in trial.last for trial in trials):
+            parts.append(_unchosen(trials, found, self.against))
+        tested = [
+            (world, f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
+            for world in dict.fromkeys(one.world for one in found)
+            for order in orders(trials, found[0].simulator, world, self.tested, self.against)
+        ]
+        if tested:
+            parts.append("Order of methods by their stable winners, Wilcoxon's signed rank over trials:\n")
+            parts.append(table(("real world", "difference", "stable winners a trial", "p, Holm-corrected"), tested))
+        return "\n".join([*parts, every_trial(trials)])
+
+    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+        """Return what a trial is worth."""
+        return worth(trials, task)
+
+
+def _unchosen(trials: Sequence[Trial], found: Sequence[Summary], against: Sequence[str]) -> str:
+    """Return how fast the last generation's policies are."""
+    rows = []
+    for one in found:
+        speeds = mean_interval([_last(trial) for trial in trials if trial.cell == one[:4]])
+        apart = (_apart(trials, one, other, _last) for other in against)
+        rows.append((one.world, one.method, f"{speeds.mean:.1f}", told(speeds), *apart))
+    titles = ("real world", "grounding", SPEED, "95 % interval", *(f"than {other}" for other in against))
+    head = "Speed of the last generation's best, which nothing real has chosen, falls and all (95 %, each alone):\n"
+    return "\n".join([head, table(titles, rows)])
+
+
+def _last(trial: Trial) -> float:
+    return trial.last[SPEED]
+
+
+def _apart(trials: Sequence[Trial], one: Summary, other: str, figure: Callable[[Trial], float | None]) -> str:
+    """Return how much larger a figure is than another method's, nothing where there is none to be set against."""
+    cell = Cell(*one[:4])
+    pair = [trial for trial in trials if trial.cell in (cell, cell._replace(method=other))]
+    tried = {trial.method for trial in pair}
+    if one.method == other or other not in tried or any(figure(trial) is None for trial in pair):
+        return ""
+    found = differences(trials, cell, other, figure)
+    return f"{found.mean:+.1f} ({told(found)})"
+
+
+def _best_noise(found: Sequence[Summary], world: str) -> tuple[str, str]:
+    noisy = [one for one in found if one.world == world and one.method.startswith("ane") and one.improvement]
+    if len(noisy) < 2:
+        return world, ""  # nothing was chosen
+    return world, max(noisy, key=lambda one: one.improvement.mean if one.improvement else 0.0).method
+
+
+def _speeds(trials: Sequence[Trial], one: Summary, task: Task) -> str:
+    own = [trial for trial in trials if trial.cell == one[:4]]
+    start, after = (task.shown * float(np.mean([getattr(trial, name) for trial in own])) for name in ("start", "value"))
+    return f"{start:.1f}, {after:.1f}"
