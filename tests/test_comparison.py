@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from operator import attrgetter
-
 import pytest
 
 from gsl.stages.comparison import differences, orders, summaries
@@ -56,7 +54,7 @@ def test_real_episodes_of_models_are_counted_and_refusals_told() -> None:
 
 
 def test_differences_are_paired_by_trial() -> None:
-    difference = differences(TRIALS, Cell("", "nao_worn", "gat", 1), "none", attrgetter("improvement"))
+    difference = differences(TRIALS, Cell("", "nao_worn", "gat", 1), "none")
     assert difference.mean == pytest.approx((20.0 - 0.0 + 10.0 + 5.0) / 2)
 
 

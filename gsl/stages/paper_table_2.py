@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from operator import attrgetter
+from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
 
 from gsl.core.setting import component, setting
-from gsl.core.statistics import mean_interval
 from gsl.report.markdown import table
 from gsl.stages.comparison import Summary, differences, orders, summaries
 from gsl.stages.comparison_table import told
@@ -24,11 +22,15 @@ TABLE_2 = {"none": ("11.1", "7 of 10", "1.3"), "ane": ("18.9", "5 of 10", "6.6")
 class Table2:
     """Improvement over π0 in real, trials without a stable improvement, best generation; and what we add to it.
 
+    Winners of generations are measured in the episodes of the choice, up to their first fall: a winner is stable if it
+    fell in none, and improving if it was faster than π0 besides.
+
     Action noise is told for every width; the best of them by real figures knows what no user knows beforehand.
     """
 
     tested: Annotated[tuple[str, ...], setting("methods whose order is tested")] = ("gat", "sgat")
     against: Annotated[tuple[str, ...], setting("methods that they are tested against")] = ("none", "ane_02")
+    beside: Annotated[tuple[str, ...], setting("methods that improvements are set against")] = ("none", "ane_02")
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table, differences paired by trial, the test of the order, and the single trials."""
@@ -36,28 +38,24 @@ class Table2:
         oracles = {_best_noise(found, world) for world in dict.fromkeys(one.world for one in found)}
         titles = (
             *("real world", "grounding", "improvement [%]", "95 % interval", "trials without a gain"),
-            *("best generation", "stable winners", f"π0 and returned [{task.unit}]", "falls", "refused", "rank"),
+            *("best generation", "stable winners", "improving winners", "last generation's improves"),
+            *(f"π0 and returned [{task.unit}]", "falls", "refused", "rank"),
             *("real episodes", "paper: improvement [%]", "paper: without", "paper: best generation"),
         )
         rows = [
             (one.world, one.method + (" (best by real)" if (one.world, one.method) in oracles else ""))
             + (*improvement_cells(one), f"{one.without} of {one.trials}", f"{one.generation:.1f}")
-            + (f"{one.stable} of {one.winners}", _speeds(trials, one, task), str(one.falls))
-            + (f"{one.refused} of {one.trials}",)
+            + (f"{one.stable} of {one.winners}", f"{one.improving} of {one.winners}", _last(trials, one, task))
+            + (_speeds(trials, one, task), str(one.falls), f"{one.refused} of {one.trials}")
             + ("" if one.rank is None else f"{one.rank.mean:.2f}", f"{one.real_episodes:.0f}")
             + TABLE_2.get("ane" if one.method == "ane_02" else one.method, NOTHING)
             for one in found
         ]
         parts = [table(titles, rows)]
-        gained = attrgetter("improvement")
-        apart = [
-            (one.world, one.method, *(_apart(trials, one, other, gained) for other in self.against)) for one in found
-        ]
+        apart = [(one.world, one.method, *(_apart(trials, one, other) for other in self.beside)) for one in found]
         if any(any(cells) for _, _, *cells in apart):
-            parts.append("Improvement against others, paired by trial [percentage points] (95 %, each alone):\n")
-            parts.append(table(("real world", "grounding", *(f"than {other}" for other in self.against)), apart))
-        if all(SPEED in trial.last for trial in trials):
-            parts.append(_unchosen(trials, found, self.against))
+            parts.append("Improvement against others, paired by trial [percentage points] (95 %, each for itself):\n")
+            parts.append(table(("real world", "grounding", *(f"than {other}" for other in self.beside)), apart))
         tested = [
             (world, f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
             for world in dict.fromkeys(one.world for one in found)
@@ -73,31 +71,23 @@ class Table2:
         return worth(trials, task)
 
 
-def _unchosen(trials: Sequence[Trial], found: Sequence[Summary], against: Sequence[str]) -> str:
-    """Return how fast the last generation's policies are."""
-    rows = []
-    for one in found:
-        speeds = mean_interval([_last(trial) for trial in trials if trial.cell == one[:4]])
-        apart = (_apart(trials, one, other, _last) for other in against)
-        rows.append((one.world, one.method, f"{speeds.mean:.1f}", told(speeds), *apart))
-    titles = ("real world", "grounding", SPEED, "95 % interval", *(f"than {other}" for other in against))
-    head = "Speed of the last generation's best, which nothing real has chosen, falls and all (95 %, each alone):\n"
-    return "\n".join([head, table(titles, rows)])
-
-
-def _last(trial: Trial) -> float:
-    return trial.last[SPEED]
-
-
-def _apart(trials: Sequence[Trial], one: Summary, other: str, figure: Callable[[Trial], float | None]) -> str:
-    """Return how much larger a figure is than another method's, nothing where there is none to be set against."""
+def _apart(trials: Sequence[Trial], one: Summary, other: str) -> str:
+    """Return by how much a method's improvement is above another's, nothing where there is none to be set against."""
     cell = Cell(*one[:4])
     pair = [trial for trial in trials if trial.cell in (cell, cell._replace(method=other))]
     tried = {trial.method for trial in pair}
-    if one.method == other or other not in tried or any(figure(trial) is None for trial in pair):
+    if one.method == other or other not in tried or any(trial.improvement is None for trial in pair):
         return ""
-    found = differences(trials, cell, other, figure)
+    found = differences(trials, cell, other)
     return f"{found.mean:+.1f} ({told(found)})"
+
+
+def _last(trials: Sequence[Trial], one: Summary, task: Task) -> str:
+    """Return in how many trials the last generation's best, which nothing real has chosen, is faster than π0."""
+    own = [trial for trial in trials if trial.cell == one[:4]]
+    if not all(SPEED in trial.last for trial in own):
+        return ""
+    return f"{sum(trial.last[SPEED] > task.shown * trial.start for trial in own)} of {len(own)}"
 
 
 def _best_noise(found: Sequence[Summary], world: str) -> tuple[str, str]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from operator import attrgetter
 from typing import Annotated
 
 import numpy as np
@@ -162,8 +161,8 @@ def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *,
     for other, cell in product(against, dict.fromkeys(trial.cell for trial in trials)):
         if other not in methods or methods.index(cell.method) <= methods.index(other):
             continue
-        apart = value_cells(differences(trials, cell, other, attrgetter("value")), task)
-        fewer = differences(trials, cell, other, attrgetter("falls"))
+        apart = value_cells(differences(trials, cell, other, "value"), task)
+        fewer = differences(trials, cell, other, "falls")
         counted = (f"{fewer.mean:+.1f}", f"{fewer.lower:+.1f} to {fewer.upper:+.1f}") if falls else ()
         rows.append((cell.world, f"{cell.method} - {other}", str(cell.iteration), *apart, *counted))
     counted = ("falls of a trial", "95 % interval") if falls else ()

@@ -37,7 +37,8 @@ class Trial(NamedTuple):
         rank: Correlation of the simulator with real over a fixed set of policies, None where nobody asked.
         real_episodes: Of models, choice, check and report, of this iteration and those before.
         outcome: What the task reports of the returned policy, by name with unit.
-        last: The same of the last generation's winner, which nothing real has chosen.
+        last: The same of the last generation's winner, which nothing real has chosen, in the episodes of the choice: up
+            to its first fall where none is tolerated.
     """
 
     simulator: str
