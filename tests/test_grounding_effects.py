@@ -22,13 +22,10 @@ from gsl.grounding.ane import ActionNoise
 from gsl.grounding.effects import DiagnosedEffects, Diagnosis, innermost, switched_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
-from gsl.models.config import ModelConfig
 from gsl.stages.effects_check import check_effects
 from gsl.stages.grounding_gate import Gate, grounding_parents
-from gsl.stages.needed_model import looking_ahead
 from gsl.stages.rollout import Scenario, rollout
 from gsl.storage.policies import read_policies
-from gsl.worlds.bullet import BulletWorld
 
 LATE = {"command_latency": {"delay": 0.02}}
 DRY = {"coulomb_friction": [{"torque": 0.1, "joints": "legs"}, {"torque": 0.05, "joints": "arms"}]}
@@ -144,21 +141,3 @@ def test_effects_and_a_transformation_are_one_choice() -> None:
     conf = Path(__file__).parents[1] / "conf/grounding/effects_gat.yaml"
     assert yaml.safe_load(conf.read_text())["defaults"] == ["effects", "gat_residual@inner", "_self_"]
     assert innermost(DiagnosedEffects(effects=LATE, inner=DiagnosedEffects(effects=DRY))) == NoGrounding()
-
-
-@pytest.mark.parametrize(
-    ("effects", "horizon", "history"),
-    [
-        ({}, 1, 3),
-        ({"command_latency": {"delay": 0.005}}, 1, 3),
-        ({"command_latency": {"delay": 0.03}}, 3, 3),
-        ({"command_latency": {"delay": 0.02}, "sensor_delay": {"delay": 0.02}}, 3, 3),
-        ({"command_latency": {"delay": 0.1}}, 6, 5),
-        ({"command_latency": {"delay": 0.3}}, 10, 9),
-    ],
-)
-def test_models_look_over_the_delay_of_a_late_simulator(effects: dict, horizon: int, history: int) -> None:
-    found = looking_ahead(ModelConfig(), BulletWorld("nao", effects))
-    assert (found.horizon, found.history) == (horizon, history)
-    assert looking_ahead(ModelConfig(history="auto"), BulletWorld("nao", effects)).history == "auto"
-    assert looking_ahead(ModelConfig(horizon=10), BulletWorld("nao", effects)) == ModelConfig(horizon=10)

@@ -16,7 +16,6 @@ from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.models.config import HISTORIES, ModelConfig
 from gsl.models.ensemble import Ensemble
 from gsl.models.linear import fit_linear
-from gsl.stages.needed_model import as_needed
 from gsl.stages.train_forward import HELDOUT, TrainForward
 from gsl.stages.train_inverse import TrainInverse
 from gsl.stages.training import labels
@@ -216,15 +215,6 @@ def test_a_gaussian_ensemble_is_trained_by_likelihood_and_knows_what_it_has_seen
     assert isinstance(found, Ensemble)
     assert len(found.members) == 3
     assert found.judged(np.full(found.history.size(2), 50.0))[1].min() > 3.0
-
-
-def test_a_grounding_is_trained_the_forward_model_that_it_needs() -> None:
-    point, wanted = ModelConfig(), ActionTransformation("f", "i", predicts="mixture", gate=1.0)
-    assert (as_needed(point, wanted).likelihood, as_needed(point, wanted).members) == ("mixture", 5)
-    residual = as_needed(point, ActionTransformation("f", "i", residual=True))
-    assert (residual.family, residual.ridge) == ("linear", 1.0)
-    own = ModelConfig(likelihood="gaussian", members=3)
-    assert as_needed(own, ActionTransformation("f", "i", gate=1.0)) == own
 
 
 def test_auto_takes_the_history_that_predicts_best_and_says_what_it_tried(real: str, sim: str, tmp_path: Path) -> None:
