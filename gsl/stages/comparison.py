@@ -33,6 +33,10 @@ class Summary(NamedTuple):
     rank: Interval | None
     real_episodes: float
 
+    def own(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Return those of some trials that it sums up."""
+        return [trial for trial in trials if trial.cell == self[:4]]
+
 
 def summaries(trials: Sequence[Trial]) -> list[Summary]:
     """Return one summary for each cell, by worlds, methods in the order of their first trial."""

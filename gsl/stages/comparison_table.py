@@ -28,9 +28,7 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
     single, paired = [], []
     for one in found:
         values = [
-            own.bare(trial.improvement if as_shares else trial.value) + "*" * trial.without
-            for trial in trials
-            if trial.cell == one[:4]
+            own.bare(trial.improvement if as_shares else trial.value) + "*" * trial.without for trial in one.own(trials)
         ]
         single.append((one.world, one.method, ", ".join(values)))
         if one.method != first:

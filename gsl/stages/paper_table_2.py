@@ -84,7 +84,7 @@ def _apart(trials: Sequence[Trial], one: Summary, other: str) -> str:
 
 def _last(trials: Sequence[Trial], one: Summary, task: Task) -> str:
     """Return in how many trials the last generation's best, which nothing real has chosen, is faster than π0."""
-    own = [trial for trial in trials if trial.cell == one[:4]]
+    own = one.own(trials)
     if not all(SPEED in trial.last for trial in own):
         return ""
     return f"{sum(trial.last[SPEED] > task.shown * trial.start for trial in own)} of {len(own)}"
@@ -98,6 +98,6 @@ def _best_noise(found: Sequence[Summary], world: str) -> tuple[str, str]:
 
 
 def _speeds(trials: Sequence[Trial], one: Summary, task: Task) -> str:
-    own = [trial for trial in trials if trial.cell == one[:4]]
+    own = one.own(trials)
     start, after = (task.shown * float(np.mean([getattr(trial, name) for trial in own])) for name in ("start", "value"))
     return f"{start:.1f}, {after:.1f}"

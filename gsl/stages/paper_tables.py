@@ -24,8 +24,6 @@ TABLE_3 = {1: ("26.3 and 26.9", "34.6 and 37.8"), 2: ("28.0", "43.3")}  # cm/s, 
 TABLE_4 = {("gat", 1): ("15.7 ± 3.0", "6 of 10"), ("sgat", 1): ("16.9 ± 0.7", "0 of 10"),
            ("gat", 2): ("18.5 ± 3.6", "10 of 10"), ("sgat", 2): ("18.0 ± 2.2", "1 of 10")}  # fmt: skip
 LINEAR_WALK = {"none": ("1.3", "3 of 5", "1"), "gat": ("4.95", "5 of 5", "3")}
-
-
 AT_THE_END, ON_AVERAGE = "distance [deg]", "mean distance [deg]"  # of the arms
 
 
@@ -45,7 +43,7 @@ class Table3:
         )
         rows = []
         for one in summaries(trials):
-            own = [trial for trial in trials if trial.cell == one[:4]]
+            own = one.own(trials)
             chains = [[past for past in trials if past.cell[:3] == one[:3] and past.number == k.number] for k in own]
             so_far = [[past for past in chain if past.iteration <= one.iteration] for chain in chains]
             stops = sum(any(past.surely <= 0.0 for past in chain) for chain in so_far)
@@ -84,7 +82,7 @@ class Table4:
         )
         rows = []
         for one in summaries(trials):
-            own = [trial for trial in trials if trial.cell == one[:4]]
+            own = one.own(trials)
             low, high = (f"{100 * bound:.0f}" for bound in _share_of_falls(own)[1:])
             speed = np.mean([trial.outcome.get(SPEED, np.nan) for trial in own])
             rows.append(
@@ -142,7 +140,7 @@ class Figure5:
         """Return the figure's values as a table."""
         rows = []
         for one in summaries(trials):
-            own = [trial.last for trial in trials if trial.cell == one[:4]]
+            own = [trial.last for trial in one.own(trials)]
             on_average, at_the_end = (mean_interval([last[name] for last in own]) for name in (ON_AVERAGE, AT_THE_END))
             cells = [cell for found in (on_average, at_the_end) for cell in (f"{found.mean:.2f}", told(found))]
             above = sum(last["above [share]"] > 0.0 for last in own)
