@@ -288,6 +288,14 @@ def test_a_learned_grounding_brings_replays_nearer(cause: dict[str, Any], residu
     assert np.mean(errors) < left * mean_errors(bare().simulator, {}, none(2), found[6:], arm()).mean()
 
 
+@pytest.mark.parametrize("delay", [0.02, 0.03, 0.04])
+def test_on_top_of_a_diagnosed_delay_a_grounding_looks_over_it(delay: float) -> None:
+    known = {"command_latency": {"delay": delay}}
+    found, late = records(log({**known, **STICKY}, jitter=0.0), arm()), replace(bare(), effects=known)
+    before = mean_errors(late.simulator, known, none(2), found[6:], arm()).mean()
+    assert np.mean(learning().errors(late, found[:6], found[6:], 1)) < 0.85 * before
+
+
 def test_a_correction_of_a_simulator_that_knows_gains_is_better_at_another_gain_than_a_model_of_logs() -> None:
     found = records(both(viscous_friction={"coefficient": 0.4}), arm())
     errors = {how: learning(residual=how).errors(bare(), found[:9], found[9:], 1) for how in (True, False)}

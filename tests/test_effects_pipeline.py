@@ -59,7 +59,7 @@ def test_a_transformation_inside_learns_from_the_diagnosed_simulator(air: tuple[
     assert any(line.startswith(f"{FIRST}/diagnose: ") and "(unchanged)" in line for line in said.lines)
     assert "command_latency" in loaded(folder / FIRST / "collect_sim/config.yaml")["world"]["effects"]
     models = [loaded(folder / FIRST / f"{stage}/config.yaml")["model"] for stage in ("train_inverse", "train_forward")]
-    assert [one["horizon"] for one in models] == [2, 2]  # an action is a tick late there
+    assert [one["horizon"] for one in models] == [3, 3]  # an action is a tick late there
     assert loaded(folder / FIRST / "optimize/metrics.json")["effects"] == ["command_latency"]
     assert 0.0 < loaded(folder / FIRST / "optimize/metrics.json")["alpha"] <= 1.0
     assert (folder / "runs/air/with_gat/joint_trace.png").is_file()

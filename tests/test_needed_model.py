@@ -6,7 +6,7 @@ import pytest
 
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import ModelConfig
-from gsl.stages.needed_model import as_needed, looking_ahead
+from gsl.stages.needed_model import as_needed, extra_ticks, looking_ahead
 from gsl.worlds.bullet import BulletWorld
 
 
@@ -25,13 +25,14 @@ def test_a_grounding_is_trained_the_forward_model_that_it_needs() -> None:
         ({}, 1, 3),
         ({"command_latency": {"delay": 0.005}}, 1, 3),
         ({"command_latency": {"delay": 0.03}}, 3, 3),
-        ({"command_latency": {"delay": 0.02}, "sensor_delay": {"delay": 0.02}}, 3, 3),
-        ({"command_latency": {"delay": 0.1}}, 6, 5),
+        ({"command_latency": {"delay": 0.02}, "sensor_delay": {"delay": 0.02}}, 4, 3),
+        ({"command_latency": {"delay": 0.1}}, 7, 6),
         ({"command_latency": {"delay": 0.3}}, 10, 9),
     ],
 )
 def test_models_look_over_the_delay_of_a_late_simulator(effects: dict, horizon: int, history: int) -> None:
-    found = looking_ahead(ModelConfig(), BulletWorld("nao", effects))
+    extra = extra_ticks(BulletWorld("nao", effects))
+    found = looking_ahead(ModelConfig(), extra)
     assert (found.horizon, found.history) == (horizon, history)
-    assert looking_ahead(ModelConfig(history="auto"), BulletWorld("nao", effects)).history == "auto"
-    assert looking_ahead(ModelConfig(horizon=10), BulletWorld("nao", effects)) == ModelConfig(horizon=10)
+    assert looking_ahead(ModelConfig(history="auto"), extra).history == "auto"
+    assert looking_ahead(ModelConfig(horizon=10), extra) == ModelConfig(horizon=10)

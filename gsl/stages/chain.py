@@ -24,7 +24,7 @@ from gsl.stages.diagnosis_plan import DiagnosisPlan
 from gsl.stages.evaluate import Evaluate, check_tolerated
 from gsl.stages.headline import several
 from gsl.stages.link import built
-from gsl.stages.needed_model import as_needed, lateness, looking_ahead
+from gsl.stages.needed_model import as_needed, extra_ticks, looking_ahead
 from gsl.stages.optimize import BEST, Optimize
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import Method, TrainInverse
@@ -181,13 +181,14 @@ class Chain:
             )
             built(stage, data[role], console)
         method: Method = "solve" if grounding.residual else self.inverse_method
-        late, inverse_model = lateness(self.sim), looking_ahead(self.inverse_model, self.sim)
-        if late:
-            console.status(f"the simulator acts {late} ticks late: models look {inverse_model.horizon} ticks ahead")
+        extra = extra_ticks(self.sim)
+        inverse_model = looking_ahead(self.inverse_model, extra)
+        if extra:
+            console.status(f"actions show late in the simulator: models look {inverse_model.horizon} ticks ahead")
         inverse = TrainInverse(str(data[SIM]), inverse_model, method=method, seed=seed)
         alike = method == self.inverse_method
         f_inverse = built(inverse, (places[SIM] if alike else home) / inverse.kind, console)
-        needed, base = looking_ahead(as_needed(self.forward_model, grounding), self.sim), None
+        needed, base = looking_ahead(as_needed(self.forward_model, grounding), extra), None
         if grounding.residual:
             needed = replace(needed, history=f_inverse.metrics["history"], horizon=inverse_model.horizon)
             base = str(f_inverse.folder)

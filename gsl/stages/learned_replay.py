@@ -28,7 +28,7 @@ from gsl.models.free_run import shortest
 from gsl.models.inverse import Solver
 from gsl.models.linear import fit_linear
 from gsl.stages import train_forward, train_inverse
-from gsl.stages.needed_model import SHRINKING
+from gsl.stages.needed_model import SHRINKING, extra_ticks_of, looking_ahead
 from gsl.stages.train_inverse import Damping
 from gsl.stages.training import parted
 from gsl.worlds.bullet import BulletEnv, BulletWorld
@@ -96,6 +96,9 @@ class LearnedReplay:
         Raises:
             ConfigError: There are too few trajectories to learn from.
         """
+        ahead = looking_ahead(self.model, world.extra_ticks)
+        if ahead != self.model:
+            return replace(self, model=ahead).errors(world, known, held, seed)
         known = [one for one in map(driven, known) if len(one) >= self.needed]
         self.check([len(one) for one in known], "the rest")
         every = [*known, *held]
@@ -151,6 +154,11 @@ class Simulated:
     robot: Robot
     effects: Effects
     nuisances: np.ndarray
+
+    @property
+    def extra_ticks(self) -> int:
+        """Ticks more than one that a model has to look ahead."""
+        return extra_ticks_of(applied(self.simulator.plant, built(self.effects)).servo, self.simulator.period)
 
     def played(
         self, known: Sequence[Record], conditions: Mapping[str, Any], noise: float, seed: int

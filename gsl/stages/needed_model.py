@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from gsl.core.plant import Servo
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import FARTHEST, ModelConfig
 from gsl.worlds.bullet import BulletWorld
@@ -15,17 +16,20 @@ SLIGHT = 0.25  # ticks of a delay that leave an action most of its effect
 SHRINKING = 1.0  # least ridge of a residual: in directions that the data hardly show it is no correction
 
 
-def lateness(sim: World) -> int:
-    """Return after how many ticks more than one a robot's encoders tell what an action does in a simulator."""
-    if not isinstance(sim, BulletWorld):
-        return 0
-    servo = sim.plant.servo
-    return max(0, math.ceil((servo.delay + servo.sensor_delay).max() / sim.layout.control_period - SLIGHT))
+def extra_ticks(sim: World) -> int:
+    """Return how many ticks more than one a model has to look ahead in a simulator that acts, or tells, late."""
+    return extra_ticks_of(sim.plant.servo, sim.layout.control_period) if isinstance(sim, BulletWorld) else 0
 
 
-def looking_ahead(model: ModelConfig, sim: World) -> ModelConfig:
-    """Return a model that looks as far ahead as a late simulator needs, and back over the actions on their way."""
-    horizon = max(model.horizon, min(1 + lateness(sim), FARTHEST))
+def extra_ticks_of(servo: Servo, period: float) -> int:
+    """Return the same of servos that are controlled once in a period [s]: what shows for a tick alone is too little."""
+    ticks = float((servo.delay + servo.sensor_delay).max()) / period
+    return 0 if ticks <= SLIGHT else 1 + math.floor(ticks + SLIGHT)
+
+
+def looking_ahead(model: ModelConfig, extra: int) -> ModelConfig:
+    """Return a model that looks some ticks more than one ahead, and back over the actions that are on their way."""
+    horizon = max(model.horizon, min(1 + extra, FARTHEST))
     history = model.history if model.history == "auto" else max(model.history, horizon - 1)
     return model if horizon == model.horizon else replace(model, horizon=horizon, history=history)
 

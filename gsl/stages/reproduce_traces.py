@@ -23,7 +23,7 @@ from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.markdown import table
 from gsl.stages.grounding_replay import PAST, Place, replay
 from gsl.stages.iterate import Iterate
-from gsl.stages.needed_model import lateness
+from gsl.stages.needed_model import extra_ticks
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.training import degrees
 from gsl.storage.models import read_forward_model, read_inverse_model
@@ -90,7 +90,7 @@ class Figure7:
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Train the grounding, walk in real, replay in simulation, draw."""
         iterate = self.iterate
-        if lateness(iterate.sim):
+        if extra_ticks(iterate.sim):
             raise ConfigError("iterate.sim", "acts late: f looks several ticks ahead there and draws no trace")
         loaded = trained(iterate, folder.parent, console)
         walk = _walked(iterate)
