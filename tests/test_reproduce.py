@@ -269,9 +269,19 @@ def test_the_linear_walk_has_distances_where_percentages_mean_nothing() -> None:
 
 
 def test_figure_5_is_told_in_degrees() -> None:
-    last = {"distance [deg]": 0.5, "above [share]": 0.0}
-    text = Figure5().markdown([a_trial("gat", k, last={**last, "mean distance [deg]": 2.0 * k}) for k in (1, 2)], Arm())
-    assert "| 3.00 |" in text and "| 0.50 |" in text and "| 0 of 2 |" in text
+    def trial(method: str, k: int, on_average: float, above: float) -> Trial:
+        last = {"distance [deg]": 0.5, "above [share]": above, "mean distance [deg]": on_average}
+        return a_trial(method, k, last=last, outcome={"mean distance [deg]": 7.0})
+
+    trials = [
+        trial("none", 1, 10.0, 1.0),
+        trial("gat", 1, 2.0, 0.0),
+        trial("none", 2, 11.0, 1.0),
+        trial("gat", 2, 4.0, 0.0),
+    ]
+    lines = Figure5().markdown(trials, Arm()).splitlines()
+    assert "| gat | 3.0 | -9.7 to 15.7 | -7.5 (-13.9 to -1.1) | 0.5 | 0.5 to 0.5 | 0 of 2 | 7.0 |" in lines[-1]
+    assert "| none | 10.5 | 4.1 to 16.9 |  | 0.5 | 0.5 to 0.5 | 2 of 2 |" in lines[-2]
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(600.0, "about 10 minutes"), (36000.0, "about 10.0 hours")])

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
-from typing import NamedTuple
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import wilcoxon
 
 from gsl.core.statistics import Interval, mean_interval
 from gsl.stages.trial import Cell, Trial
+
+Figure = Callable[[Trial], Any]  # of a trial
+IMPROVEMENT: Figure = attrgetter("improvement")
 
 
 class Summary(NamedTuple):
@@ -44,7 +48,7 @@ def summaries(trials: Sequence[Trial]) -> list[Summary]:
     return [_summary(cell, [trial for trial in trials if trial.cell == cell]) for cell in cells]
 
 
-def differences(trials: Sequence[Trial], cell: Cell, other: str, figure: str = "improvement") -> Interval:
+def differences(trials: Sequence[Trial], cell: Cell, other: str, figure: Figure = IMPROVEMENT) -> Interval:
     """Return how much larger a figure is than another method's, paired by trial, with its 95 % interval."""
     return mean_interval(np.subtract(*_paired(trials, cell, other, figure)))
 
@@ -77,15 +81,15 @@ def orders(
     for method, other in product(methods, others):
         if not {method, other} <= there or method == other:
             continue
-        first, second = _paired(trials, Cell(simulator, world, method, 1), other, "stable")
+        first, second = _paired(trials, Cell(simulator, world, method, 1), other, attrgetter("stable"))
         found.append(Order(method, other, float(np.mean(first - second)), _signed_rank(first - second)))
     return _corrected(found)
 
 
-def _paired(trials: Sequence[Trial], cell: Cell, other: str, figure: str) -> tuple[np.ndarray, np.ndarray]:
+def _paired(trials: Sequence[Trial], cell: Cell, other: str, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
     """Return a figure of two methods in the trials that both have, shape (trials,) each."""
     values = {
-        name: {trial.number: getattr(trial, figure) for trial in trials if trial.cell == cell._replace(method=name)}
+        name: {trial.number: figure(trial) for trial in trials if trial.cell == cell._replace(method=name)}
         for name in (cell.method, other)
     }
     numbers = sorted(values[cell.method].keys() & values[other].keys())

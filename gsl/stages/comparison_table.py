@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from operator import attrgetter
 
 from gsl.core.statistics import Interval
 from gsl.report.markdown import in_unit, table
@@ -32,7 +33,7 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
         ]
         single.append((one.world, one.method, ", ".join(values)))
         if one.method != first:
-            apart = differences(trials, Cell(*one[:4]), first, figure)
+            apart = differences(trials, Cell(*one[:4]), first, attrgetter(figure))
             bounds = own.interval([apart.lower, apart.upper])
             paired.append((one.world, f"{one.method} - {first}", own.bare(apart.mean, sign=True), bounds))
     parts = [table(tuple(columns), list(zip(*columns.values(), strict=True)))]

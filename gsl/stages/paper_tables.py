@@ -5,8 +5,9 @@ Figures of the paper are those of its text and tables; figure 5 has none that ca
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import product
+from operator import attrgetter
 from typing import Annotated
 
 import numpy as np
@@ -134,23 +135,36 @@ class LinearWalkTable:
 
 @component
 class Figure5:
-    """Distance of the arms to their goal with the last generation's policy, which nothing real has chosen."""
+    """Distance of the arms to their goal with the last generation's policy, which nothing real has chosen.
+
+    Beside it that of the policy which the real world chose among the best of all generations.
+    """
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the figure's values as a table."""
-        rows = []
+        rows, first = [], trials[0].method
         for one in summaries(trials):
-            own = [trial.last for trial in one.own(trials)]
-            on_average, at_the_end = (mean_interval([last[name] for last in own]) for name in (ON_AVERAGE, AT_THE_END))
-            cells = [cell for found in (on_average, at_the_end) for cell in (f"{found.mean:.2f}", told(found))]
-            above = sum(last["above [share]"] > 0.0 for last in own)
-            rows.append((one.world, one.method, *cells, f"{above} of {len(own)}"))
-        titles = ("mean distance [°]", "95 % interval", "final distance [°]", "95 % interval", "trials above the goal")
-        return table(("real world", "grounding", *titles), rows)
+            own = one.own(trials)
+            apart = differences(trials, own[0].cell, first, _on_average)
+            cells = (
+                *_degrees(map(_on_average, own)),
+                "" if one.method == first else f"{apart.mean:+.1f} ({told(apart)})",
+                *_degrees(trial.last[AT_THE_END] for trial in own),
+                f"{sum(trial.last['above [share]'] > 0.0 for trial in own)} of {len(own)}",
+                *_degrees(trial.outcome[ON_AVERAGE] for trial in own),
+                f"{one.real_episodes:.0f}",
+            )
+            rows.append((one.world, one.method, *cells))
+        titles = (
+            *("real world", "grounding", "mean distance [°]", "95 % interval", f"than {first} (95 %, paired)"),
+            *("final distance [°]", "95 % interval", "trials above the goal"),
+            *("chosen in real: mean distance [°]", "95 % interval", "real episodes"),
+        )
+        return table(titles, rows)
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
         """Return the mean distances."""
-        return "mean distance in real [°]", [trial.last[ON_AVERAGE] for trial in trials]
+        return "mean distance in real [°]", list(map(_on_average, trials))
 
 
 def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *, falls: bool = False) -> str:
@@ -159,13 +173,23 @@ def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *,
     for other, cell in product(against, dict.fromkeys(trial.cell for trial in trials)):
         if other not in methods or methods.index(cell.method) <= methods.index(other):
             continue
-        apart = value_cells(differences(trials, cell, other, "value"), task)
-        fewer = differences(trials, cell, other, "falls")
+        apart = value_cells(differences(trials, cell, other, attrgetter("value")), task)
+        fewer = differences(trials, cell, other, attrgetter("falls"))
         counted = (f"{fewer.mean:+.1f}", f"{fewer.lower:+.1f} to {fewer.upper:+.1f}") if falls else ()
         rows.append((cell.world, f"{cell.method} - {other}", str(cell.iteration), *apart, *counted))
     counted = ("falls of a trial", "95 % interval") if falls else ()
     titles = ("real world", "difference", "iteration", f"in real [{task.unit}]", "95 % interval, paired by trial")
     return table((*titles, *counted), rows)
+
+
+def _on_average(trial: Trial) -> float:
+    return trial.last[ON_AVERAGE]
+
+
+def _degrees(distances: Iterable[float]) -> tuple[str, str]:
+    """Return the cells of a mean and its interval."""
+    found = mean_interval(list(distances))
+    return f"{found.mean:.1f}", told(found)
 
 
 def _share_of_falls(trials: Sequence[Trial]) -> Interval:
