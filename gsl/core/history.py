@@ -11,6 +11,8 @@ import numpy as np
 BODY_SENSORS = {"gyro": 3, "tilt": 2, "foot_force": 2}
 """Number of entries of each body sensor a window may hold."""
 
+RESTING = 0.15  # [rad]; a joint that rests is no farther than this from its target, however soft the servo
+
 
 @dataclass(frozen=True)
 class History:
@@ -71,7 +73,8 @@ def tilt(x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any]:
 class Window:
     """The window of an episode as it goes on: `see` what is measured, `complete` it with an action, `remember` one.
 
-    Before the first tick the robot is taken to have stood still, told what it is told first.
+    Before the first tick the robot is taken to have stood still, told what it is told first, as far as `RESTING`
+    allows: what a first action asks beyond it was not asked before.
     """
 
     def __init__(self, history: History, n_joints: int) -> None:
@@ -98,7 +101,7 @@ class Window:
     def complete(self, action: np.ndarray) -> np.ndarray:
         """Return the window with an action [rad], shape (n_joints,); the array is used again at the next call."""
         if self._fresh:
-            self._past_actions[:] = action
+            self._past_actions[:] = np.clip(action, self._position - RESTING, self._position + RESTING)
             self._fresh = False
         self._action[:] = action
         np.subtract(self._raw, self._position, out=self._joints)
