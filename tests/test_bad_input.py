@@ -142,7 +142,7 @@ def test_a_model_of_another_robot(chain: Path, rewritten: Callable[..., str], tm
         assert gsl(stage, f"data={data}", "model=linear", f"out={tmp_path / stage}", folder=chain).code == 0
     models = (f"grounding.forward_model={tmp_path}/train-forward", f"grounding.inverse_model={tmp_path}/train-inverse")
     line = refused(*GAT, *models, "out=runs/refused", folder=chain)
-    assert line == "grounding: the models and the world differ in joints: LElbowRoll, LKneePitch"
+    assert line == "grounding: its models know joints that the world lacks: LElbowRoll"
 
 
 def test_a_model_of_another_control_period(chain: Path, rewritten: Callable[..., str], tmp_path: Path) -> None:

@@ -335,6 +335,7 @@ def test_replays_beside_others_have_no_noise_and_say_when_they_diverge() -> None
     ("model", "line"),
     [
         ({"sensors": ("gyro",)}, "gat.model.sensors: logs in the air have joints alone"),
+        ({"variables": ("a",)}, "gat.model.variables: whole replays are of all joints"),
         ({"members": 3}, "gat.model: replays are of one model that says a point"),
         ({"history": "auto"}, "gat.model: a correction has a history of one length, and plain angles"),
         ({"encoding": "sincos"}, "gat.model: a correction has a history of one length, and plain angles"),

@@ -154,8 +154,20 @@ def test_no_grounding_and_no_noise_are_the_identity(grounding: object) -> None:
 
 def test_models_of_another_robot_are_refused() -> None:
     grounding = LoadedTransformation(a_model(1), a_solver(1))
-    with pytest.raises(ConfigError, match="joints: c, d"):
+    with pytest.raises(ConfigError, match="joints that the world lacks: c$"):
         grounding.start(Layout(("a", "b", "d"), LAYOUT.sizes, 0.02), np.random.default_rng(0))
+
+
+def test_joints_that_the_models_do_not_know_get_the_agents_actions() -> None:
+    whole = LoadedTransformation(ForwardModel(servo(0.3), HISTORY, LAYOUT.joints), inverse_servo(0.8))
+    wide = Layout(("z", "c", "a", "y", "b"), {"position": 5, "velocity": 5}, 0.02)
+    order, rng = [2, 4, 1], np.random.default_rng(3)
+    run, among = (whole.start(layout, np.random.default_rng(0)) for layout in (LAYOUT, wide))
+    for _ in range(4):
+        x, action = rng.normal(size=5), rng.normal(size=5)
+        expected = action.copy()
+        expected[order] = run.transform(np.r_[x[order], np.zeros(N)], action[order])
+        np.testing.assert_array_equal(among.transform(np.r_[x, np.zeros(5)], action), expected)
 
 
 def test_models_of_different_robots_do_not_go_together() -> None:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,20 @@ def test_the_window_of_a_running_episode_is_that_of_its_recording(history: Histo
         window.remember(episode.action[tick])
     np.testing.assert_allclose(seen[history.span :], expected, atol=1e-15)
     assert expected.shape[1] == history.size(3)
+
+
+def test_an_episode_that_begins_at_rest_has_windows_of_its_first_ticks() -> None:
+    episode, history = an_episode(), History(3, ("gyro",), rested=True)
+    window, seen = Window(history, 3), []
+    for tick in range(len(episode)):
+        window.see(episode.position[tick], sensed(episode, history.sensors)[tick])
+        seen.append(window.complete(episode.action[tick]).copy())
+        window.remember(episode.action[tick])
+    found = transitions([episode], history, 2, carried_out=False)
+    np.testing.assert_allclose(found.windows, seen[:-1], atol=1e-15)
+    np.testing.assert_allclose(found.change, episode.position[2:] - episode.position[:-2], atol=1e-15)
+    later = transitions([episode], replace(history, rested=False), 2, carried_out=False)
+    np.testing.assert_array_equal(found.windows[3:], later.windows)
 
 
 def test_before_the_first_tick_the_robot_stood_still() -> None:

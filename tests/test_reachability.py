@@ -57,6 +57,18 @@ def test_a_simulator_can_do_what_it_does_and_what_no_servo_can_is_told_joint_by_
     assert impossible.metrics()["by_joint"]["LKneePitch"] == 1.0
 
 
+def test_joints_that_the_models_do_not_know_are_not_asked_about() -> None:
+    env = WALK.make()
+    walk = rollout(WALK, env, POLICY.initial, 1)
+    env.close()
+    starts, bare = places([walk], SIM.layout, 4), SIM.make()
+    history, knees = History(0), ("LKneePitch", "RKneePitch")
+    f = ForwardModel(Network([(np.zeros((2, history.size(2))), np.array([0.8, 0.0]))]), history, knees)
+    found = reachability(bare, LoadedTransformation(f, Solver(f, np.eye(2), 0.1)), starts, 1)
+    bare.close()
+    assert found.joints == knees and found.unreached[0] == 1.0 > found.unreached[1]
+
+
 def test_a_region_holds_its_own_kind_and_little_else() -> None:
     rng = np.random.default_rng(0)
     mix = rng.normal(size=(6, 6))

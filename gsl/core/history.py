@@ -24,11 +24,13 @@ class History:
         ticks: Past positions and past actions, k each.
         sensors: Names out of `BODY_SENSORS`.
         sensor_ticks: Ticks of each sensor, the present one included.
+        rested: Whether episodes begin at rest, so that there are windows of their first ticks as well.
     """
 
     ticks: int = 3
     sensors: tuple[str, ...] = ()
     sensor_ticks: int = 2
+    rested: bool = False
 
     @property
     def sensed(self) -> int:
@@ -65,6 +67,30 @@ def windows(
     return np.concatenate(parts, axis=1)
 
 
+def asked_at_rest(action: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Return what a robot that rests was told before its first action [rad]: this, as far as `RESTING` allows."""
+    return np.clip(action, position - RESTING, position + RESTING)
+
+
+def with_rest(
+    history: History, position: np.ndarray, action: np.ndarray, sensed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return positions, actions and body sensors of an episode with as many ticks of rest before it as a window needs.
+
+    Args:
+        history: What a window holds.
+        position: See `windows`, as the others.
+        action: The episode's.
+        sensed: Body sensors.
+    """
+
+    def after(first: np.ndarray, column: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.repeat(first, history.span, axis=0), column])
+
+    told = asked_at_rest(action[:1], position[:1])
+    return after(position[:1], position), after(told, action), after(sensed[:1], sensed)
+
+
 def tilt(x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any]:
     """Return the first two entries of the upward direction in body axes, of one quaternion or of arrays of them."""
     return 2.0 * (x * z - y * w), 2.0 * (y * z + x * w)
@@ -73,8 +99,7 @@ def tilt(x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any]:
 class Window:
     """The window of an episode as it goes on: `see` what is measured, `complete` it with an action, `remember` one.
 
-    Before the first tick the robot is taken to have stood still, told what it is told first, as far as `RESTING`
-    allows: what a first action asks beyond it was not asked before.
+    Before the first tick the robot is taken to have rested.
     """
 
     def __init__(self, history: History, n_joints: int) -> None:
@@ -101,7 +126,7 @@ class Window:
     def complete(self, action: np.ndarray) -> np.ndarray:
         """Return the window with an action [rad], shape (n_joints,); the array is used again at the next call."""
         if self._fresh:
-            self._past_actions[:] = np.clip(action, self._position - RESTING, self._position + RESTING)
+            self._past_actions[:] = asked_at_rest(action, self._position)
             self._fresh = False
         self._action[:] = action
         np.subtract(self._raw, self._position, out=self._joints)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,17 @@ class Trajectory:
         """Number of control steps T."""
         return len(self.action)
 
+    def of_columns(self, columns: Sequence[int]) -> Trajectory:
+        """Return the same of some joints alone, by number."""
+        sent = self.grounded_action
+        return replace(
+            self,
+            action=self.action[:, columns],
+            position=self.position[:, columns],
+            velocity=self.velocity[:, columns],
+            grounded_action=None if sent is None else sent[:, columns],
+        )
+
     @property
     def ended_in_a_fall(self) -> bool:
         """Whether the robot fell in this episode."""
@@ -71,6 +82,13 @@ class Batch:
         """Number of entries of a state that is not joints; 0 for a robot."""
         first = self.episodes[0].state
         return 0 if first is None else int(first.shape[1])
+
+    def of_joints(self, joints: Sequence[str]) -> Batch:
+        """Return the same of some joints alone."""
+        if tuple(joints) == self.joints:
+            return self
+        columns = [self.joints.index(joint) for joint in joints]
+        return replace(self, episodes=tuple(one.of_columns(columns) for one in self.episodes), joints=tuple(joints))
 
     def __len__(self) -> int:
         """Number of episodes."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.history import History, windows
+from gsl.core.history import History, windows, with_rest
 from gsl.core.observation import sensed
 from gsl.core.trajectory import Trajectory
 
@@ -40,12 +40,13 @@ def transitions(episodes: Sequence[Trajectory], history: History, horizon: int, 
 
 
 def _of_one(episode: Trajectory, history: History, horizon: int, *, carried_out: bool) -> Transitions:
-    action = actions(episode, carried_out=carried_out)
-    ticks = np.arange(history.span, usable(episode) - horizon + 1)
-    x = episode.position
-    return Transitions(
-        windows(history, x, action, sensed(episode, history.sensors), ticks), x[ticks + horizon] - x[ticks]
-    )
+    x, action, body = episode.position, actions(episode, carried_out=carried_out), sensed(episode, history.sensors)
+    last = usable(episode) - horizon + 1
+    if history.rested:
+        x, action, body = with_rest(history, x, action, body)
+        last += history.span
+    ticks = np.arange(history.span, last)
+    return Transitions(windows(history, x, action, body, ticks), x[ticks + horizon] - x[ticks])
 
 
 def actions(episode: Trajectory, *, carried_out: bool) -> np.ndarray:

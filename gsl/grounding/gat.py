@@ -80,7 +80,7 @@ class ActionTransformation:
         if getattr(f, "space", "joints") != getattr(f_inv, "space", "joints"):
             raise ConfigError("inverse_model", "is of another kind of world than the forward model")
         if self.x != "all" and not isinstance(f, Forward):
-            raise ConfigError("x", "names joints of a robot; model.variables are an environment's")
+            raise ConfigError("x", "names joints of a robot; an environment's variables are those of its models")
         if isinstance(f, Counts):
             if self.noise or self.gate is not None or self.alpha not in (1.0, "auto"):
                 raise ConfigError("grounding", "alpha, noise and gate are for actions that are numbers, not choices")
@@ -131,7 +131,7 @@ class LoadedTransformation:
         inverse: f_inv, of the simulator.
         alpha: In [0, 1].
         noise: Standard deviation of the noise on top [rad].
-        x: Names of the joints that are grounded, None for all; the others are sent the agent's actions.
+        x: Names of the joints that are grounded, None for all that the models know; others get the agent's actions.
         draws: Whether f's answer is drawn and not expected.
         gate: Doubt of f from which on it is trusted less, None for never.
     """
@@ -148,11 +148,10 @@ class LoadedTransformation:
         """Return the grounding at the beginning of an episode.
 
         Raises:
-            ConfigError: The world has other joints than the models.
+            ConfigError: The models know joints that the world lacks.
         """
-        if layout.joints != self.forward.joints:
-            different = sorted(set(layout.joints) ^ set(self.forward.joints)) or ["their order"]
-            raise ConfigError("grounding", f"the models and the world differ in joints: {', '.join(different)}")
+        if lacking := [joint for joint in self.forward.joints if joint not in layout.joints]:
+            raise ConfigError("grounding", f"its models know joints that the world lacks: {', '.join(lacking)}")
         return TransformationRun(self, layout, rng)
 
 
@@ -169,15 +168,16 @@ class TransformationRun:
         self._grounding, self._rng = grounding, rng
         self._draws = Draws(rng, grounding.forward.memory) if grounding.draws else None
         self._senses = Senses(layout, grounding.forward.history.sensors)
-        n = len(layout.joints)
-        x = layout.joints if grounding.x is None else grounding.x
-        self._alpha = grounding.alpha * np.array([joint in x for joint in layout.joints])
+        joints = grounding.forward.joints
+        n, x = len(joints), joints if grounding.x is None else grounding.x
+        self._known = slice(None) if joints == layout.joints else [layout.joints.index(joint) for joint in joints]
+        self._alpha = grounding.alpha * np.array([joint in x for joint in joints])
         self._real, self._sim = Window(grounding.forward.history, n), Window(grounding.inverse.history, n)
 
     def transform(self, observation: np.ndarray, action: np.ndarray) -> np.ndarray:
         """Return the grounded action [rad], shape (n_joints,)."""
         grounding, real, sim = self._grounding, self._real, self._sim
-        position = self._senses.position(observation)
+        position, every, action = self._senses.position(observation)[self._known], action, action[self._known]
         real.see(position, self._senses.sensed(observation))
         window = real.complete(action)
         wanted, trust = self._wanted(window)
@@ -190,7 +190,11 @@ class TransformationRun:
         sent = np.asarray(np.minimum(np.maximum(sent, action - REACH), action + REACH))
         real.remember(action)
         sim.remember(sent)
-        return sent
+        if self._known == slice(None):
+            return sent
+        every = every.copy()
+        every[self._known] = sent
+        return every
 
     def _wanted(self, window: np.ndarray) -> tuple[np.ndarray, float | np.ndarray]:
         """What f says, and how far to believe it: from 1 up to the gate to 0 at twice that, joint by joint."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from gsl.core.angles import Encoding
 from gsl.core.history import History
 from gsl.core.setting import component, setting
+from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
 from gsl.models.head import Head, Likelihood
 
@@ -36,8 +37,10 @@ class ModelConfig:
     encoding: Annotated[Encoding, setting("angles as they are, or as sine and cosine")] = "plain"
     ridge: Annotated[float, setting("penalty on the weights of the linear model, scaled inputs", ge=1e-9)] = 1e-2
     variables: Annotated[
-        tuple[int, ...] | Literal["all"], setting("state variables of interest of a gymnasium environment, by index")
+        tuple[int | str, ...] | Literal["all"],
+        setting("state variables of interest: a robot's joints by name, a gymnasium environment's state by index"),
     ] = "all"
+    rested: Annotated[bool, setting("a robot's episodes begin at rest: their first ticks are learned from too")] = False
     likelihood: Annotated[
         Likelihood, setting("what a forward model says of the next state: a point, a Gaussian, a mixture of Gaussians")
     ] = "point"
@@ -86,9 +89,29 @@ class ModelConfig:
         if not self.variables or len(set(self.variables)) < len(self.variables):
             raise ConfigError(f"{where}.variables", "names at least one entry of the state, each once")
         for variable in self.variables:
-            if not 0 <= variable < states:
+            if not (isinstance(variable, int) and 0 <= variable < states):
                 raise ConfigError(f"{where}.variables", f"the state has entries 0 to {states - 1}", given=str(variable))
-        return self.variables
+        return tuple(map(int, self.variables))
+
+    def joints_of_interest(self, joints: Sequence[str], where: str) -> tuple[str, ...]:
+        """Return the joints of interest, in the robot's order.
+
+        Args:
+            joints: Of the robot.
+            where: Name of the setting that this configuration is.
+
+        Raises:
+            ConfigError: They are none, or not among the robot's.
+        """
+        if self.variables == "all":
+            return tuple(joints)
+        if not self.variables:
+            raise ConfigError(f"{where}.variables", "names at least one joint")
+        for name in self.variables:
+            if name not in joints:
+                hint = did_you_mean(str(name), joints)
+                raise ConfigError(f"{where}.variables", f"the robot has no joint of this name{hint}", given=str(name))
+        return tuple(joint for joint in joints if joint in self.variables)
 
     @property
     def variants(self) -> Mapping[str, ModelConfig]:
@@ -111,12 +134,12 @@ class ModelConfig:
     @property
     def of_body(self) -> History:
         """What a forward model of the robot sees, at most."""
-        return History(self._ticks, self.sensors, self.sensor_ticks)
+        return History(self._ticks, self.sensors, self.sensor_ticks, self.rested)
 
     @property
     def of_joints(self) -> History:
         """What a model of the simulator sees, at most: joints alone."""
-        return History(self._ticks)
+        return History(self._ticks, rested=self.rested)
 
     @property
     def _ticks(self) -> int:

@@ -48,16 +48,17 @@ def drifts(scenario: Scenario, known: Region, found: Mapping[str, np.ndarray], s
     """
     grounding = scenario.grounding
     assert isinstance(grounding, LoadedTransformation), "only learned groundings have data"
-    env, shares = scenario.make(), {}
+    env, shares, joints = scenario.make(), {}, scenario.world.layout.joints
+    columns = [joints.index(joint) for joint in grounding.forward.joints]
     for index, (name, parameters) in enumerate(found.items()):
-        walked = rollout(scenario, env, parameters, derived_seed(seed, index))
+        walked = rollout(scenario, env, parameters, derived_seed(seed, index)).of_columns(columns)
         shares[name] = outside(grounding, known, [walked])
     env.close()
     return shares
 
 
 def outside(grounding: LoadedTransformation, known: Region, episodes: Sequence[Trajectory]) -> float:
-    """Return the share of the ticks of episodes that lie outside; 1 if all of them end before a window is full."""
+    """Return the share of the ticks of episodes, of the known joints, that lie outside; 1 if none fills a window."""
     history = grounding.forward.history
     long = [one for one in episodes if usable(one) > history.span]
     return known.outside(transitions(long, history, 1, carried_out=False).windows) if long else 1.0

@@ -33,7 +33,8 @@ def fewest(env: Any, grounding: LoadedTransformation, starts: Sequence[Place], s
         raise InputError("no validation trajectory is long enough to choose joints on; say grounding.x=all")
     joints = grounding.forward.joints
     bare = _squares(env, NoGrounding(), starts, seed)
-    gained = (bare - _squares(env, grounding, starts, seed)).mean(axis=0)
+    known = [env.layout.joints.index(joint) for joint in joints]
+    gained = (bare - _squares(env, grounding, starts, seed)).mean(axis=0)[known]
     order = [joints[k] for k in np.argsort(-gained)]
     sets = [tuple(order[:k]) for k in range(len(order) + 1)]
     errors = [bare.sum(axis=1)]

@@ -76,9 +76,13 @@ class Iterate:
         if isinstance(self.sim, ExternalRobot):
             raise ConfigError("sim", "is a real robot, which cannot play the simulator's part")
         object.__setattr__(self, "policy", sized(self.policy, self.sim))
-        check_alike(self.sim.layout, self.real.layout)
+        layout = self.sim.layout
+        check_alike(layout, self.real.layout)
         for name, model in {"forward_model": self.forward_model, "inverse_model": self.inverse_model}.items():
-            model.of_interest(self.sim.layout.states, name)
+            if layout.states:
+                model.of_interest(layout.states, name)
+            else:
+                model.joints_of_interest(layout.joints, name)
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""

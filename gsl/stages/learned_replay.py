@@ -58,6 +58,8 @@ class LearnedReplay:
         """Refuse what cannot be learned from joints alone, and what a correction cannot be."""
         if self.model.sensors:
             raise ConfigError("gat.model.sensors", "logs in the air have joints alone; leave the sensors out")
+        if self.model.variables != "all":
+            raise ConfigError("gat.model.variables", "whole replays are of all joints; leave the variables out")
         if self.model.head.draws or self.model.members > 1:
             raise ConfigError(
                 "gat.model", "replays are of one model that says a point; leave likelihood and members out"

@@ -24,7 +24,7 @@ DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
 MADE = ("forward_model", "inverse_model", "diagnosis")  # of a grounding: names of what a trial makes itself
 NUMBER = ("number", "trial")  # what rows call their trial
 # Settings that came after trials were written down, at what changes nothing.
-LATER = {"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim"}
+LATER = {"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim", "rested": False}
 
 Known = Annotated[str | None, setting("figures of trials that the same study has made before, not to be run again")]
 

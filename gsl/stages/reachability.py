@@ -66,21 +66,24 @@ def reachability(env: Any, grounding: LoadedTransformation, starts: Sequence[Pla
         starts: On real trajectories that no model has seen.
         seed: Of all randomness.
     """
-    x = env.layout["position"]
-    wanted = np.array([_expected(grounding, place, env.layout) for place in starts])
-    real = np.array([place.seen[place.tick + 1][x] - place.seen[place.tick][x] for place in starts])
-    tolerance = FLOOR + TOLERANCE * np.sqrt(np.mean(real**2, axis=0))
-    missed = [missed_by(env, place, target, seed) for place, target in zip(starts, wanted, strict=True)]
-    return Reachability(env.layout.joints, np.mean(np.abs(missed) > tolerance, axis=0), len(starts))
+    x, joints = env.layout["position"], grounding.forward.joints
+    known = [env.layout.joints.index(joint) for joint in joints]
+    changes = np.array([place.seen[place.tick + 1][x] - place.seen[place.tick][x] for place in starts])
+    wanted = changes.copy()  # of joints that the models do not know nothing else is expected
+    wanted[:, known] = [_expected(grounding, place, known, env.layout) for place in starts]
+    tolerance = FLOOR + TOLERANCE * np.sqrt(np.mean(changes[:, known] ** 2, axis=0))
+    missed = [missed_by(env, place, target, seed)[known] for place, target in zip(starts, wanted, strict=True)]
+    return Reachability(joints, np.mean(np.abs(missed) > tolerance, axis=0), len(starts))
 
 
-def _expected(grounding: LoadedTransformation, place: Place, layout: Layout) -> np.ndarray:
-    """Return what the forward model expects of the agent's action at a start [rad], shape (n_joints,)."""
+def _expected(grounding: LoadedTransformation, place: Place, known: list[int], layout: Layout) -> np.ndarray:
+    """Return what the forward model expects of the agent's action at a start [rad], shape (len(known),)."""
     history, seen = grounding.forward.history, place.seen[: place.tick + 1]
     senses = Senses(layout, history.sensors)
     sensed = np.array([senses.sensed(one) for one in seen])
     ticks = np.array([place.tick])
-    return grounding.forward.effects(windows(history, seen[:, layout["position"]], place.actions, sensed, ticks))[0]
+    position = seen[:, layout["position"]][:, known]
+    return grounding.forward.effects(windows(history, position, place.actions[:, known], sensed, ticks))[0]
 
 
 def missed_by(env: Any, place: Place, wanted: np.ndarray, seed: int) -> np.ndarray:

@@ -88,30 +88,31 @@ class TrainForward:
         earlier = {one: earlier_batch(one, newest.training) for one in map(data_file, self.earlier)}
         data = aggregated(newest, list(earlier.values()))
         console.status(f"fitting a forward model to {len(data.training)} trajectories")
-        base = None if self.residual_to is None else self._simulator(self.residual_to, data.training)
         if data.training.states:
+            if self.residual_to is not None:
+                raise ConfigError("residual_to", "is for robots; these trajectories are of an environment's states")
             write(folder / HELDOUT, data.heldout)
             return forward_of_states(folder, data, self.model, self.seed)
         if self.model.covariance == "full":
             raise ConfigError("model.covariance", "full is for a gymnasium environment; robots' joints are drawn alone")
         for file, batches in {path: newest, **{one: [batch] for one, batch in earlier.items()}}.items():
             self._check(file, batches)
-        model, choice = fitted(self.model, data, self.seed, base)
+        known = data.of_joints(self.model.joints_of_interest(data.training.joints, "model"))
+        base = None if self.residual_to is None else self._simulator(self.residual_to, known.training)
+        model, choice = fitted(self.model, known, self.seed, base)
         write_model(folder, model)
-        own = [one for part in data for one in of_policy(part, pi0=True)]
+        own = [one for part in known for one in of_policy(part, pi0=True)]
         falls = float(np.mean([one.ended_in_a_fall for one in own])) if own else 0.0
         write(folder / HELDOUT, replace(data.heldout, metadata={**data.heldout.metadata, FALLS: falls}))
         write(folder / VALIDATION, data.validation)
-        known, unseen = (_rows(choice.config, part.episodes).windows for part in (data.training, data.validation))
-        write_region(folder, region(known, unseen))
-        groups = {"pi0": of_policy(data.heldout, pi0=True), "off_pi0": of_policy(data.heldout, pi0=False)}
+        seen, unseen = (_rows(choice.config, part.episodes).windows for part in (known.training, known.validation))
+        write_region(folder, region(seen, unseen))
+        groups = {"pi0": of_policy(known.heldout, pi0=True), "off_pi0": of_policy(known.heldout, pi0=False)}
         measured = {name: measures(model, long) for name, part in groups.items() if (long := _long(self.model, part))}
         return {**summary(choice), "trajectories": len(data.training) + len(data.validation), "heldout": measured}
 
     def _simulator(self, reference: str, batch: Batch) -> ForwardModel:
         """Return the model of the simulator behind an inverse model, if f can correct it."""
-        if batch.states:
-            raise ConfigError("residual_to", "is for robots; these trajectories are of an environment's states")
         inverse = read_inverse_model(reference)
         if not isinstance(inverse, Solver):
             raise ConfigError("residual_to", "holds no model of the simulator; train it with method=solve")

@@ -33,6 +33,10 @@ class Parts(NamedTuple):
     validation: Batch
     heldout: Batch
 
+    def of_joints(self, joints: Sequence[str]) -> Parts:
+        """Return the same of some joints alone."""
+        return Parts(*(part.of_joints(joints) for part in self))
+
 
 def data_file(reference: str) -> Path:
     """Return the trajectory file that a path, an artifact of `collect` or `import`, or a run's name stands for."""
