@@ -20,7 +20,7 @@ from gsl.stages.diagnosis_plan import Flight
 from gsl.stages.evaluate import TABLE
 from gsl.stages.grounding_replay import PAST, Place, replay
 from gsl.stages.headline import Unit
-from gsl.stages.measured import ended, ends, share_of
+from gsl.stages.measured import ended, ends
 from gsl.storage.artifact import Artifact
 from gsl.tasks.task import Task
 from gsl.worlds.bullet import BulletWorld
@@ -92,7 +92,7 @@ class Rounds:
         after, before = self.best.metrics["returned"], self._done[0].metrics["baseline"]
         unit = self._unit
         gained, name = unit.interval(self.best.metrics["gain"]["interval"], sign=True), unit.name
-        if share_of(before, after["value"] - before["value"]) is not None:
+        if before["interval"][0] > 0.0:
             low, high = (100.0 * bound / before["value"] for bound in self.best.metrics["gain"]["interval"])
             gained, name = f"{low:+.0f} to {high:+.0f}", "% of π0"
         last = " ".join(filter(None, ["gain of the last step", gained, name, "(95 %)"]))

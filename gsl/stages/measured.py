@@ -7,13 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.statistics import Interval, difference_interval, mean_interval
+from gsl.core.statistics import difference_interval, mean_interval
 from gsl.report.markdown import in_unit
 from gsl.stages.headline import Unit
 from gsl.stages.population import Episode
 from gsl.storage.policies import PolicyRecord
-
-LITTLE = 0.1  # of a gain: what π0 is worth measures no gain of more than ten times as much
 
 
 def falls(done: Sequence[Episode]) -> int:
@@ -41,17 +39,17 @@ def row(theta: PolicyRecord, done: Sequence[Episode]) -> dict[str, Any]:
 
 
 def gain(after: Sequence[Episode], before: Sequence[Episode]) -> dict[str, Any]:
-    """Return mean(after) - mean(before), Welch's 95 % interval, and the share of the latter if that measures it."""
+    """Return mean(after) - mean(before) with Welch's 95 % interval, and its share of the latter if that is above 0.
+
+    Where the latter's own interval holds 0 there is no share: None.
+    """
     values = [np.array([episode.value for episode in done]) for done in (after, before)]
-    difference = Interval(0.0, 0.0, 0.0) if after is before else difference_interval(*values)
-    share = share_of(summary(before), difference.mean)
+    shared = mean_interval(values[1]).lower > 0.0
+    if after is before:
+        return {"value": 0.0, "interval": [0.0, 0.0], "share": 0.0 if shared else None}
+    difference = difference_interval(*values)
+    share = difference.mean / mean(before) if shared else None
     return {"value": difference.mean, "interval": [difference.lower, difference.upper], "share": share}
-
-
-def share_of(start: Mapping[str, Any], gained: float) -> float | None:
-    """Return a gain as a share of the value that a summary tells; None if that may be 0 or is next to nothing."""
-    measures = start["interval"][0] > 0.0 and start["value"] > LITTLE * gained
-    return gained / start["value"] if measures else None
 
 
 def columns(first: Mapping[str, Any], unit: Unit) -> list[str]:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from gsl.stages.headline import Unit
-from gsl.stages.measured import share_of
 
 
 class Cell(NamedTuple):
@@ -25,7 +24,7 @@ class Trial(NamedTuple):
         number: Trials of one number have the same seeds.
         start: Value of π0 in real, in the unit of the task.
         value: Of the policy that this iteration returned, on fresh real episodes, falls counting as in the task.
-        improvement: The one over the other [%]; None where π0's value may be 0 or is next to nothing.
+        improvement: The one over the other [%]; None where π0's own interval holds 0.
         surely: Lower end of the 95 % interval of what this iteration gained, in the unit of the task.
         returned: Name of the returned policy.
         generation: That found it, 0 for the policy that the iteration started from.
@@ -89,13 +88,12 @@ class Trial(NamedTuple):
             rank: See the class.
         """
         start, after = (first or measured)["baseline"], measured["returned"]
-        share = share_of(start, after["value"] - start["value"])
         return cls(
             *cell,
             number,
             start=start["value"],
             value=after["value"],
-            improvement=None if share is None else 100.0 * share,
+            improvement=100.0 * (after["value"] / start["value"] - 1.0) if start["interval"][0] > 0.0 else None,
             surely=measured["gain"]["interval"][0],
             returned=measured["best"],
             generation=measured["best_generation"],
