@@ -19,6 +19,9 @@ LINEAR = ("train-forward", "model=linear")
 GAT = ("optimize", *SMALL, "grounding=gat", "grounding.inverse_model=chain", "accept=true")
 
 
+ARM = "experiment=arm preset=toy grounding=gat"
+
+
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
@@ -51,6 +54,12 @@ GAT = ("optimize", *SMALL, "grounding=gat", "grounding.inverse_model=chain", "ac
         ("evaluate policies=nothing", "nothing: there is no such path and no such run in runs"),
         ("evaluate confirmation=1", "confirmation = 1: must be at least 2"),
         ("train-inverse data=nothing", "nothing: there is no such path and no such run in runs"),
+        (f"iterate {ARM} inverse_model.variables=all", "inverse_model.variables: has to name the joints that forward_"),
+        (f"iterate {ARM} grounding.x=[LKneePitch]", "grounding.x = LKneePitch: the models know no joint of this name"),
+        (
+            f"iterate {ARM} forward_model.variables=[LKnePitch]",
+            "forward_model.variables = LKnePitch: the robot has no ",
+        ),
         ("iterate world=nao_worn", "world: here a world has a role; say real=... or sim=..."),
     ],
 )

@@ -308,7 +308,7 @@ def test_too_few_trajectories_teach_no_grounding() -> None:
     for episodes in (made.episodes[:2], (*made.episodes[:2], *short)):
         found = records(replace(made, episodes=episodes, metadata={}), arm())
         with pytest.raises(
-            ConfigError, match="fewer than 3 trajectories of 14 control periods to learn from; gat=null"
+            ConfigError, match="fewer than 3 trajectories of 29 control periods to learn from; gat=null"
         ):
             learning().errors(bare(), found, found, 1)
 
@@ -335,6 +335,7 @@ def test_replays_beside_others_have_no_noise_and_say_when_they_diverge() -> None
     ("model", "line"),
     [
         ({"sensors": ("gyro",)}, "gat.model.sensors: logs in the air have joints alone"),
+        ({"rested": True}, "gat.model.rested: logs are learned from in cuts, which do not begin at rest"),
         ({"variables": ("a",)}, "gat.model.variables: whole replays are of all joints"),
         ({"members": 3}, "gat.model: replays are of one model that says a point"),
         ({"history": "auto"}, "gat.model: a correction has a history of one length, and plain angles"),

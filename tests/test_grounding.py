@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -159,7 +160,8 @@ def test_models_of_another_robot_are_refused() -> None:
 
 
 def test_joints_that_the_models_do_not_know_get_the_agents_actions() -> None:
-    whole = LoadedTransformation(ForwardModel(servo(0.3), HISTORY, LAYOUT.joints), inverse_servo(0.8))
+    f = ForwardModel(servo(0.3), HISTORY, LAYOUT.joints)
+    whole = LoadedTransformation(f, inverse_servo(0.8))
     wide = Layout(("z", "c", "a", "y", "b"), {"position": 5, "velocity": 5}, 0.02)
     order, rng = [2, 4, 1], np.random.default_rng(3)
     run, among = (whole.start(layout, np.random.default_rng(0)) for layout in (LAYOUT, wide))
@@ -168,6 +170,8 @@ def test_joints_that_the_models_do_not_know_get_the_agents_actions() -> None:
         expected = action.copy()
         expected[order] = run.transform(np.r_[x[order], np.zeros(N)], action[order])
         np.testing.assert_array_equal(among.transform(np.r_[x, np.zeros(5)], action), expected)
+    shaken = replace(whole, noise=0.01).start(wide, np.random.default_rng(0))
+    assert (shaken.transform(np.r_[x, np.zeros(5)], action) != action).all()  # noise on top is of the whole robot
 
 
 def test_models_of_different_robots_do_not_go_together() -> None:

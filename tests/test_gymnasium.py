@@ -585,8 +585,7 @@ def test_what_does_not_go_together_is_refused(arguments: str, line: str, tmp_pat
 @pytest.mark.parametrize(
     ("changes", "line"),
     [
-        ({"variables": ()}, "model.variables: names at least one"),
-        ({"variables": (1, 1)}, "model.variables: names at least one entry of the state, each once"),
+        ({"rested": True}, "model.rested: is of a robot"),
         ({"variables": (0, 2)}, "model.variables = 2: the state has entries 0 to 1"),
         ({"horizon": 2}, "model.horizon: is for robots"),
         ({"members": 3}, "model.members: is for robots"),

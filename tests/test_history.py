@@ -68,8 +68,8 @@ def test_an_episode_that_begins_at_rest_has_windows_of_its_first_ticks() -> None
 def test_before_the_first_tick_the_robot_stood_still() -> None:
     window = Window(History(2), 2)
     window.see(np.array([0.1, 0.2]), ())  # what it is told first is farther away than a robot that rests can be
-    first = window.complete(np.array([0.3, 0.5])).reshape(-1, 2)
-    np.testing.assert_allclose(first, [[0.2, 0.3], [0.1, 0.2], [0, 0], [0, 0], [0.15, 0.15], [0.15, 0.15]])
+    first = window.complete(np.array([0.14, 0.5])).reshape(-1, 2)
+    np.testing.assert_allclose(first, [[0.04, 0.3], [0.1, 0.2], [0, 0], [0, 0], [0.04, 0.0], [0.04, 0.0]])
 
 
 def test_a_window_does_not_move_with_the_robot_but_for_the_positions_themselves() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsl.core.history import History
+from gsl.core.history import History, asked_at_rest
 from gsl.core.region import INSIDE, region
 from gsl.core.transitions import transitions
 from gsl.grounding.gat import LoadedTransformation
@@ -67,6 +67,16 @@ def test_joints_that_the_models_do_not_know_are_not_asked_about() -> None:
     found = reachability(bare, LoadedTransformation(f, Solver(f, np.eye(2), 0.1)), starts, 1)
     bare.close()
     assert found.joints == knees and found.unreached[0] == 1.0 > found.unreached[1]
+
+
+def test_what_a_robot_was_told_at_rest_is_known_before_a_large_step_and_before_a_small_one() -> None:
+    env = BulletWorld(robot="nao", effects={"servo_gain": {"kp": 0.5}}, floating=False, settle=0.5).make()
+    posture = POLICY.posture(POLICY.initial, SIM.layout)
+    seen, _ = env.reset(seed=1, options={"posture": posture})
+    env.close()
+    position = seen[SIM.layout["position"]]
+    for step, off in ((1.0, 0.02), (0.1, 0.02), (0.01, 0.011)):
+        assert np.abs(asked_at_rest(posture - step, position) - posture).max() < off
 
 
 def test_a_region_holds_its_own_kind_and_little_else() -> None:

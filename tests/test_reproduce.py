@@ -116,6 +116,11 @@ def test_a_file_that_holds_no_trials_is_refused(tmp_path: Path) -> None:
     assert said.code == 2 and "figures.json: row 1 is no trial of such a study: " in said.lines[-1]
 
 
+def test_a_trace_is_of_a_joint_that_the_models_know(tmp_path: Path) -> None:
+    said = gsl("reproduce", "fig6", "preset=toy", "joint=RKneePitch", folder=tmp_path)
+    assert said.code == 2 and "joint = RKneePitch: the models know no joint of this name" in said.lines[-1]
+
+
 class Silent:
     def status(self, text: str) -> None: ...
 

@@ -11,7 +11,7 @@ import numpy as np
 BODY_SENSORS = {"gyro": 3, "tilt": 2, "foot_force": 2}
 """Number of entries of each body sensor a window may hold."""
 
-RESTING = 0.15  # [rad]; a joint that rests is no farther than this from its target, however soft the servo
+RESTING = 0.05  # [rad]; what a robot is told first is taken for what held it at rest up to this distance from there
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ def windows(
 
 
 def asked_at_rest(action: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Return what a robot that rests was told before its first action [rad]: this, as far as `RESTING` allows."""
-    return np.clip(action, position - RESTING, position + RESTING)
+    """Return what held a robot at rest before its first action [rad]: this, or where it is if that is farther away."""
+    return np.where(np.abs(action - position) <= RESTING, action, position)
 
 
 def with_rest(
@@ -99,7 +99,7 @@ def tilt(x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any]:
 class Window:
     """The window of an episode as it goes on: `see` what is measured, `complete` it with an action, `remember` one.
 
-    Before the first tick the robot is taken to have rested.
+    Before the first tick the robot is taken to have rested; in the middle of a motion the first `span` windows guess.
     """
 
     def __init__(self, history: History, n_joints: int) -> None:

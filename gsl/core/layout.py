@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from gsl.errors import ConfigError
@@ -39,6 +39,10 @@ class Layout:
                 return slice(start, start + size)
             start += size
         raise KeyError(part)
+
+    def numbers(self, joints: Sequence[str]) -> list[int]:
+        """Return which of the joints some of them are."""
+        return [self.joints.index(joint) for joint in joints]
 
     @property
     def states(self) -> int:

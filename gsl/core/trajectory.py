@@ -39,7 +39,7 @@ class Trajectory:
         """Number of control steps T."""
         return len(self.action)
 
-    def of_columns(self, columns: Sequence[int]) -> Trajectory:
+    def only(self, columns: Sequence[int]) -> Trajectory:
         """Return the same of some joints alone, by number."""
         sent = self.grounded_action
         return replace(
@@ -83,12 +83,12 @@ class Batch:
         first = self.episodes[0].state
         return 0 if first is None else int(first.shape[1])
 
-    def of_joints(self, joints: Sequence[str]) -> Batch:
+    def only(self, joints: Sequence[str]) -> Batch:
         """Return the same of some joints alone."""
         if tuple(joints) == self.joints:
             return self
         columns = [self.joints.index(joint) for joint in joints]
-        return replace(self, episodes=tuple(one.of_columns(columns) for one in self.episodes), joints=tuple(joints))
+        return replace(self, episodes=tuple(one.only(columns) for one in self.episodes), joints=tuple(joints))
 
     def __len__(self) -> int:
         """Number of episodes."""

@@ -170,7 +170,7 @@ class TransformationRun:
         self._senses = Senses(layout, grounding.forward.history.sensors)
         joints = grounding.forward.joints
         n, x = len(joints), joints if grounding.x is None else grounding.x
-        self._known = slice(None) if joints == layout.joints else [layout.joints.index(joint) for joint in joints]
+        self._known = slice(None) if joints == layout.joints else layout.numbers(joints)
         self._alpha = grounding.alpha * np.array([joint in x for joint in joints])
         self._real, self._sim = Window(grounding.forward.history, n), Window(grounding.inverse.history, n)
 
@@ -184,15 +184,16 @@ class TransformationRun:
         sim.see(position, ())
         inverse = grounding.inverse.action(sim.complete(action), action, wanted)
         sent = grounded(action, inverse, self._alpha * trust)
-        if grounding.noise:
-            sent = sent + grounding.noise * self._rng.standard_normal(len(sent))
+        noise = grounding.noise * self._rng.standard_normal(len(every)) if grounding.noise else None
+        if noise is not None:
+            sent = sent + noise[self._known]
         # np.clip takes four times as long
         sent = np.asarray(np.minimum(np.maximum(sent, action - REACH), action + REACH))
         real.remember(action)
         sim.remember(sent)
         if self._known == slice(None):
             return sent
-        every = every.copy()
+        every = every.copy() if noise is None else every + noise
         every[self._known] = sent
         return every
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
+from pydantic import StrictInt, StrictStr
+
 from gsl.core.angles import Encoding
 from gsl.core.history import History
 from gsl.core.setting import component, setting
@@ -37,7 +39,7 @@ class ModelConfig:
     encoding: Annotated[Encoding, setting("angles as they are, or as sine and cosine")] = "plain"
     ridge: Annotated[float, setting("penalty on the weights of the linear model, scaled inputs", ge=1e-9)] = 1e-2
     variables: Annotated[
-        tuple[int | str, ...] | Literal["all"],
+        tuple[StrictInt | StrictStr, ...] | Literal["all"],
         setting("state variables of interest: a robot's joints by name, a gymnasium environment's state by index"),
     ] = "all"
     rested: Annotated[bool, setting("a robot's episodes begin at rest: their first ticks are learned from too")] = False
@@ -73,6 +75,8 @@ class ModelConfig:
         """Refuse what no family can be."""
         if self.likelihood == "mixture" and self.family == "linear":
             raise ConfigError("family", "a linear model has no mixture; take mlp or auto", given=self.family)
+        if not self.variables or (self.variables != "all" and len(set(self.variables)) < len(self.variables)):
+            raise ConfigError("variables", "names at least one joint or entry of the state, each once")
 
     def of_interest(self, states: int, where: str) -> tuple[int, ...]:
         """Return the state variables of interest, by index.
@@ -82,12 +86,12 @@ class ModelConfig:
             where: Name of the setting that this configuration is.
 
         Raises:
-            ConfigError: They are none, or not among so many states.
+            ConfigError: They are not among so many states, or what is of a robot alone is asked for.
         """
+        if self.rested:
+            raise ConfigError(f"{where}.rested", "is of a robot; an environment's models look no ticks back")
         if self.variables == "all":
             return tuple(range(states))
-        if not self.variables or len(set(self.variables)) < len(self.variables):
-            raise ConfigError(f"{where}.variables", "names at least one entry of the state, each once")
         for variable in self.variables:
             if not (isinstance(variable, int) and 0 <= variable < states):
                 raise ConfigError(f"{where}.variables", f"the state has entries 0 to {states - 1}", given=str(variable))
@@ -101,12 +105,10 @@ class ModelConfig:
             where: Name of the setting that this configuration is.
 
         Raises:
-            ConfigError: They are none, or not among the robot's.
+            ConfigError: They are not among the robot's.
         """
         if self.variables == "all":
             return tuple(joints)
-        if not self.variables:
-            raise ConfigError(f"{where}.variables", "names at least one joint")
         for name in self.variables:
             if name not in joints:
                 hint = did_you_mean(str(name), joints)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 from gsl.core.setting import component, setting
+from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, having_effects, innermost, switched_on
 from gsl.grounding.gat import ActionTransformation
@@ -112,12 +113,27 @@ class Chain:
         inner = innermost(grounding)
         if not isinstance(inner, ActionTransformation):
             return
+        self._check_joints(inner)
         if inner.residual and self.sim.layout.states:
             raise ConfigError("grounding.residual", "is for robots; f of an environment's states corrects nothing")
         for role, count in {REAL: sum(self.budget.real), SIM: sum(self.budget.sim)}.items():
             if count < FEWEST:
                 problem = f"{several(count, 'episode')} with neighbours; {FEWEST} are the least for a model: {WHY}"
                 raise ConfigError(f"budget.{role}_episodes", problem)
+
+    def _check_joints(self, grounding: ActionTransformation) -> None:
+        """Refuse models that know different joints, and to ground one that they do not know."""
+        layout = self.sim.layout
+        if layout.states:
+            return
+        known = self.forward_model.joints_of_interest(layout.joints, "forward_model")
+        if known != self.inverse_model.joints_of_interest(layout.joints, "inverse_model"):
+            raise ConfigError("inverse_model.variables", "has to name the joints that forward_model.variables names")
+        if isinstance(grounding.x, tuple):
+            for name in grounding.x:
+                if name not in known:
+                    hint = did_you_mean(name, known)
+                    raise ConfigError("grounding.x", f"the models know no joint of this name{hint}", given=name)
 
     def round(
         self,

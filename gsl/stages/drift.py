@@ -48,10 +48,9 @@ def drifts(scenario: Scenario, known: Region, found: Mapping[str, np.ndarray], s
     """
     grounding = scenario.grounding
     assert isinstance(grounding, LoadedTransformation), "only learned groundings have data"
-    env, shares, joints = scenario.make(), {}, scenario.world.layout.joints
-    columns = [joints.index(joint) for joint in grounding.forward.joints]
+    env, shares, columns = scenario.make(), {}, scenario.world.layout.numbers(grounding.forward.joints)
     for index, (name, parameters) in enumerate(found.items()):
-        walked = rollout(scenario, env, parameters, derived_seed(seed, index)).of_columns(columns)
+        walked = rollout(scenario, env, parameters, derived_seed(seed, index)).only(columns)
         shares[name] = outside(grounding, known, [walked])
     env.close()
     return shares

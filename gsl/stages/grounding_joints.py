@@ -22,7 +22,7 @@ def fewest(env: Any, grounding: LoadedTransformation, starts: Sequence[Place], s
 
     Args:
         env: The simulator.
-        grounding: Of all joints.
+        grounding: Of all joints that its models know.
         starts: On trajectories that neither fitted the models nor judge the grounding.
         seed: Of all randomness.
 
@@ -33,8 +33,7 @@ def fewest(env: Any, grounding: LoadedTransformation, starts: Sequence[Place], s
         raise InputError("no validation trajectory is long enough to choose joints on; say grounding.x=all")
     joints = grounding.forward.joints
     bare = _squares(env, NoGrounding(), starts, seed)
-    known = [env.layout.joints.index(joint) for joint in joints]
-    gained = (bare - _squares(env, grounding, starts, seed)).mean(axis=0)[known]
+    gained = (bare - _squares(env, grounding, starts, seed)).mean(axis=0)[env.layout.numbers(joints)]
     order = [joints[k] for k in np.argsort(-gained)]
     sets = [tuple(order[:k]) for k in range(len(order) + 1)]
     errors = [bare.sum(axis=1)]

@@ -13,6 +13,8 @@ from gsl.storage.artifact import Artifact
 
 Metrics = Mapping[str, Any]
 
+MANY = 10.0  # times π0: a share of what is next to nothing, which tells people nothing
+
 
 class Unit(NamedTuple):
     """How people are shown the values of a task: `factor` times the value, in `name`, with falls if it knows them."""
@@ -150,7 +152,7 @@ def _optimize(metrics: Metrics, unit: Unit) -> str:
 def _evaluate(metrics: Metrics, unit: Unit) -> str:
     after, gain = metrics["returned"], metrics["gain"]
     told = f"{metrics['best']} {unit.shown(after['value'])}, {unit.ended(after)}"
-    return told if not gain["share"] else f"{told}; {100 * gain['share']:+.1f} % over the start"
+    return told if not gain["share"] or gain["share"] > MANY else f"{told}; {100 * gain['share']:+.1f} % over the start"
 
 
 def _iterate(metrics: Metrics, unit: Unit) -> str:

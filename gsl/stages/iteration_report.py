@@ -19,7 +19,7 @@ from gsl.report.markdown import table
 from gsl.stages.diagnosis_plan import Flight
 from gsl.stages.evaluate import TABLE
 from gsl.stages.grounding_replay import PAST, Place, replay
-from gsl.stages.headline import Unit
+from gsl.stages.headline import MANY, Unit
 from gsl.stages.measured import ended, ends
 from gsl.storage.artifact import Artifact
 from gsl.tasks.task import Task
@@ -156,7 +156,8 @@ class Rounds:
         simulated, gain = metrics["returned_value_sim"], metrics["gain"]
         expected = "" if simulated is None else self._unit.bare(simulated)
         absolute = self._unit.shown(gain["value"], sign=True)
-        gained = absolute if gain["share"] is None else f"{100 * gain['share']:+.1f} %"
+        share = gain["share"]
+        gained = absolute if share is None or share > MANY else f"{100 * share:+.1f} %"
         zero: tuple[str, ...] = ("0", "π0", "", *self._measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
         name = BEGUN.get(metrics["best"], metrics["best"])

@@ -21,7 +21,7 @@ from gsl.diagnosis.whole import driven, mean_errors
 from gsl.effects.effect import applied, built
 from gsl.errors import ConfigError, GslError
 from gsl.grounding.gat import LoadedTransformation
-from gsl.models.config import ModelConfig
+from gsl.models.config import FARTHEST, ModelConfig
 from gsl.models.ensemble import Forward
 from gsl.models.forward import ForwardModel
 from gsl.models.free_run import shortest
@@ -60,6 +60,8 @@ class LearnedReplay:
             raise ConfigError("gat.model.sensors", "logs in the air have joints alone; leave the sensors out")
         if self.model.variables != "all":
             raise ConfigError("gat.model.variables", "whole replays are of all joints; leave the variables out")
+        if self.model.rested:
+            raise ConfigError("gat.model.rested", "logs are learned from in cuts, which do not begin at rest")
         if self.model.head.draws or self.model.members > 1:
             raise ConfigError(
                 "gat.model", "replays are of one model that says a point; leave likelihood and members out"
@@ -70,7 +72,8 @@ class LearnedReplay:
     @property
     def needed(self) -> int:
         """Control periods a trajectory has to have to be learned from."""
-        return shortest(self.model.of_joints, self.model.horizon)
+        farthest = looking_ahead(self.model, FARTHEST)  # nobody knows yet what is diagnosed
+        return shortest(farthest.of_joints, farthest.horizon)
 
     def check(self, lengths: Sequence[int], told: str) -> None:
         """Refuse to learn from too little.
@@ -98,16 +101,14 @@ class LearnedReplay:
         Raises:
             ConfigError: There are too few trajectories to learn from.
         """
-        ahead = looking_ahead(self.model, world.extra_ticks)
-        if ahead != self.model:
-            return replace(self, model=ahead).errors(world, known, held, seed)
+        learner = replace(self, model=looking_ahead(self.model, world.extra_ticks))
         known = [one for one in map(driven, known) if len(one) >= self.needed]
         self.check([len(one) for one in known], "the rest")
         every = [*known, *held]
         kinds = same([one.conditions for one in every])
         kind = {k: number for number, index in enumerate(kinds) for k in index}
-        solvers = [self._solver(world, known, every[index[0]].conditions, seed) for index in kinds]
-        forwards = self._forwards(world, known, [kind[k] for k in range(len(known))], solvers, seed)
+        solvers = [learner._solver(world, known, every[index[0]].conditions, seed) for index in kinds]
+        forwards = learner._forwards(world, known, [kind[k] for k in range(len(known))], solvers, seed)
         return [
             world.replayed(one, LoadedTransformation(forwards[kind[k]], solvers[kind[k]]), seed)
             for k, one in enumerate(held, start=len(known))

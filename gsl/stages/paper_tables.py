@@ -156,7 +156,7 @@ class Figure5:
             )
             rows.append((one.world, one.method, *cells))
         titles = (
-            *("real world", "grounding", "mean distance [°]", "95 % interval", f"than {first} (95 %, paired)"),
+            *("real world", "grounding", "mean distance [°]", "95 % interval", f"minus {first} [°] (95 %)"),
             *("final distance [°]", "95 % interval", "trials above the goal"),
             *("chosen in real: mean distance [°]", "95 % interval", "real episodes"),
         )

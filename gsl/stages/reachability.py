@@ -67,7 +67,7 @@ def reachability(env: Any, grounding: LoadedTransformation, starts: Sequence[Pla
         seed: Of all randomness.
     """
     x, joints = env.layout["position"], grounding.forward.joints
-    known = [env.layout.joints.index(joint) for joint in joints]
+    known = env.layout.numbers(joints)
     changes = np.array([place.seen[place.tick + 1][x] - place.seen[place.tick][x] for place in starts])
     wanted = changes.copy()  # of joints that the models do not know nothing else is expected
     wanted[:, known] = [_expected(grounding, place, known, env.layout) for place in starts]

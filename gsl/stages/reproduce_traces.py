@@ -14,6 +14,7 @@ from gsl.core.history import windows
 from gsl.core.observation import observations, sensed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
+from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.grounding import Grounding
@@ -55,6 +56,7 @@ class Figure6:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Train the grounding, play the command in the three worlds, draw."""
+        _check_joint(self.iterate, self.joint)
         iterate, loaded = self.iterate, trained(self.iterate, folder.parent, console)
         layout = iterate.sim.layout
         index, period = layout.joints.index(self.joint), layout.control_period
@@ -92,6 +94,7 @@ class Figure7:
         iterate = self.iterate
         if extra_ticks(iterate.sim):
             raise ConfigError("iterate.sim", "acts late: f looks several ticks ahead there and draws no trace")
+        _check_joint(iterate, self.joint)
         loaded = trained(iterate, folder.parent, console)
         walk = _walked(iterate)
         layout = iterate.sim.layout
@@ -105,13 +108,16 @@ class Figure7:
             for way in (NoGrounding(), loaded)
         )
         env.close()
-        predicted = _predicted(loaded.forward, walk, tick, ticks)[:, index]
+        known = loaded.forward.joints
+        foreseen = _predicted(loaded.forward, walk.only(layout.numbers(known)), tick, ticks)
+        predicted = foreseen[:, known.index(self.joint)]
         shown = slice(tick + 1, tick + 1 + ticks)
         plain = Traces(walk.time[shown], walk.action[tick : tick + ticks, index], walk.position[shown, index], bare)
         far = [f"{degrees(trace - plain.real):.1f}°" for trace in (predicted, bare)]
         title = f"{self.joint}: as f predicts it {far[0]} from the real robot, in simulation {far[1]} (RMS)"
-        foreseen = plain._replace(grounded=predicted, name="forward model")
-        joint_trace(folder / "figure_7a.png", foreseen, self.joint, title=title)
+        joint_trace(
+            folder / "figure_7a.png", plain._replace(grounded=predicted, name="forward model"), self.joint, title=title
+        )
         joint_trace(folder / "figure_7b.png", plain._replace(grounded=grounded), self.joint)
         found = {"ungrounded": bare, "forward model": predicted, "grounded": grounded}
         return _told(folder, self.joint, plain.real, found)
@@ -125,6 +131,12 @@ def trained(iterate: Iterate, home: Path, console: Any) -> LoadedTransformation:
     loaded = ready.load(read_forward_model, read_inverse_model)
     assert isinstance(loaded, LoadedTransformation), "the world is a robot"
     return loaded
+
+
+def _check_joint(iterate: Iterate, joint: str) -> None:
+    known = iterate.forward_model.joints_of_interest(iterate.sim.layout.joints, "iterate.forward_model")
+    if joint not in known:
+        raise ConfigError("joint", f"the models know no joint of this name{did_you_mean(joint, known)}", given=joint)
 
 
 def _played(

@@ -97,7 +97,7 @@ class TrainForward:
             raise ConfigError("model.covariance", "full is for a gymnasium environment; robots' joints are drawn alone")
         for file, batches in {path: newest, **{one: [batch] for one, batch in earlier.items()}}.items():
             self._check(file, batches)
-        known = data.of_joints(self.model.joints_of_interest(data.training.joints, "model"))
+        known = data.only(self.model.joints_of_interest(data.training.joints, "model"))
         base = None if self.residual_to is None else self._simulator(self.residual_to, known.training)
         model, choice = fitted(self.model, known, self.seed, base)
         write_model(folder, model)
@@ -118,7 +118,8 @@ class TrainForward:
             raise ConfigError("residual_to", "holds no model of the simulator; train it with method=solve")
         base = inverse.simulator
         if base.joints != batch.joints:
-            raise ConfigError("residual_to", "is of other joints than the trajectories")
+            problem = "its model of the simulator knows other joints"
+            raise ConfigError("residual_to", f"{problem}; train both on the same trajectories and model.variables")
         if self.model.encoding != "plain":
             raise ConfigError("model.encoding", "angles that are corrected are plain", given=self.model.encoding)
         if (self.model.history, self.model.horizon) != (base.history.ticks, base.horizon):

@@ -62,7 +62,7 @@ class TrainInverse:
         console.status(f"fitting an inverse model to {len(data.training)} trajectories")
         if data.training.states:
             return inverse_of_states(folder, data, self.model, self.seed)
-        data = data.of_joints(self.model.joints_of_interest(data.training.joints, "model"))
+        data = data.only(self.model.joints_of_interest(data.training.joints, "model"))
         for part in data:
             checked(path, part.episodes, shortest(self.model.of_joints, self.model.horizon))
         model, choice = fitted(self.model, data, self.seed, self.method, self.damping)

@@ -33,9 +33,9 @@ class Parts(NamedTuple):
     validation: Batch
     heldout: Batch
 
-    def of_joints(self, joints: Sequence[str]) -> Parts:
+    def only(self, joints: Sequence[str]) -> Parts:
         """Return the same of some joints alone."""
-        return Parts(*(part.of_joints(joints) for part in self))
+        return Parts(*(part.only(joints) for part in self))
 
 
 def data_file(reference: str) -> Path:
