@@ -56,7 +56,7 @@ OFFERED = {
     "table3": ("gat", "effects"),
     "table4": ("none", "ane_02", "gat", "sgat", "sgat_005"),
     "linear-walk": ("none", "ane_02", "gat", "gat_residual"),
-    "fig5": ("none", "ane_02", "gat", "gat_005"),
+    "fig5": ("none", "ane_02", "gat", "gat_005", "sgat"),
     "worlds": ("none", "ane_02", "gat", "effects"),
 }
 FEW = ("preset=toy", "study.iterate.workers=1", "study.iterate.optimizer.candidates=4")
@@ -92,7 +92,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
 
 
 def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) -> None:
-    left_out = ("~study.methods.ane_02", "~study.methods.gat_005")
+    left_out = ("~study.methods.ane_02", "~study.methods.gat_005", "~study.methods.sgat")
     few = (*FEW, *left_out, "study.iterate.task.duration=1.2", "study.iterate.optimizer.generations=1")
     done("reproduce", "fig5", *few, folder=tmp_path)
     first = tmp_path / "runs/fig5/trials.json"
