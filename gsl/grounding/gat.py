@@ -170,7 +170,8 @@ class TransformationRun:
         self._senses = Senses(layout, grounding.forward.history.sensors)
         joints = grounding.forward.joints
         n, x = len(joints), joints if grounding.x is None else grounding.x
-        self._known = slice(None) if joints == layout.joints else layout.numbers(joints)
+        self._whole = joints == layout.joints
+        self._known = slice(None) if self._whole else layout.numbers(joints)
         self._alpha = grounding.alpha * np.array([joint in x for joint in joints])
         self._real, self._sim = Window(grounding.forward.history, n), Window(grounding.inverse.history, n)
 
@@ -191,7 +192,7 @@ class TransformationRun:
         sent = np.asarray(np.minimum(np.maximum(sent, action - REACH), action + REACH))
         real.remember(action)
         sim.remember(sent)
-        if self._known == slice(None):
+        if self._whole:
             return sent
         every = every.copy() if noise is None else every + noise
         every[self._known] = sent
