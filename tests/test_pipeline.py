@@ -160,3 +160,15 @@ def test_an_unchanged_iteration_shows_its_table_again(whole: tuple[Path, Said]) 
     again = done("iterate", *SMALL, "name=whole", "accept=true", "beside=true", folder=folder)
     start = said.out.index("grounded simulation learning [cm/s]")
     assert again.out == said.out[start:].replace("runs/whole/iterate\n", "runs/whole/iterate (unchanged)\n")
+
+
+@pytest.mark.parametrize("grounding", ["gat_residual", "gat_gated"])
+def test_models_of_two_joints_ground_no_others(grounding: str, tmp_path: Path) -> None:
+    line = ("experiment=arm", "preset=toy", f"grounding={grounding}", "grounding.x=auto", "accept=true", "workers=1")
+    done("iterate", *line, "forward_model.epochs=5", "task.duration=1.2", folder=tmp_path)
+    found = next(tmp_path.rglob("optimize/metrics.json"))
+    assert set(json.loads(found.read_text())["x"]) <= {"LShoulderPitch", "RShoulderPitch"}
+    assert json.loads((found.parent / "grounding.json").read_text())["reachability"]["by_joint"].keys() == {
+        "LShoulderPitch",
+        "RShoulderPitch",
+    }
