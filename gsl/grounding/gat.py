@@ -8,7 +8,7 @@ Hanna, Desai, Karnan, Warnell, Stone: Grounded action transformation for sim-to-
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -30,6 +30,13 @@ from gsl.models.inverse import InverseModel, Solver
 from gsl.models.states import StateForward
 
 REACH = 0.5  # [rad]; a servo told to go farther than this from the agent's target is at its torque limit anyway
+
+
+def check_known(joints: Sequence[str], known: Sequence[str], where: str) -> None:
+    """Refuse joints that models do not know; `where` is the setting that names them."""
+    for joint in joints:
+        if joint not in known:
+            raise ConfigError(where, f"the models know no joint of this name{did_you_mean(joint, known)}", given=joint)
 
 
 @component
@@ -108,9 +115,7 @@ class ActionTransformation:
             )
             raise ConfigError("inverse_model", problem)
         x = f.joints if isinstance(self.x, str) else self.x
-        if unknown := [joint for joint in x if joint not in f.joints]:
-            problem = f"the models have no joint of this name{did_you_mean(unknown[0], f.joints)}"
-            raise ConfigError("x", problem, given=unknown[0])
+        check_known(x, f.joints, "x")
         return LoadedTransformation(f, f_inv, alpha, self.noise, x, self.predicts != "point", self.gate)
 
     def start(self, layout: Layout, rng: np.random.Generator) -> TransformationRun:

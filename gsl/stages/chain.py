@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 from gsl.core.setting import component, setting
-from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, having_effects, innermost, switched_on
-from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.gat import ActionTransformation, check_known
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import RandomisedEffects
@@ -130,10 +129,7 @@ class Chain:
         if known != self.inverse_model.joints_of_interest(layout.joints, "inverse_model"):
             raise ConfigError("inverse_model.variables", "has to name the joints that forward_model.variables names")
         if isinstance(grounding.x, tuple):
-            for name in grounding.x:
-                if name not in known:
-                    hint = did_you_mean(name, known)
-                    raise ConfigError("grounding.x", f"the models know no joint of this name{hint}", given=name)
+            check_known(grounding.x, known, "grounding.x")
 
     def round(
         self,

@@ -79,6 +79,11 @@ def headline(artifact: Artifact) -> str:
         return ""
 
 
+def gained(share: float | None) -> str:
+    """Return a gain as a share of π0's value [%], nothing where that may be nothing or is next to it."""
+    return "" if share is None or share > MANY else f"{100 * share:+.1f} %"
+
+
 def several(count: int, what: str) -> str:
     """Return a count of things."""
     return f"{count} {what}{'s' * (count != 1)}"
@@ -152,7 +157,8 @@ def _optimize(metrics: Metrics, unit: Unit) -> str:
 def _evaluate(metrics: Metrics, unit: Unit) -> str:
     after, gain = metrics["returned"], metrics["gain"]
     told = f"{metrics['best']} {unit.shown(after['value'])}, {unit.ended(after)}"
-    return told if not gain["share"] or gain["share"] > MANY else f"{told}; {100 * gain['share']:+.1f} % over the start"
+    share = gained(gain["share"]) if gain["share"] else ""
+    return f"{told}; {share} over the start" if share else told
 
 
 def _iterate(metrics: Metrics, unit: Unit) -> str:

@@ -19,7 +19,7 @@ from gsl.report.markdown import table
 from gsl.stages.diagnosis_plan import Flight
 from gsl.stages.evaluate import TABLE
 from gsl.stages.grounding_replay import PAST, Place, replay
-from gsl.stages.headline import MANY, Unit
+from gsl.stages.headline import Unit, gained
 from gsl.stages.measured import ended, ends
 from gsl.storage.artifact import Artifact
 from gsl.tasks.task import Task
@@ -91,11 +91,11 @@ class Rounds:
             return f"No improvement over π0 was found: π0 is returned. {cost}"
         after, before = self.best.metrics["returned"], self._done[0].metrics["baseline"]
         unit = self._unit
-        gained, name = unit.interval(self.best.metrics["gain"]["interval"], sign=True), unit.name
+        bounds, name = unit.interval(self.best.metrics["gain"]["interval"], sign=True), unit.name
         if before["interval"][0] > 0.0:
             low, high = (100.0 * bound / before["value"] for bound in self.best.metrics["gain"]["interval"])
-            gained, name = f"{low:+.0f} to {high:+.0f}", "% of π0"
-        last = " ".join(filter(None, ["gain of the last step", gained, name, "(95 %)"]))
+            bounds, name = f"{low:+.0f} to {high:+.0f}", "% of π0"
+        last = " ".join(filter(None, ["gain of the last step", bounds, name, "(95 %)"]))
         of = f" by iteration {1 + self._done.index(self.best)}" if len(self._done) > 1 else ""
         fell = f"{after['falls']} falls in " if unit.falls else ""
         end = f"{fell}{after['episodes']} fresh episodes. {self._ended}{cost}"
@@ -155,13 +155,11 @@ class Rounds:
     def _added(self, label: str, metrics: Mapping[str, Any], cost: str, *, first: bool) -> list[tuple[str, ...]]:
         simulated, gain = metrics["returned_value_sim"], metrics["gain"]
         expected = "" if simulated is None else self._unit.bare(simulated)
-        absolute = self._unit.shown(gain["value"], sign=True)
-        share = gain["share"]
-        gained = absolute if share is None or share > MANY else f"{100 * share:+.1f} %"
+        told = gained(gain["share"]) or self._unit.shown(gain["value"], sign=True)
         zero: tuple[str, ...] = ("0", "π0", "", *self._measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
         name = BEGUN.get(metrics["best"], metrics["best"])
-        rows.append((label, name, expected, *self._measured(metrics["returned"]), gained, cost))
+        rows.append((label, name, expected, *self._measured(metrics["returned"]), told, cost))
         self.rows += rows
         return rows
 

@@ -14,9 +14,8 @@ from gsl.core.history import windows
 from gsl.core.observation import observations, sensed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
-from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
-from gsl.grounding.gat import ActionTransformation, LoadedTransformation
+from gsl.grounding.gat import ActionTransformation, LoadedTransformation, check_known
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.models.ensemble import Forward
@@ -135,8 +134,7 @@ def trained(iterate: Iterate, home: Path, console: Any) -> LoadedTransformation:
 
 def _check_joint(iterate: Iterate, joint: str) -> None:
     known = iterate.forward_model.joints_of_interest(iterate.sim.layout.joints, "iterate.forward_model")
-    if joint not in known:
-        raise ConfigError("joint", f"the models know no joint of this name{did_you_mean(joint, known)}", given=joint)
+    check_known([joint], known, "joint")
 
 
 def _played(

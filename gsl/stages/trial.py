@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from gsl.stages.headline import MANY, Unit
+from gsl.stages.headline import Unit, gained
 
 
 class Cell(NamedTuple):
@@ -117,10 +117,9 @@ class Trial(NamedTuple):
 
     def told(self, unit: Unit) -> str:
         """Return the trial in a few words."""
-        told = self.improvement is not None and self.improvement <= 100.0 * MANY
-        gained = f" ({self.improvement:+.1f} %)" if told else ""
+        more = gained(None if self.improvement is None else self.improvement / 100.0)
         winners = f", {self.stable} of {self.winners} winners stable" if unit.falls else ""
-        return f"{self.returned}, {unit.shown(self.value)}{gained}{winners}"
+        return f"{self.returned}, {unit.shown(self.value)}{f' ({more})' if more else ''}{winners}"
 
     @property
     def without(self) -> bool:
