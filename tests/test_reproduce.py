@@ -256,6 +256,14 @@ def test_table_3_counts_where_chains_stop() -> None:
     assert "| 30.0 |" in rows[1] and "| 26.0 |" in rows[2] and "| 2 of 2 | 30.0 |" in rows[2]
 
 
+@pytest.mark.parametrize("table", [Table2(), Table3(), Table4(), LinearWalkTable(), Figure5()])
+def test_one_trial_tells_no_interval(table: Any) -> None:
+    text = table.markdown(
+        [a_trial(method, 1, outcome={"mean distance [deg]": 7.0}) for method in ("none", "gat")], Walk()
+    )
+    assert "| - |" in text and "inf" not in text and "nan to" not in text
+
+
 def test_table_4_counts_falls_over_episodes() -> None:
     known = [a_trial(method, k, value=0.2) for method in ("none", "gat") for k in (1, 2)]
     trials = [*known, *(a_trial("sgat", k, falls=k, outcome={"speed [cm/s]": 20.0 + k}) for k in (1, 2))]

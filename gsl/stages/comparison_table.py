@@ -44,9 +44,9 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
     return "\n".join([*parts, table(("real world", "grounding", "trials"), single)])
 
 
-def told(interval: Interval) -> str:
+def told(interval: Interval, *, sign: bool = False) -> str:
     """Return the bounds of an interval for people."""
-    return SHARE.interval([interval.lower, interval.upper])
+    return SHARE.interval([interval.lower, interval.upper], sign=sign)
 
 
 def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]]:

@@ -8,6 +8,7 @@ from gsl.core.statistics import Interval
 from gsl.report.markdown import table
 from gsl.stages.comparison import Summary
 from gsl.stages.comparison_table import told
+from gsl.stages.headline import Unit
 from gsl.stages.trial import Trial
 from gsl.tasks.task import Task
 
@@ -30,8 +31,8 @@ def improvement_cells(one: Summary) -> tuple[str, str]:
 
 def value_cells(interval: Interval, task: Task) -> tuple[str, str]:
     """Return a mean and its interval, in the unit that the task shows."""
-    mean, low, high = (task.shown * value for value in interval)
-    return f"{mean:.1f}", f"{low:.1f} to {high:.1f}"
+    unit = Unit.of(task)
+    return unit.bare(interval.mean), unit.interval([interval.lower, interval.upper])
 
 
 def every_trial(trials: Sequence[Trial]) -> str:

@@ -175,7 +175,7 @@ def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *,
             continue
         apart = value_cells(differences(trials, cell, other, attrgetter("value")), task)
         fewer = differences(trials, cell, other, attrgetter("falls"))
-        counted = (f"{fewer.mean:+.1f}", f"{fewer.lower:+.1f} to {fewer.upper:+.1f}") if falls else ()
+        counted = (f"{fewer.mean:+.1f}", told(fewer, sign=True)) if falls else ()
         rows.append((cell.world, f"{cell.method} - {other}", str(cell.iteration), *apart, *counted))
     counted = ("falls of a trial", "95 % interval") if falls else ()
     titles = ("real world", "difference", "iteration", f"in real [{task.unit}]", "95 % interval, paired by trial")
