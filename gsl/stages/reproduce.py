@@ -15,6 +15,7 @@ from gsl.report.style import EFFECTS, GAT, SGAT, UNINFORMED
 from gsl.report.trial_dots import Dots, trial_dots
 from gsl.stages.compare import DATA, TABLE, Compare
 from gsl.stages.comparison import summaries
+from gsl.stages.headline import several
 from gsl.stages.ledger import known_parent
 from gsl.stages.study_effort import seconds, told
 from gsl.stages.trial import Trial
@@ -71,7 +72,7 @@ def _sizes(study: Compare) -> str:
     )
     learned = f"{budget.real_episodes} real episodes of a policy and {budget.real_neighbours} around it to learn from"
     measured = f"{budget.episodes} for the choice, {budget.check} for the check, {budget.confirmation} for the report"
-    return f"{study.trials} trials; {searched}; {learned}; {measured}."
+    return f"{several(study.trials, 'trial')}; {searched}; {learned}; {measured}."
 
 
 def _draw(path: Path, trials: Sequence[Trial], study: Compare, axis: str, values: Sequence[float]) -> None:
