@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from commands import done, gsl
@@ -125,28 +125,54 @@ class Silent:
     def status(self, text: str) -> None: ...
 
 
-FIELDS = ("number", "value")
+class Figure(NamedTuple):
+    number: int
+    value: float
 
 
 def test_a_ledger_only_grows(tmp_path: Path) -> None:
     path, given = tmp_path / "trials.json", tmp_path / "given.json"
-    before = Ledger(path, {}, FIELDS, Silent())
+    before = Ledger(path, {}, Figure, Silent())
     before.add("a", [{"number": 1, "value": 1.0}])
     before.add("b", [{"number": 2, "value": 2.0}])
     given.write_text(path.read_text().replace('"b"', '"c"'))
-    after = Ledger(path, {"known": given}, FIELDS, Silent())
+    after = Ledger(path, {"known": given}, Figure, Silent())
     assert not after.take("d")
     after.add("b", [{"number": 2, "value": 3.0}])
     assert {row["recipe"]: row["value"] for row in json.loads(path.read_text())} == {"b": 3.0, "a": 1.0, "c": 2.0}
     assert after.take("a") and after.figures == [{"number": 1, "value": 1.0}, {"number": 2, "value": 3.0}]
     with pytest.raises(ArtifactError, match="is what this study writes"):
-        Ledger(path, {"known": path}, FIELDS, Silent())
+        Ledger(path, {"known": path}, Figure, Silent())
+    with pytest.raises(ArtifactError, match="recipe a has number 1; by its settings that is 2"):
+        Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent()).take("a", number=2)
+    given.write_text(path.read_text().replace("3.0", '"fast"'))
+    with pytest.raises(ArtifactError, match="row 2: its value cannot be 'fast'"):
+        Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent())
     given.write_text(path.read_text().replace("3.0", "NaN"))
     with pytest.raises(ArtifactError, match="NaN is no figure"):
-        Ledger(tmp_path / "new.json", {"known": given}, FIELDS, Silent())
+        Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent())
     given.write_text(json.dumps([*json.loads(path.read_text()), json.loads(path.read_text())[0]]))
     with pytest.raises(ArtifactError, match="row 4 is of a trial that the file has already"):
-        Ledger(tmp_path / "new.json", {"known": given}, FIELDS, Silent())
+        Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent())
+
+
+@pytest.mark.parametrize(
+    ("more", "problem"),
+    [
+        ({"stable": 6}, "stable 6, winners 5"),
+        ({"improvement": 55.0}, "improvement 55.0, but start 0.2 and value 0.25"),
+        ({"falls": 11}, "falls 11, episodes 10"),
+        ({"number": -3}, "number -3"),
+    ],
+)
+def test_figures_that_contradict_each_other_are_no_trial(more: dict[str, Any], problem: str, tmp_path: Path) -> None:
+    path = tmp_path / "trials.json"
+    row = {**a_trial("gat", 1)._asdict(), "recipe": "a", "made_by": "b"}
+    path.write_text(json.dumps([row]))
+    assert Ledger(path, {}, Trial, Silent()).figures == []
+    path.write_text(json.dumps([{**row, **more}]))
+    with pytest.raises(ArtifactError, match=f"row 1 contradicts itself: {problem}"):
+        Ledger(path, {}, Trial, Silent())
 
 
 def test_a_recipe_is_of_what_a_trial_comes_from(tmp_path: Path) -> None:

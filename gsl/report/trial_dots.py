@@ -60,7 +60,7 @@ def _draw(axes: Axes, methods: Mapping[str, Dots], close: float) -> None:
         values, failed = np.asarray(one.values, float), np.asarray(one.failed, bool)
         found = mean_interval(values)
         if np.isfinite(found.lower):
-            axes.plot([found.lower, found.upper], [row, row], color=one.colour, linewidth=6, alpha=0.25)
+            axes.hlines(row, found.lower, found.upper, color=one.colour, linewidth=6, alpha=0.25)
         axes.plot([found.mean] * 2, [row - 0.3, row + 0.3], color=one.colour, linewidth=2.2)
         for part, face in ((~failed, one.colour), (failed, "white")):
             heights = row + _apart(values, close)[part]

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 
 from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
+from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
@@ -69,6 +70,8 @@ class Compare:
 
     def carried_out(self, folder: Path, console: Any) -> tuple[list[Trial], str]:
         """Return all trials, built beside `folder` and told as they end, and who made them; write them down."""
+        if not self.methods or not self.worlds:
+            raise ConfigError("methods" if self.worlds else "worlds", "none is left; leave one in")
         for grounding in self.methods.values():
             self.iterate.chain.check(grounding)
         check_aggregate(self.iterate, self.methods.values(), "iterate.aggregate")
@@ -77,18 +80,24 @@ class Compare:
             check_alike(sim.layout, real.layout)
         named = {f"simulators.{name}" if name else "iterate.sim": one for name, one in simulators.items()}
         try_out({**named, **{f"worlds.{name}": one for name, one in self.worlds.items()}})
-        ledger = Ledger(home / DATA, self.parents(), Trial._fields, console)
+        ledger = Ledger(home / DATA, self.parents(), Trial, console)
         cells = product(range(1, self.trials + 1), self.methods, simulators, self.worlds)
-        for number, method, simulator, world in cells:
-            where = " ".join(filter(None, (simulator, world)))
-            cell, sim = Cell(simulator, world, method, 1), simulators[simulator]
-            key = recipe(self.iterate, number, cell, sim, self.worlds[world], self.methods[method], self.rank)
-            if ledger.take(key):
+        keys = {
+            (number, cell := Cell(simulator, world, method, 1)): recipe(
+                *(self.iterate, number, cell, simulators[simulator]),
+                *(self.worlds[world], self.methods[method], self.rank),
+            )
+            for number, method, simulator, world in cells
+        }
+        ledger.announce(keys.values())
+        for (number, cell), key in keys.items():
+            where = " ".join(filter(None, (cell.simulator, cell.world)))
+            if ledger.take(key, number=number, simulator=cell.simulator, world=cell.world, method=cell.method):
                 continue
             trials = []
-            for trial in self._trial(home, sim, cell, number, console):
+            for trial in self._trial(home, simulators[cell.simulator], cell, number, console):
                 trials.append(trial)
-                console.status(f"{where}, {method}, trial {number}: {trial.told(Unit.of(self.iterate.task))}")
+                console.status(f"{where}, {cell.method}, trial {number}: {trial.told(Unit.of(self.iterate.task))}")
             ledger.add(key, [trial._asdict() for trial in trials])
         return [Trial(**row) for row in ledger.figures], ledger.close(folder / DATA)
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import TypeAdapter, ValidationError
 
 from gsl.core.described import described
 from gsl.core.setting import setting
@@ -65,15 +67,16 @@ class Ledger:
         ArtifactError: The file of earlier trials holds something else, a trial twice, or is the one to be written.
     """
 
-    def __init__(self, path: Path, known: Mapping[str, Path], fields: Sequence[str], console: Any) -> None:
+    def __init__(self, path: Path, known: Mapping[str, Path], kind: type[NamedTuple], console: Any) -> None:
         self._path, self._console = path, console
         self._done: dict[str, list[dict[str, Any]]] = {}
-        self._kept = _read(path, fields) if path.is_file() else {}
+        self._kept = _read(path, kind) if path.is_file() else {}
         self._known: dict[str, list[dict[str, Any]]] = {}
         for file in known.values():
             if path.exists() and file.samefile(path):
                 raise ArtifactError(file, "is what this study writes; copy it, or give the study another name=")
-            self._known = _read(file, fields)
+            self._known = _read(file, kind)
+        self._from = next(iter(known.values()), path)
         self._me = _made_by()
 
     @property
@@ -81,10 +84,26 @@ class Ledger:
         """The rows of all trials so far, by trial, without recipe and maker."""
         return [{name: value for name, value in row.items() if name not in (RECIPE, MADE_BY)} for row in self._rows()]
 
-    def take(self, key: str) -> bool:
-        """Make a trial that is known one of this study; say whether it is known."""
+    def announce(self, keys: Collection[str]) -> None:
+        """Say how many of a study's trials are known, if a file of such was given."""
+        if not self._known:
+            return
+        known = sum(key in self._known for key in keys)
+        why = "" if known else "; those that are have other settings or seeds"
+        self._console.status(f"{known} of {len(keys)} trials are in {self._from}{why}")
+
+    def take(self, key: str, **of: Any) -> bool:
+        """Make a trial that is known one of this study; say whether it is known.
+
+        Raises:
+            ArtifactError: Its rows say that they are of something else than `of`, by field.
+        """
         if key not in self._known:
             return False
+        for row in self._known[key]:
+            if wrong := [name for name, value in of.items() if row[name] != value]:
+                problem = f"the trial of recipe {key} has {wrong[0]} {row[wrong[0]]!r}; by its settings that is"
+                raise ArtifactError(self._from, f"{problem} {of[wrong[0]]!r}")
         self._write(key, self._known[key])
         return True
 
@@ -119,18 +138,26 @@ def _effective(told: Any) -> Any:
     return [_effective(value) for value in told] if isinstance(told, list) else told
 
 
-def _read(path: Path, fields: Sequence[str]) -> dict[str, list[dict[str, Any]]]:
-    """Return the rows of each trial."""
+def _read(path: Path, kind: type[NamedTuple]) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows of each trial; a `kind` may have a property that tells a `contradiction`."""
     try:
         rows = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_figure)
     except (ValueError, OSError) as error:
         raise ArtifactError(path, f"is no file of trials: {error}") from error
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         raise ArtifactError(path, "is no file of trials: not a list of rows")
-    wanted, found, last = {*fields, RECIPE, MADE_BY}, dict[str, list[dict[str, Any]]](), None
+    wanted, found, last = {*kind._fields, RECIPE, MADE_BY}, dict[str, list[dict[str, Any]]](), None
+    adapter = TypeAdapter(kind)
     for index, row in enumerate(rows, start=1):
         if wrong := sorted(wanted ^ row.keys()):
             raise ArtifactError(path, f"row {index} is no trial of such a study: {', '.join(wrong)} lacking or unknown")
+        try:
+            one = adapter.validate_python({name: row[name] for name in kind._fields}, strict=True)
+        except ValidationError as error:
+            name, *_ = error.errors()[0]["loc"]
+            raise ArtifactError(path, f"row {index}: its {name} cannot be {row[str(name)]!r}") from error
+        if problem := getattr(one, "contradiction", ""):
+            raise ArtifactError(path, f"row {index} contradicts itself: {problem}")
         if row[RECIPE] in found and row[RECIPE] != last:
             raise ArtifactError(path, f"row {index} is of a trial that the file has already; leave one of the two out")
         last = row[RECIPE]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from gsl.core.statistics import Interval
 from gsl.report.markdown import table
@@ -12,16 +13,26 @@ from gsl.stages.headline import Unit
 from gsl.stages.trial import Trial
 from gsl.tasks.task import Task
 
+
+class Drawn(NamedTuple):
+    """What is drawn of every trial: its values, in the unit of `axis`, and which of them failed, at what."""
+
+    axis: str
+    values: Sequence[float]
+    failed: Sequence[bool] | None = None  # None: found no stable improvement
+    missed: str = ""
+
+
 NOTHING = ("", "", "")  # of a paper that has no such figures
 SPEED = "speed [cm/s]"
 
 
-def worth(trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+def worth(trials: Sequence[Trial], task: Task) -> Drawn:
     """Return improvements where π0 is worth something in every trial, else values."""
     improvements = [trial.improvement for trial in trials if trial.improvement is not None]
     if len(improvements) == len(trials):
-        return "improvement over π0 in real [%]", improvements
-    return f"in real [{task.unit}]", [task.shown * trial.value for trial in trials]
+        return Drawn("improvement over π0 in real [%]", improvements)
+    return Drawn(f"in real [{task.unit}]", [task.shown * trial.value for trial in trials])
 
 
 def improvement_cells(one: Summary) -> tuple[str, str]:

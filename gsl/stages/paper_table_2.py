@@ -11,7 +11,7 @@ from gsl.core.setting import component, setting
 from gsl.report.markdown import table
 from gsl.stages.comparison import Summary, differences, orders, summaries
 from gsl.stages.comparison_table import told
-from gsl.stages.paper_cells import NOTHING, SPEED, every_trial, improvement_cells, worth
+from gsl.stages.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, worth
 from gsl.stages.trial import Cell, Trial
 from gsl.tasks.task import Task
 
@@ -66,7 +66,7 @@ class Table2:
             parts.append(table(("real world", "difference", "stable winners a trial", "p, Holm-corrected"), tested))
         return "\n".join([*parts, every_trial(trials)])
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return what a trial is worth."""
         return worth(trials, task)
 

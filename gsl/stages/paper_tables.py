@@ -17,7 +17,7 @@ from gsl.core.statistics import Interval, mean_interval, wilson
 from gsl.report.markdown import table
 from gsl.stages.comparison import differences, summaries
 from gsl.stages.comparison_table import told
-from gsl.stages.paper_cells import NOTHING, SPEED, every_trial, improvement_cells, value_cells, worth
+from gsl.stages.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, value_cells, worth
 from gsl.stages.trial import Trial
 from gsl.tasks.task import Task
 
@@ -25,7 +25,7 @@ TABLE_3 = {1: ("26.3 and 26.9", "34.6 and 37.8"), 2: ("28.0", "43.3")}  # cm/s, 
 TABLE_4 = {("gat", 1): ("15.7 ± 3.0", "6 of 10"), ("sgat", 1): ("16.9 ± 0.7", "0 of 10"),
            ("gat", 2): ("18.5 ± 3.6", "10 of 10"), ("sgat", 2): ("18.0 ± 2.2", "1 of 10")}  # fmt: skip
 LINEAR_WALK = {"none": ("1.3", "3 of 5", "1"), "gat": ("4.95", "5 of 5", "3")}
-AT_THE_END, ON_AVERAGE = "distance [deg]", "mean distance [deg]"  # of the arms
+AT_THE_END, ON_AVERAGE, ABOVE = "distance [deg]", "mean distance [deg]", "above [share]"  # of the arms
 
 
 @component
@@ -64,7 +64,7 @@ class Table3:
         below = f"π0 in real: {task.shown * start.mean:.1f} {task.unit} (paper: 19.5)."
         return "\n".join([table(titles, rows), below, "", every_trial(trials)])
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return what a trial is worth."""
         return worth(trials, task)
 
@@ -98,9 +98,9 @@ class Table4:
         ]
         return "\n".join([table(titles, rows), *below, _differences(trials, task, self.against, falls=True)])
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return what a trial is worth: of a π0 that falls half of the time shares would be of little."""
-        return f"in real, a fall worth 0 [{task.unit}]", [task.shown * trial.value for trial in trials]
+        return Drawn(f"in real, a fall worth 0 [{task.unit}]", [task.shown * trial.value for trial in trials])
 
 
 @component
@@ -128,9 +128,9 @@ class LinearWalkTable:
         ]
         return "\n".join([table(titles, rows), _differences(trials, task, ("none", "gat"))])
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
+    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return the distances."""
-        return f"distance in real [{task.unit}]", [task.shown * trial.value for trial in trials]
+        return Drawn(f"distance in real [{task.unit}]", [task.shown * trial.value for trial in trials])
 
 
 @component
@@ -150,7 +150,7 @@ class Figure5:
                 *_degrees(map(_on_average, own)),
                 "" if one.method == first else f"{apart.mean:+.1f} ({told(apart)})",
                 *_degrees(trial.last[AT_THE_END] for trial in own),
-                f"{sum(trial.last['above [share]'] > 0.0 for trial in own)} of {len(own)}",
+                f"{sum(trial.last[ABOVE] > 0.0 for trial in own)} of {len(own)}",
                 *_degrees(trial.outcome[ON_AVERAGE] for trial in own),
                 f"{one.real_episodes:.0f}",
             )
@@ -162,9 +162,12 @@ class Figure5:
         )
         return table(titles, rows)
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
-        """Return the mean distances."""
-        return "mean distance in real [°]", list(map(_on_average, trials))
+    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
+        """Return the mean distances; an arm above the goal has failed."""
+        failed = [trial.last[ABOVE] > 0.0 for trial in trials]
+        return Drawn(
+            "mean distance in real [°], less is better", list(map(_on_average, trials)), failed, "above the goal"
+        )
 
 
 def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *, falls: bool = False) -> str:

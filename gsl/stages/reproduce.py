@@ -17,6 +17,7 @@ from gsl.stages.compare import DATA, TABLE, Compare
 from gsl.stages.comparison import summaries
 from gsl.stages.headline import several
 from gsl.stages.ledger import known_parent
+from gsl.stages.paper_cells import Drawn
 from gsl.stages.study_effort import seconds, told
 from gsl.stages.trial import Trial
 from gsl.tasks.task import Task
@@ -31,8 +32,8 @@ class PaperTable(Protocol):
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table with the paper's figures beside ours."""
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> tuple[str, list[float]]:
-        """Return what is drawn of every trial, with its unit, and its values."""
+    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
+        """Return what is drawn of every trial."""
 
 
 @component
@@ -59,7 +60,7 @@ class Reproduce:
         task = self.study.iterate.task
         parts = [self.table.markdown(trials, task), f"{_sizes(self.study)}\n", made]
         (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
-        _draw(folder / FIGURE, trials, self.study, *self.table.drawn(trials, task))
+        _draw(folder / FIGURE, trials, self.study, self.table.drawn(trials, task))
         return {"trials": self.study.trials, "summaries": [one._asdict() for one in summaries(trials)]}
 
 
@@ -75,22 +76,19 @@ def _sizes(study: Compare) -> str:
     return f"{several(study.trials, 'trial')}; {searched}; {learned}; {measured}."
 
 
-def _draw(path: Path, trials: Sequence[Trial], study: Compare, axis: str, values: Sequence[float]) -> None:
-    """Draw every trial, hollow where no stable improvement was found, a panel each pair of worlds."""
+def _draw(path: Path, trials: Sequence[Trial], study: Compare, drawn: Drawn) -> None:
+    """Draw every trial, hollow where it failed, a panel each pair of worlds."""
     panels: dict[str, dict[str, Dots]] = {}
-    several, tolerant = any(trial.iteration > 1 for trial in trials), study.iterate.budget.tolerated > 0.0
+    further, tolerant = any(trial.iteration > 1 for trial in trials), study.iterate.budget.tolerated > 0.0
+    failures = drawn.failed or [trial.surely <= 0.0 if tolerant else trial.without for trial in trials]
     for cell in dict.fromkeys(trial.cell for trial in trials):
-        own = [
-            (value, trial.surely <= 0.0 if tolerant else trial.without)
-            for value, trial in zip(values, trials, strict=True)
-            if trial.cell == cell
-        ]
-        shown, failed = zip(*own, strict=True)
+        every = zip(trials, drawn.values, failures, strict=True)
+        shown, failed = zip(*((value, one) for trial, value, one in every if trial.cell == cell), strict=True)
         panel = " ".join(filter(None, (cell.simulator, cell.world)))
-        name = f"{cell.method}, iteration {cell.iteration}" if several else cell.method
+        name = f"{cell.method}, iteration {cell.iteration}" if further else cell.method
         panels.setdefault(panel, {})[name] = Dots(shown, failed, _colour(study.methods[cell.method]))
-    missed = "no sure improvement" if tolerant else "no stable improvement"
-    trial_dots(path, panels, axis=axis, title=f"Every trial (hollow: {missed}), mean and 95 % interval")
+    missed = drawn.missed or f"no {'sure' if tolerant else 'stable'} improvement{' by the iteration' * further}"
+    trial_dots(path, panels, axis=drawn.axis, title=f"Every trial (hollow: {missed}), mean and 95 % interval")
 
 
 def _colour(grounding: Grounding) -> str:

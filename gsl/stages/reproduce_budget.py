@@ -80,10 +80,11 @@ class Budget:
             if not learned(grounding):
                 raise ConfigError(f"methods.{name}", "learns nothing from real trajectories; take gat or sgat")
         home = folder.parent
-        ledger = Ledger(home / DATA, self.parents(), Point._fields, console)
-        for number in range(1, self.trials + 1):
-            key = recipe(replace(self, trials=1, known=None), number)
-            if not ledger.take(key):
+        ledger = Ledger(home / DATA, self.parents(), Point, console)
+        keys = {number: recipe(replace(self, trials=1, known=None), number) for number in range(1, self.trials + 1)}
+        ledger.announce(keys.values())
+        for number, key in keys.items():
+            if not ledger.take(key, trial=number):
                 ledger.add(key, [one._asdict() for one in self._trial(home, number, console)])
         points = [Point(**row) for row in ledger.figures]
         self._told(folder, points, ledger.close(folder / DATA))

@@ -82,9 +82,10 @@ class NoiseStudy:
         named = {f"{group}.{name}": one for group in ("worlds", "sims") for name, one in getattr(self, group).items()}
         try_out({"iterate.sim": self.iterate.sim, **named})
         home = folder.parent
-        ledger = Ledger(home / DATA, self.parents(), Point._fields, console)
+        ledger = Ledger(home / DATA, self.parents(), Point, console)
         keys = {number: recipe(replace(self, trials=1, known=None), number) for number in range(1, self.trials + 1)}
-        known = {number for number, key in keys.items() if ledger.take(key)}
+        ledger.announce(keys.values())
+        known = {number for number, key in keys.items() if ledger.take(key, trial=number)}
         jobs = [(number, home) for number in keys if number not in known]
         with console.progress(len(jobs), "trials") as progress:
             for index, found in arriving(_trial, self, jobs, self.workers, progress):

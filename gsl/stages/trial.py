@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 from gsl.stages.headline import Unit, gained
@@ -93,7 +95,7 @@ class Trial(NamedTuple):
             number,
             start=start["value"],
             value=after["value"],
-            improvement=100.0 * (after["value"] / start["value"] - 1.0) if start["interval"][0] > 0.0 else None,
+            improvement=_improvement(start["value"], after["value"]) if start["interval"][0] > 0.0 else None,
             surely=measured["gain"]["interval"][0],
             returned=measured["best"],
             generation=measured["best_generation"],
@@ -122,6 +124,24 @@ class Trial(NamedTuple):
         return f"{self.returned}, {unit.shown(self.value)}{f' ({more})' if more else ''}{winners}"
 
     @property
+    def contradiction(self) -> str:
+        """What cannot be, of figures that a file told."""
+        counts = ("improving", self.improving), ("stable", self.stable), ("winners", self.winners)
+        for (few, less), (many, more) in pairwise([("nothing", 0), *counts]):
+            if less > more:
+                return f"{few} {less}, {many} {more}"
+        if not 0 <= self.falls <= self.episodes:
+            return f"falls {self.falls}, episodes {self.episodes}"
+        gain = self.improvement
+        if gain is not None and not math.isclose(gain, _improvement(self.start, self.value), abs_tol=1e-6):
+            return f"improvement {self.improvement}, but start {self.start} and value {self.value}"
+        return "" if self.number > 0 else f"number {self.number}"
+
+    @property
     def without(self) -> bool:
         """Whether the trial found no stable improvement: a fall in fresh episodes, or a gain that may be none."""
         return self.falls > 0 or self.surely <= 0.0
+
+
+def _improvement(start: float, value: float) -> float:
+    return 100.0 * (value / start - 1.0)
