@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
-from gsl.commandline.tables import LineTable, RichLiveTable, drawn
+from gsl.commandline.tables import LineTable, RichLiveTable, drawn, fitting
 from gsl.core.interruption import checkpoint
 
 if TYPE_CHECKING:
@@ -43,6 +43,16 @@ class Console:
         self.json = json
         self._live: RichLiveTable | None = None
         self._lines: LineTable | None = None
+        self._part = ""
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Within, tables belong to a part of the work that has this name: progress, not results."""
+        self._part = name
+        try:
+            yield
+        finally:
+            self._part = ""
 
     def status(self, text: str) -> None:
         """Say what is going on, on stderr."""
@@ -55,16 +65,21 @@ class Console:
     def table(
         self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
     ) -> None:
-        """Print a table of results on stdout; with JSON it is left to `result`."""
+        """Print a table of results on stdout, of a `part` on stderr; with JSON it is left to `result`."""
+        title = f"{self._part}: {title}" if self._part else title
         _log.info("%s", "\n".join([title, *("\t".join(map(str, row)) for row in [columns, *rows]), caption or ""]))
         if self.json:
             return
         above_live_table = self._live is not None and self._stdout.is_terminal
-        place = self._stderr if above_live_table else self._stdout
+        place = self._stderr if above_live_table or self._part else self._stdout
         place.print(title, style="bold", markup=False, highlight=False, soft_wrap=True)
-        place.print(drawn(columns, rows))
-        if caption:
-            place.print(caption + "\n", markup=False, highlight=False, soft_wrap=True)
+        widths = fitting(columns, rows, place.width)
+        place.print(drawn(columns, rows, widths=widths))
+        below = [caption] if caption else []
+        if left := columns[len(widths) :]:
+            below.insert(0, f"no room for {len(left)} more columns: {', '.join(left)}")
+        if below:
+            place.print("\n".join(below) + "\n", markup=False, highlight=False, soft_wrap=True)
 
     def result(self, document: Mapping[str, Any], *, text: str = "") -> None:
         """Print the outcome: the document as JSON, or `text` for a person."""

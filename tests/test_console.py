@@ -5,6 +5,7 @@ import logging
 
 import pytest
 
+from gsl.commandline.tables import fitting
 from gsl.console import Console
 
 
@@ -78,3 +79,25 @@ def test_what_is_said_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO, logger="gsl"):
         Console().status("collecting")
     assert caplog.messages == ["collecting"]
+
+
+def test_a_table_leaves_out_columns_that_there_is_no_room_for(capsys: pytest.CaptureFixture[str]) -> None:
+    columns = [f"column_{k:05d}" for k in range(20)]
+    Console().table("t", ["name", *columns], [["a", *range(20)]])
+    heading, left_out = capsys.readouterr().out.split("no room for 8 more columns: ")
+    assert heading.split()[2:14] == columns[:12] and left_out.strip().split(", ") == columns[12:]
+
+
+def test_words_of_a_table_stay_whole_where_there_is_room_for_some_columns() -> None:
+    widths = fitting(["name", "improvement [%]", "95 % interval"], [["gat", "3.6", "0.3 to 6.9"]], 34)
+    assert widths == [4, 11, 9]
+    assert fitting(["name", "improvement [%]"], [["gat", "3.6"]], 10) == [4]
+
+
+def test_tables_of_a_part_are_progress(capsys: pytest.CaptureFixture[str]) -> None:
+    console = Console()
+    with console.part("gat, trial 1"):
+        console.table("errors", ["a"], [[1]])
+    console.table("results", ["a"], [[1]])
+    out, err = capsys.readouterr()
+    assert "gat, trial 1: errors" in err and "errors" not in out and "results" in out

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     import rich.table
 
 CELL = 13
 """Least width of a column whose later cells are not known yet."""
+WORD = 16
+"""Longest word that is kept whole."""
+EDGE, APART = 1, 3
+"""Characters that a drawn table takes besides its cells: in all, and for each column."""
 
 
 class LineTable:
@@ -54,8 +58,17 @@ class RichLiveTable:
         self._refresh()
 
 
-def drawn(columns: Sequence[str], rows: Sequence[Sequence[object]], title: str | None = None) -> rich.table.Table:
-    """Return a table as rich draws it; a column of numbers is aligned to the right, and brackets are only brackets."""
+def drawn(
+    columns: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    title: str | None = None,
+    widths: Sequence[int | None] | None = None,
+) -> rich.table.Table:
+    """Return a table as rich draws it; a column of numbers is aligned to the right, and brackets are only brackets.
+
+    Of columns there are as many as `widths`.
+    """
+    widths = [None] * len(columns) if widths is None else widths
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -68,12 +81,34 @@ def drawn(columns: Sequence[str], rows: Sequence[Sequence[object]], title: str |
         title_justify="left",
         caption_justify="left",
     )
-    for index, column in enumerate(columns):
+    for index, (column, width) in enumerate(zip(columns, widths, strict=False)):
         numbers = bool(rows) and all(_is_number(row[index]) for row in rows)
-        table.add_column(Text(column), justify="right" if numbers else "left", no_wrap=index == 0, overflow="fold")
+        aligned: Literal["right", "left"] = "right" if numbers else "left"
+        table.add_column(Text(column), justify=aligned, no_wrap=not index and not width, overflow="fold", width=width)
     for row in rows:
-        table.add_row(*(Text(str(cell)) for cell in row))
+        table.add_row(*(Text(str(cell)) for cell in row[: len(widths)]))
     return table
+
+
+def fitting(columns: Sequence[str], rows: Sequence[Sequence[object]], width: int) -> list[int]:
+    """Return the widths of the first columns that a place of so many characters has room for: one at least.
+
+    Words stay whole but for those that are longer than `WORD`, such as paths; names in the first column are not folded
+    where they leave two thirds to the others.
+    """
+    cells = [[str(row[index]) for row in [columns, *rows]] for index in range(len(columns))]
+    widths = [max(map(len, column)) for column in cells]
+    words = [max(len(word) for cell in column for word in cell.split() or [""]) for column in cells]
+    least = [min(widths[0], max(WORD, width // 3)), *(min(word, WORD) for word in words[1:])]
+    while len(least) > 1 and sum(least) > width - EDGE - APART * len(least):
+        least.pop()
+    widths = widths[: len(least)]
+    for _ in range(sum(widths) - (width - EDGE - APART * len(least))):
+        foldable = [index for index, (wide, few) in enumerate(zip(widths, least, strict=True)) if wide > few]
+        if not foldable:
+            break
+        widths[max(foldable, key=widths.__getitem__)] -= 1
+    return widths
 
 
 def _is_number(cell: object) -> bool:

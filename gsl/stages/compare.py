@@ -94,10 +94,11 @@ class Compare:
             where = " ".join(filter(None, (cell.simulator, cell.world)))
             if ledger.take(key, number=number, simulator=cell.simulator, world=cell.world, method=cell.method):
                 continue
-            trials = []
-            for trial in self._trial(home, simulators[cell.simulator], cell, number, console):
-                trials.append(trial)
-                console.status(f"{where}, {cell.method}, trial {number}: {trial.told(Unit.of(self.iterate.task))}")
+            trials, part = [], f"{where}, {cell.method}, trial {number}"
+            with console.part(part):
+                for trial in self._trial(home, simulators[cell.simulator], cell, number, console):
+                    trials.append(trial)
+                    console.status(f"{part}: {trial.told(Unit.of(self.iterate.task))}")
             ledger.add(key, [trial._asdict() for trial in trials])
         return [Trial(**row) for row in ledger.figures], ledger.close(folder / DATA)
 
