@@ -15,8 +15,19 @@ from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Solver
 from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.grounding_check import ALPHAS, BARE, GROUNDED, OFF, PI0, STILL, allowed_falls, check, largest_stable
-from gsl.stages.grounding_replay import TICKS
+from gsl.stages.grounding_check import (
+    ALPHAS,
+    BARE,
+    GROUNDED,
+    OFF,
+    PI0,
+    STILL,
+    GroundingReport,
+    allowed_falls,
+    check,
+    largest_stable,
+)
+from gsl.stages.grounding_replay import TICKS, Deviations
 from gsl.stages.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld
@@ -102,6 +113,20 @@ def _without(group: str) -> Batch:
         for one in heldout().episodes
     ]
     return replace(heldout(), episodes=tuple(episodes))
+
+
+def test_a_body_that_is_farther_while_its_joints_are_nearer_is_remarked_on() -> None:
+    def apart(joints: float, pitch: float, forward: float) -> dict[int, Deviations]:
+        found = Deviations(np.full((3, 2), joints), np.full(3, pitch), np.full(3, forward))
+        return dict.fromkeys((1, TICKS), found)
+
+    def report(joints: float, pitch: float, forward: float) -> GroundingReport:
+        sims = {GROUNDED: apart(joints, pitch, forward), BARE: apart(0.1, 0.1, 0.1)}
+        return GroundingReport({OFF: sims}, ("a", "b"), 1, 0, np.zeros(1))
+
+    assert report(0.05, 0.2, 0.2).remark == "its joints are nearer, the body's pitch and place farther"
+    assert report(0.05, 0.05, 0.2).remark == "its joints are nearer, the body's place farther"
+    assert report(0.05, 0.05, 0.05).remark == report(0.2, 0.2, 0.2).remark == ""
 
 
 def test_trajectories_of_another_robot_are_refused() -> None:

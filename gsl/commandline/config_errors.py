@@ -16,7 +16,7 @@ from gsl.core.setting import settings_of
 from gsl.core.validation import config_error, did_you_mean
 from gsl.errors import ConfigError, InputError
 
-_UNKNOWN = re.compile(r"Could not override '([^']+)'")
+_UNKNOWN = re.compile(r"Could not (?:override|delete from config\.) '([^']+)'")
 _NO_OPTION = re.compile(r"Could not find '([^']+)/([^'/]*)'")
 _MISSING = re.compile(r"[Mm]issing mandatory value: (\S+)")
 _NO_PRIMARY = re.compile(r"Cannot find primary config '([^']+)'")

@@ -65,7 +65,8 @@ def config_error(error: ValidationError, target: Callable[..., Any], *, where: s
 def did_you_mean(word: str, known: Iterable[str], *, listed: bool = False) -> str:
     """Return `; did you mean ...?` and, where nothing is near or `listed`, the list of what there is."""
     names = sorted(known)
-    near = difflib.get_close_matches(word, names, n=2, cutoff=0.6)
+    alike = {name.casefold(): name for name in names}
+    near = [alike[one] for one in difflib.get_close_matches(word.casefold(), alike, n=2, cutoff=0.6)]
     question = f"; did you mean {' or '.join(near)}?" if near else ""
     if near and not listed or not names:
         return question

@@ -76,6 +76,16 @@ class GroundingReport:
         return found
 
     @property
+    def remark(self) -> str:
+        """What is farther from the real robot than without grounding, though its joints, which decide, are not."""
+        sims = self.deviations.get(OFF) or self.deviations.get(PI0)
+        if not sims or self.problems:
+            return ""
+        with_it, without = (self._errors(sims[name][TICKS]) for name in (GROUNDED, BARE))
+        farther = [name for name in BODY if with_it[BODY[name]] > without[BODY[name]]]
+        return f"its joints are nearer, the body's {' and '.join(farther)} farther" if farther else ""
+
+    @property
     def acceptable(self) -> bool:
         """Whether there is no problem."""
         return not self.problems
@@ -126,6 +136,7 @@ class GroundingReport:
         }
 
 
+BODY = {"pitch": "pitch_deg", "place": "forward_mm"}
 TITLES = (
     *("trajectories", "simulator", "joints 1 tick [°]", "pitch 1 tick [°]", "forward 1 tick [mm]"),
     *("joints 0.2 s [°]", "pitch 0.2 s [°]", "forward 0.2 s [mm]"),

@@ -17,15 +17,18 @@ from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.report.budget_curve import Line, budget_curve
 from gsl.report.markdown import table
+from gsl.stages.chain import Budget as ChainBudget
 from gsl.stages.collect import FILE as TRAJECTORIES
 from gsl.stages.collect import Collect
-from gsl.stages.comparison_table import told
+from gsl.stages.compare import Compare
+from gsl.stages.comparison_table import told as bounds
 from gsl.stages.grounding_check import BARE, GROUNDED, OFF, check
 from gsl.stages.grounding_gate import settled
 from gsl.stages.iterate import Iterate
 from gsl.stages.ledger import Known, Ledger, known_parent, recipe
 from gsl.stages.link import built
 from gsl.stages.rollout import Scenario
+from gsl.stages.study_effort import seconds, told
 from gsl.storage.trajectories import read
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.external import asking
@@ -79,6 +82,7 @@ class Budget:
         for name, grounding in self.methods.items():
             if not learned(grounding):
                 raise ConfigError(f"methods.{name}", "learns nothing from real trajectories; take gat or sgat")
+        console.status(f"{told(self._seconds)} from nothing; a study that was stopped goes on where it was")
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
         keys = {number: recipe(replace(self, trials=1, known=None), number) for number in range(1, self.trials + 1)}
@@ -90,6 +94,21 @@ class Budget:
         self._told(folder, points, ledger.close(folder / DATA))
         return {"points": len(points)}
 
+    @property
+    def _seconds(self) -> float:
+        """An estimate of the study's duration [s]."""
+        study = Compare(self.iterate, {"real": self.iterate.real}, {NONE: NoGrounding()}, self.trials)
+        learning = [
+            replace(study, methods=self.methods, iterate=replace(self.iterate, budget=self._budget(count)))
+            for count in self.budgets
+        ]
+        return sum(map(seconds, [study, *learning]))
+
+    def _budget(self, count: int) -> ChainBudget:
+        """Return the effort with so many real trajectories to learn from."""
+        own = max(1, count // OWN)
+        return replace(self.iterate.budget, real_episodes=own, real_neighbours=count - own)
+
     def _trial(self, home: Path, number: int, console: Any) -> Iterator[Point]:
         name = f"trial_{number:02d}"
         yield self._ungrounded(home / NONE / name, number, console)
@@ -98,9 +117,8 @@ class Budget:
                 yield self._point(home / method / f"real_{count:03d}" / name, method, count, number, console)
 
     def _point(self, place: Path, method: str, count: int, number: int, console: Any) -> Point:
-        own = max(1, count // OWN)
-        budget = replace(self.iterate.budget, real_episodes=own, real_neighbours=count - own)
-        chain, seed = replace(self.iterate.chain, budget=budget, accept=True), self.iterate.seed + number - 1
+        chain = replace(self.iterate.chain, budget=self._budget(count), accept=True)
+        seed = self.iterate.seed + number - 1
         grounding = chain.diagnosed(place.parents[2] / "diagnosis" / place.name, self.methods[method], seed, console)
         ready = chain.ready(place, grounding, None, seed, console)
         held = read(self._held_out(place.parents[2] / "held_out" / place.name, seed, console) / TRAJECTORIES)
@@ -142,11 +160,11 @@ class Budget:
             wrong = [mean_interval([one.error for one in cell if one.error is not None]) for cell in cells]
             values[method], errors[method] = Line(self.budgets, means), Line(self.budgets, wrong)
             rows += [
-                (method, str(n), f"{value.mean:.1f}", told(value), f"{error.mean:.2f}", told(error))
+                (method, str(n), f"{value.mean:.1f}", bounds(value), f"{error.mean:.2f}", bounds(error))
                 for n, value, error in zip(self.budgets, means, wrong, strict=True)
             ]
         none = mean_interval([shown * one.value for one in points if one.method == NONE])
-        rows.append((NONE, "0", f"{none.mean:.1f}", told(none), "", ""))
+        rows.append((NONE, "0", f"{none.mean:.1f}", bounds(none), "", ""))
         titles = ("grounding", "real trajectories collected", f"in real [{unit}]", "95 % interval")
         titles_of_errors = ("joints after 0.2 s, off π0 [°]", "95 % interval")
         held = f"Joints are measured on {1 + HELD_OUT} real trajectories more, the same for all of a trial.\n"

@@ -9,6 +9,7 @@ from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
 from gsl.stages.compare import Compare
+from gsl.stages.headline import several
 from gsl.stages.population import threads
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.values import Values
@@ -60,8 +61,8 @@ def seconds(study: Compare) -> float:
 
 def told(duration: float) -> str:
     """Return a duration for people."""
-    minutes = duration / 60.0
-    return f"about {minutes:.0f} minutes" if minutes < 90.0 else f"about {minutes / 60.0:.1f} hours"
+    minutes = max(1, round(duration / 60.0))
+    return f"about {several(minutes, 'minute')}" if minutes < 90 else f"about {minutes / 60.0:.1f} hours"
 
 
 def _rollout(study: Compare, world: World, role: str) -> float:
