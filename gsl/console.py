@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
-from gsl.commandline.tables import LineTable, RichLiveTable, drawn, fitting
+from gsl.commandline.tables import LineTable, RichLiveTable, drawn, fitting, total
 from gsl.core.interruption import checkpoint
 
 if TYPE_CHECKING:
@@ -48,11 +48,11 @@ class Console:
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
         """Within, tables belong to a part of the work that has this name: progress, not results."""
-        self._part = name
+        before, self._part = self._part, name
         try:
             yield
         finally:
-            self._part = ""
+            self._part = before
 
     def status(self, text: str) -> None:
         """Say what is going on, on stderr."""
@@ -66,20 +66,21 @@ class Console:
         self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
     ) -> None:
         """Print a table of results on stdout, of a `part` on stderr; with JSON it is left to `result`."""
-        title = f"{self._part}: {title}" if self._part else title
+        title = self._titled(title)
         _log.info("%s", "\n".join([title, *("\t".join(map(str, row)) for row in [columns, *rows]), caption or ""]))
         if self.json:
             return
         above_live_table = self._live is not None and self._stdout.is_terminal
         place = self._stderr if above_live_table or self._part else self._stdout
         place.print(title, style="bold", markup=False, highlight=False, soft_wrap=True)
-        widths = fitting(columns, rows, place.width)
+        widths = fitting(columns, rows, place.width, leave_out=place.is_terminal)
+        if not place.is_terminal:
+            place.width = max(WIDTH_WITHOUT_TERMINAL, total(widths))
         place.print(drawn(columns, rows, widths=widths))
-        below = [caption] if caption else []
-        if left := columns[len(widths) :]:
-            below.insert(0, f"no room for {len(left)} more columns: {', '.join(left)}")
-        if below:
-            place.print("\n".join(below) + "\n", markup=False, highlight=False, soft_wrap=True)
+        left = columns[len(widths) :]
+        more = f"{len(left)} more in a wider window: {', '.join(left)}" if left else ""
+        if below := "\n".join(filter(None, [more, caption])):
+            place.print(below + "\n", markup=False, highlight=False, soft_wrap=True)
 
     def result(self, document: Mapping[str, Any], *, text: str = "") -> None:
         """Print the outcome: the document as JSON, or `text` for a person."""
@@ -119,6 +120,7 @@ class Console:
     @contextmanager
     def live_table(self, title: str, columns: Sequence[str]) -> Iterator[LiveTable]:
         """Show a growing table on a terminal, else each row as a line; the final table is for `table`."""
+        title = self._titled(title)
         if not self._stderr.is_terminal or self._live is not None:
             self._lines = LineTable(title, columns, self.status)
             try:
@@ -135,6 +137,9 @@ class Console:
                 yield self._live
             finally:
                 self._live = None
+
+    def _titled(self, title: str) -> str:
+        return f"{self._part}: {title}" if self._part else title
 
     @cached_property
     def _stdout(self) -> rich.console.Console:

@@ -2,8 +2,10 @@
 
 import json
 import logging
+from contextlib import suppress
 
 import pytest
+from rich.console import Console as RichConsole
 
 from gsl.commandline.tables import fitting
 from gsl.console import Console
@@ -83,8 +85,12 @@ def test_what_is_said_is_logged(caplog: pytest.LogCaptureFixture) -> None:
 
 def test_a_table_leaves_out_columns_that_there_is_no_room_for(capsys: pytest.CaptureFixture[str]) -> None:
     columns = [f"column_{k:05d}" for k in range(20)]
-    Console().table("t", ["name", *columns], [["a", *range(20)]])
-    heading, left_out = capsys.readouterr().out.split("no room for 8 more columns: ")
+    console = Console()
+    console.table("t", ["name", *columns], [["a", *range(20)]])
+    assert capsys.readouterr().out.split()[2:22] == columns  # a file has room for all
+    console._stdout = RichConsole(width=200, force_terminal=True, color_system=None)
+    console.table("t", ["name", *columns], [["a", *range(20)]])
+    heading, left_out = capsys.readouterr().out.split("8 more in a wider window: ")
     assert heading.split()[2:14] == columns[:12] and left_out.strip().split(", ") == columns[12:]
 
 
@@ -92,12 +98,24 @@ def test_words_of_a_table_stay_whole_where_there_is_room_for_some_columns() -> N
     widths = fitting(["name", "improvement [%]", "95 % interval"], [["gat", "3.6", "0.3 to 6.9"]], 34)
     assert widths == [4, 11, 9]
     assert fitting(["name", "improvement [%]"], [["gat", "3.6"]], 10) == [4]
+    assert fitting(["name", "improvement [%]"], [["gat", "3.6"]], 10, leave_out=False) == [4, 11]
+    assert fitting(["name", "took"], [["a/long/reference/to/copy", "1 min"]], 40) == [24, 5]  # whole
+    assert fitting(["name", "took"], [["a/long/reference/to/copy", "1 min"]], 30) == [18, 5]  # folded: all columns
+    assert (
+        fitting(["name"], [["漢字漢字"]], 40) == [8] and fitting(["name"], [], 40) == [4] and fitting([], [], 40) == []
+    )
 
 
 def test_tables_of_a_part_are_progress(capsys: pytest.CaptureFixture[str]) -> None:
     console = Console()
     with console.part("gat, trial 1"):
+        with suppress(KeyError), console.part("its second round"):
+            console.table("values", ["a"], [[1]])
+            raise KeyError
         console.table("errors", ["a"], [[1]])
+        with console.live_table("rounds", ["round"]) as rounds:
+            rounds.row(1)
     console.table("results", ["a"], [[1]])
     out, err = capsys.readouterr()
-    assert "gat, trial 1: errors" in err and "errors" not in out and "results" in out
+    assert "its second round: values" in err and "gat, trial 1: errors" in err and "gat, trial 1: rounds" in err
+    assert "errors" not in out and "results" in out

@@ -290,7 +290,7 @@ SETTINGS = {
     ),
     "an axis": (
         {"signals": {"action": "goal_{joint}", "position": "q_{joint}", "gyro": {"column": "g", "sign": {"X": -1}}}},
-        "mapping.signals.gyro.sign.X: is no axis; there is x, y, z",
+        "mapping.signals.gyro.sign.X: is no axis; did you mean x?",
     ),
     "one value by joint": (
         {

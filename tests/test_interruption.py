@@ -59,6 +59,24 @@ def test_a_stage_that_is_stopped_leaves_nothing(stage: str, stop: signal.Signals
     assert not (chain / "runs" / tmp_path.name).exists()
 
 
+def test_an_interruption_waits_until_a_library_is_imported() -> None:
+    """One within torch's import is an exception in its C++, which aborts the process (seen once)."""
+    importing = """
+import os, signal
+from gsl.core.interruption import held, listen
+listen()
+try:
+    with held():
+        os.kill(os.getpid(), signal.SIGINT)
+        print("imported")
+    print("went on")
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    done = subprocess.run([sys.executable, "-c", importing], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["imported", "interrupted"]
+
+
 def test_a_semaphore_that_an_interruption_leaves_is_nobodys_worry() -> None:
     """Its last thread can be stopped between removing it and saying so (seen once, on a busy machine)."""
     leaving = """

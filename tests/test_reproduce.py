@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest.mock import Mock
 
 import pytest
 from commands import done, gsl
@@ -72,7 +73,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     left_out += short if what in ("table4", "linear-walk", "worlds") else []
     left_out += ["study.iterate.aggregate=true"] if what == "table4" else []
     said = done("reproduce", what, *FEW, "study.iterate.task.duration=1.2", *left_out, folder=tmp_path)
-    assert "minutes from nothing" in said.err
+    assert "from nothing" in said.err
     folder = next((tmp_path / "runs").glob("*/reproduce"))
     trials = json.loads((folder / "trials.json").read_text())
     assert {one["method"] for one in trials} == set(KEPT[what])
@@ -128,6 +129,7 @@ class Silent:
 class Figure(NamedTuple):
     number: int
     value: float
+    contradiction = ""
 
 
 def test_a_ledger_only_grows(tmp_path: Path) -> None:
@@ -143,10 +145,10 @@ def test_a_ledger_only_grows(tmp_path: Path) -> None:
     assert after.take("a") and after.figures == [{"number": 1, "value": 1.0}, {"number": 2, "value": 3.0}]
     with pytest.raises(ArtifactError, match="is what this study writes"):
         Ledger(path, {"known": path}, Figure, Silent())
-    with pytest.raises(ArtifactError, match="recipe a has number 1; by its settings that is 2"):
+    with pytest.raises(ArtifactError, match=r"say number 2 says 1; leave it out"):
         Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent()).take("a", number=2)
     given.write_text(path.read_text().replace("3.0", '"fast"'))
-    with pytest.raises(ArtifactError, match="row 2: its value cannot be 'fast'"):
+    with pytest.raises(ArtifactError, match="row 2 has value 'fast': input should be a valid number"):
         Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent())
     given.write_text(path.read_text().replace("3.0", "NaN"))
     with pytest.raises(ArtifactError, match="NaN is no figure"):
@@ -163,16 +165,30 @@ def test_a_ledger_only_grows(tmp_path: Path) -> None:
         ({"improvement": 55.0}, "improvement 55.0, but start 0.2 and value 0.25"),
         ({"falls": 11}, "falls 11, episodes 10"),
         ({"number": -3}, "number -3"),
+        ({"start": 0.0}, "improvement 25.0, but start 0.0 and value 0.25"),
     ],
 )
 def test_figures_that_contradict_each_other_are_no_trial(more: dict[str, Any], problem: str, tmp_path: Path) -> None:
-    path = tmp_path / "trials.json"
+    path, given = tmp_path / "trials.json", tmp_path / "given.json"
     row = {**a_trial("gat", 1)._asdict(), "recipe": "a", "made_by": "b"}
-    path.write_text(json.dumps([row]))
-    assert Ledger(path, {}, Trial, Silent()).figures == []
-    path.write_text(json.dumps([{**row, **more}]))
+    given.write_text(json.dumps([row]))
+    assert Ledger(path, {"known": given}, Trial, Silent()).take("a", iteration=[1], method="gat")
+    given.write_text(json.dumps([{**row, **more}]))
     with pytest.raises(ArtifactError, match=f"row 1 contradicts itself: {problem}"):
-        Ledger(path, {}, Trial, Silent())
+        Ledger(tmp_path / "new.json", {"known": given}, Trial, Silent())
+
+
+def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
+    said: list[str] = []
+    given, console = tmp_path / "given.json", Mock(status=said.append)
+    given.write_text(json.dumps([{"number": 1, "value": 1.0, "recipe": "a", "made_by": "b"}]))
+    Ledger(tmp_path / "t.json", {}, Figure, console).announce(["a"])
+    for keys in (["a", "b"], ["b"]):
+        Ledger(tmp_path / "t.json", {"known": given}, Figure, console).announce(keys)
+    assert said == [
+        f"1 of this study's 2 results are in {given}",
+        f"none of this study's 1 results are in {given}: its trials have other settings, seeds or files",
+    ]
 
 
 def test_a_recipe_is_of_what_a_trial_comes_from(tmp_path: Path) -> None:
@@ -219,7 +235,19 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     assert all(one["error"] > 0.0 < one["bare"] for one in points[1:])
     assert points[1]["bare"] == points[2]["bare"]  # measured on the same trajectories
     assert (folder / "budget.png").stat().st_size > 10_000
-    assert "real trajectories" in said.out
+    assert "about " in said.err and "from nothing" in said.err
+    assert "gat, 4 trajectories, trial 1: grounded simulator against" in said.err
+    assert "grounded simulator against" not in said.out and "real trajectories collected" in said.out
+
+
+@pytest.mark.parametrize(
+    ("study", "of", "names"), [("budget", "", ("gat", "sgat")), ("fig5", "study.", OFFERED["fig5"])]
+)
+def test_a_study_of_nothing_is_refused(study: str, of: str, names: tuple[str, ...], tmp_path: Path) -> None:
+    refused = gsl("reproduce", study, "preset=toy", *(f"~{of}methods.{name}" for name in names), folder=tmp_path)
+    assert refused.lines == [f"gsl reproduce {study}: {of}methods: none is left; leave one in"]
+    misspelt = gsl("reproduce", study, "preset=toy", f"~{of}methods.gatt", folder=tmp_path)
+    assert "did you mean" in misspelt.lines[0] and misspelt.code == 2
 
 
 def a_trial(method: str, number: int, **more: Any) -> Trial:
@@ -279,6 +307,7 @@ def test_table_3_counts_where_chains_stop() -> None:
     rows = [line for line in text.splitlines() if line.startswith("| s | gat")]
     assert ["2 of 2" in row for row in rows[:3]] == [False, False, True]
     assert "43.3" in rows[1]
+    assert "| 0 of 2 | 2 of 2 | 30.0 |" in rows[2]
     assert "| 30.0 |" in rows[1] and "| 26.0 |" in rows[2] and "| 2 of 2 | 30.0 |" in rows[2]
 
 
@@ -324,6 +353,8 @@ def test_figure_5_is_told_in_degrees() -> None:
     assert "| none | 10.5 | 4.1 to 16.9 |  | 0.5 | 0.5 to 0.5 | 2 of 2 |" in lines[-2]
 
 
-@pytest.mark.parametrize(("seconds", "text"), [(600.0, "about 10 minutes"), (36000.0, "about 10.0 hours")])
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(20.0, "about 1 minute"), (600.0, "about 10 minutes"), (36000.0, "about 10.0 hours")]
+)
 def test_durations_are_told_as_people_do(seconds: float, text: str) -> None:
     assert told(seconds) == text

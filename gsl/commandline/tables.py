@@ -90,25 +90,33 @@ def drawn(
     return table
 
 
-def fitting(columns: Sequence[str], rows: Sequence[Sequence[object]], width: int) -> list[int]:
-    """Return the widths of the first columns that a place of so many characters has room for: one at least.
+def fitting(
+    columns: Sequence[str], rows: Sequence[Sequence[object]], width: int, *, leave_out: bool = True
+) -> list[int]:
+    """Return the widths of the columns that a place of so many characters has room for, from the first, one at least.
 
-    Words stay whole but for those that are longer than `WORD`, such as paths; names in the first column are not folded
-    where they leave two thirds to the others.
+    Words stay whole but for those that are longer than `WORD`, such as paths. What stands in the first column stays
+    whole as well, if there is room for all columns nevertheless; columns are left out last, or not at all.
     """
+    from rich.cells import cell_len
+
     cells = [[str(row[index]) for row in [columns, *rows]] for index in range(len(columns))]
-    widths = [max(map(len, column)) for column in cells]
-    words = [max(len(word) for cell in column for word in cell.split() or [""]) for column in cells]
-    least = [min(widths[0], max(WORD, width // 3)), *(min(word, WORD) for word in words[1:])]
-    while len(least) > 1 and sum(least) > width - EDGE - APART * len(least):
+    widths = [max(map(cell_len, column)) for column in cells]
+    words = [max(cell_len(word) for cell in column for word in cell.split() or [""]) for column in cells]
+    least = [*widths[:1], *(min(word, WORD) for word in words[1:])]
+    if total(least) > width:
+        least[:1] = [min(wide, max(WORD, width // 3)) for wide in widths[:1]]
+    while leave_out and len(least) > 1 and total(least) > width:
         least.pop()
     widths = widths[: len(least)]
-    for _ in range(sum(widths) - (width - EDGE - APART * len(least))):
-        foldable = [index for index, (wide, few) in enumerate(zip(widths, least, strict=True)) if wide > few]
-        if not foldable:
-            break
+    while total(widths) > width and (foldable := [k for k, few in enumerate(least) if widths[k] > few]):
         widths[max(foldable, key=widths.__getitem__)] -= 1
     return widths
+
+
+def total(widths: Sequence[int]) -> int:
+    """Return how wide a table with such columns is drawn."""
+    return EDGE + sum(widths) + APART * len(widths)
 
 
 def _is_number(cell: object) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 
 ECHO = 2.0  # seconds in which the same wish may arrive again, as from `timeout`, which tells the process and its group
 
-_asked = False
+_asked = _held = False
 _heard = -ECHO
 
 
@@ -36,6 +36,18 @@ def checkpoint() -> None:
     """Raise KeyboardInterrupt if this process was interrupted and is still running."""
     if _asked:
         raise KeyboardInterrupt
+
+
+@contextmanager
+def held() -> Iterator[None]:
+    """Let an interruption wait for the end of the block: one in the middle of an import of torch aborts the process."""
+    global _held
+    _held = True
+    try:
+        yield
+    finally:
+        _held = False
+    checkpoint()
 
 
 @contextmanager
@@ -65,4 +77,5 @@ def _interrupt(number: int, frame: Any) -> None:
     if time.monotonic() - _heard < ECHO:
         return
     _asked, _heard = True, time.monotonic()
-    raise KeyboardInterrupt
+    if not _held:
+        raise KeyboardInterrupt

@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from gsl.core.interruption import held
 from gsl.models.config import ModelConfig
 from gsl.models.head import POINT, Head
 from gsl.models.linear import fit_linear, with_spread
@@ -34,7 +35,8 @@ def fit_network(
         inputs, targets = training if head.draws else both
         network = fit_linear(inputs, targets, ridge=config.ridge)
         return with_spread(network, inputs, targets) if head.draws else network
-    from gsl.models.fitting import fit_mlp
+    with held():
+        from gsl.models.fitting import fit_mlp
 
     return fit_mlp(training, validation, config, seed=seed, head=head)
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from gsl.core.interruption import held
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.optimizers.optimizer import Simulator
@@ -66,10 +67,11 @@ class Trpo:
         if not isinstance(policy, Mlp):
             raise ConfigError("optimizer", "TRPO improves a policy=mlp; cma_es is for the others")
         try:
-            import sb3_contrib
-            import torch
-            from stable_baselines3.common.logger import Logger
-            from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+            with held():
+                import sb3_contrib
+                import torch
+                from stable_baselines3.common.logger import Logger
+                from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
         except ImportError as error:
             raise ConfigError("optimizer", f"TRPO needs gsl[rl]: pip install 'gsl[rl]' ({error})") from error
         threads = torch.get_num_threads()

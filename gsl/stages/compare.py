@@ -56,6 +56,16 @@ class Compare:
     rank: Annotated[bool, setting("set a fixed set of policies in simulation against real")] = False
     known: Known = None
 
+    def __post_init__(self) -> None:
+        """Refuse a study of nothing.
+
+        Raises:
+            ConfigError: No method or no world is left.
+        """
+        for name in ("methods", "worlds"):
+            if not getattr(self, name):
+                raise ConfigError(name, "none is left; leave one in")
+
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
         return known_parent("known", self.known, DATA)
@@ -70,8 +80,6 @@ class Compare:
 
     def carried_out(self, folder: Path, console: Any) -> tuple[list[Trial], str]:
         """Return all trials, built beside `folder` and told as they end, and who made them; write them down."""
-        if not self.methods or not self.worlds:
-            raise ConfigError("methods" if self.worlds else "worlds", "none is left; leave one in")
         for grounding in self.methods.values():
             self.iterate.chain.check(grounding)
         check_aggregate(self.iterate, self.methods.values(), "iterate.aggregate")
@@ -83,17 +91,15 @@ class Compare:
         ledger = Ledger(home / DATA, self.parents(), Trial, console)
         cells = product(range(1, self.trials + 1), self.methods, simulators, self.worlds)
         keys = {
-            (number, cell := Cell(simulator, world, method, 1)): recipe(
-                *(self.iterate, number, cell, simulators[simulator]),
-                *(self.worlds[world], self.methods[method], self.rank),
-            )
-            for number, method, simulator, world in cells
+            (number, Cell(sim, world, method, 1)): self._recipe(number, Cell(sim, world, method, 1), simulators[sim])
+            for number, method, sim, world in cells
         }
         ledger.announce(keys.values())
         for (number, cell), key in keys.items():
-            where = " ".join(filter(None, (cell.simulator, cell.world)))
-            if ledger.take(key, number=number, simulator=cell.simulator, world=cell.world, method=cell.method):
+            of = {"number": number, "simulator": cell.simulator, "world": cell.world, "method": cell.method}
+            if ledger.take(key, **of, iteration=list(range(1, self.iterate.iterations + 1))):
                 continue
+            where = " ".join(filter(None, (cell.simulator, cell.world)))
             trials, part = [], f"{where}, {cell.method}, trial {number}"
             with console.part(part):
                 for trial in self._trial(home, simulators[cell.simulator], cell, number, console):
@@ -101,6 +107,10 @@ class Compare:
                     console.status(f"{part}: {trial.told(Unit.of(self.iterate.task))}")
             ledger.add(key, [trial._asdict() for trial in trials])
         return [Trial(**row) for row in ledger.figures], ledger.close(folder / DATA)
+
+    def _recipe(self, number: int, cell: Cell, sim: World) -> str:
+        world, method = self.worlds[cell.world], self.methods[cell.method]
+        return recipe(self.iterate, number, cell, sim, world, method, self.rank)
 
     def _trial(self, home: Path, sim: World, cell: Cell, number: int, console: Any) -> Iterator[Trial]:
         """Yield a trial iteration by iteration."""

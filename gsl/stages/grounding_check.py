@@ -77,13 +77,15 @@ class GroundingReport:
 
     @property
     def remark(self) -> str:
-        """What is farther from the real robot than without grounding, though its joints, which decide, are not."""
-        sims = self.deviations.get(OFF) or self.deviations.get(PI0)
-        if not sims or self.problems:
+        """What of the body is farther from the real robot than without grounding off π0; it decides nothing."""
+        if OFF not in self.deviations:
             return ""
-        with_it, without = (self._errors(sims[name][TICKS]) for name in (GROUNDED, BARE))
-        farther = [name for name in BODY if with_it[BODY[name]] > without[BODY[name]]]
-        return f"its joints are nearer, the body's {' and '.join(farther)} farther" if farther else ""
+        grounded, bare = (self._errors(self.deviations[OFF][name][TICKS]) for name in (GROUNDED, BARE))
+        body = {"pitch": "pitch_deg", "place": "forward_mm"}
+        farther = [name for name, error in body.items() if grounded[error] > bare[error]]
+        if not farther:
+            return ""
+        return f"after {TICKS} ticks the body's {' and '.join(farther)} off π0 is farther from the real one"
 
     @property
     def acceptable(self) -> bool:
@@ -107,6 +109,7 @@ class GroundingReport:
             "pi0": pi0,
             "acceptable": self.acceptable,
             "problems": self.problems,
+            "remark": self.remark,
         }
 
     def by_joint(self) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
@@ -136,7 +139,6 @@ class GroundingReport:
         }
 
 
-BODY = {"pitch": "pitch_deg", "place": "forward_mm"}
 TITLES = (
     *("trajectories", "simulator", "joints 1 tick [°]", "pitch 1 tick [°]", "forward 1 tick [mm]"),
     *("joints 0.2 s [°]", "pitch 0.2 s [°]", "forward 0.2 s [mm]"),

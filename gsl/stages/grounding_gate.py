@@ -150,7 +150,7 @@ class Gate:
             problem = "the real robot does not tell where its base is, so no simulation can start from its trajectories"
             self.console.status(f"warning: {problem}: of the grounding only the falls of π0 in it were checked")
         if report.remark:
-            self.console.status(f"{report.remark} after 0.2 s: look at what the search returns")
+            self.console.status(f"{report.remark}, whatever its joints are: look at what the search returns")
         if report.reach:
             self.console.status(report.reach.told)
         self._judge(report.problems, "Collect more data")

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
-
-from pydantic import TypeAdapter, ValidationError
+from typing import Annotated, Any
 
 from gsl.core.described import described
 from gsl.core.setting import setting
 from gsl.errors import ArtifactError
+from gsl.stages.ledger_file import MADE_BY, RECIPE, Figures, read
 from gsl.storage.documents import text, write_json
 from gsl.storage.hashing import file_hash, sources_hash
 from gsl.storage.identity import WITHOUT_EFFECT
@@ -21,7 +19,6 @@ from gsl.storage.read_files import read_files
 from gsl.storage.references import resolve
 from gsl.storage.versions import commit
 
-RECIPE, MADE_BY = "recipe", "made_by"
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
 MADE = ("forward_model", "inverse_model", "diagnosis")  # of a grounding: names of what a trial makes itself
 NUMBER = ("number", "trial")  # what rows call their trial
@@ -64,19 +61,20 @@ class Ledger:
     The file only grows: trials of an earlier start stay until they are made anew.
 
     Raises:
-        ArtifactError: The file of earlier trials holds something else, a trial twice, or is the one to be written.
+        ArtifactError: The file of earlier trials holds something else, a trial twice, figures that cannot be, or is the
+            one to be written.
     """
 
-    def __init__(self, path: Path, known: Mapping[str, Path], kind: type[NamedTuple], console: Any) -> None:
+    def __init__(self, path: Path, known: Mapping[str, Path], kind: type[Figures], console: Any) -> None:
         self._path, self._console = path, console
         self._done: dict[str, list[dict[str, Any]]] = {}
-        self._kept = _read(path, kind) if path.is_file() else {}
+        self._kept = read(path, kind) if path.is_file() else {}
         self._known: dict[str, list[dict[str, Any]]] = {}
         for file in known.values():
             if path.exists() and file.samefile(path):
                 raise ArtifactError(file, "is what this study writes; copy it, or give the study another name=")
-            self._known = _read(file, kind)
-        self._from = next(iter(known.values()), path)
+            self._known = read(file, kind)
+        self._from = next(iter(known.values()), None)
         self._me = _made_by()
 
     @property
@@ -86,25 +84,31 @@ class Ledger:
 
     def announce(self, keys: Collection[str]) -> None:
         """Say how many of a study's trials are known, if a file of such was given."""
-        if not self._known:
+        if self._from is None:
             return
         known = sum(key in self._known for key in keys)
-        why = "" if known else "; those that are have other settings or seeds"
-        self._console.status(f"{known} of {len(keys)} trials are in {self._from}{why}")
+        why = "" if known else ": its trials have other settings, seeds or files"
+        self._console.status(f"{known or 'none'} of this study's {len(keys)} results are in {self._from}{why}")
 
     def take(self, key: str, **of: Any) -> bool:
         """Make a trial that is known one of this study; say whether it is known.
 
+        Args:
+            key: Its recipe.
+            of: What its rows have to say by field: the same in each, or in a list one for each row.
+
         Raises:
-            ArtifactError: Its rows say that they are of something else than `of`, by field.
+            ArtifactError: They say something else.
         """
         if key not in self._known:
             return False
-        for row in self._known[key]:
-            if wrong := [name for name, value in of.items() if row[name] != value]:
-                problem = f"the trial of recipe {key} has {wrong[0]} {row[wrong[0]]!r}; by its settings that is"
-                raise ArtifactError(self._from, f"{problem} {of[wrong[0]]!r}")
-        self._write(key, self._known[key])
+        rows = self._known[key]
+        for name, value in of.items():
+            right = value if isinstance(value, list) else [value] * len(rows)
+            if (told := [row[name] for row in rows]) != right:
+                problem = f"a trial whose settings (recipe {key}) say {name} {_told(right)} says {_told(told)}"
+                raise ArtifactError(self._from or self._path, f"{problem}; leave it out")
+        self._write(key, rows)
         return True
 
     def add(self, key: str, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -138,35 +142,8 @@ def _effective(told: Any) -> Any:
     return [_effective(value) for value in told] if isinstance(told, list) else told
 
 
-def _read(path: Path, kind: type[NamedTuple]) -> dict[str, list[dict[str, Any]]]:
-    """Return the rows of each trial; a `kind` may have a property that tells a `contradiction`."""
-    try:
-        rows = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_figure)
-    except (ValueError, OSError) as error:
-        raise ArtifactError(path, f"is no file of trials: {error}") from error
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise ArtifactError(path, "is no file of trials: not a list of rows")
-    wanted, found, last = {*kind._fields, RECIPE, MADE_BY}, dict[str, list[dict[str, Any]]](), None
-    adapter = TypeAdapter(kind)
-    for index, row in enumerate(rows, start=1):
-        if wrong := sorted(wanted ^ row.keys()):
-            raise ArtifactError(path, f"row {index} is no trial of such a study: {', '.join(wrong)} lacking or unknown")
-        try:
-            one = adapter.validate_python({name: row[name] for name in kind._fields}, strict=True)
-        except ValidationError as error:
-            name, *_ = error.errors()[0]["loc"]
-            raise ArtifactError(path, f"row {index}: its {name} cannot be {row[str(name)]!r}") from error
-        if problem := getattr(one, "contradiction", ""):
-            raise ArtifactError(path, f"row {index} contradicts itself: {problem}")
-        if row[RECIPE] in found and row[RECIPE] != last:
-            raise ArtifactError(path, f"row {index} is of a trial that the file has already; leave one of the two out")
-        last = row[RECIPE]
-        found.setdefault(last, []).append(row)
-    return found
-
-
-def _no_figure(name: str) -> None:
-    raise ValueError(f"{name} is no figure")
+def _told(values: Sequence[Any]) -> str:
+    return ", ".join(map(str, dict.fromkeys(values))) if len(set(values)) == 1 else ", ".join(map(str, values))
 
 
 def _number(row: Mapping[str, Any]) -> int:

@@ -43,6 +43,11 @@ class Point(NamedTuple):
     promised: float | None
 
     @property
+    def contradiction(self) -> str:
+        """What cannot be, of figures that a file told."""
+        return "" if self.trial > 0 < self.round else f"trial {self.trial}, round {self.round}"
+
+    @property
     def place(self) -> Place:
         """Where it was measured."""
         return Place(self.world, self.noise, self.round)

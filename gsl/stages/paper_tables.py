@@ -32,15 +32,16 @@ AT_THE_END, ON_AVERAGE, ABOVE = "distance [deg]", "mean distance [deg]", "above 
 class Table3:
     """Speed after each iteration, with either simulator; all are run, and told is what an `iterate` would return.
 
-    That stops after an iteration whose gain is not sure, and returns the policy before it, or the first if it gained.
+    With `accept=true` it stops after an iteration whose gain is not sure, and returns the policy before it, or the
+    first if it gained; without, it ends at a grounding that is refused.
     """
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
         titles = (
             *("simulator", "grounding", "iteration", f"in real [{task.unit}]", "95 % interval", "improvement [%]"),
-            *("95 % interval", "falls", "stopped by then", f"where they stop [{task.unit}]", "real episodes"),
-            *(f"paper [{task.unit}]", "paper: improvement [%]"),
+            *("95 % interval", "falls", "refused", "stopped by then", f"where they stop [{task.unit}]"),
+            *("real episodes", f"paper [{task.unit}]", "paper: improvement [%]"),
         )
         rows = []
         for one in summaries(trials):
@@ -54,6 +55,7 @@ class Table3:
                 (one.simulator, one.method, str(one.iteration), *value_cells(one.value, task), *improvement_cells(one))
                 + (
                     str(one.falls),
+                    f"{one.refused} of {one.trials}",
                     f"{stops} of {one.trials}",
                     value_cells(stopped, task)[0],
                     f"{one.real_episodes:.0f}",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -56,6 +57,11 @@ class Point(NamedTuple):
     error: float | None
     bare: float | None
 
+    @property
+    def contradiction(self) -> str:
+        """What cannot be, of figures that a file told."""
+        return "" if self.trial > 0 <= self.trajectories else f"trial {self.trial}, trajectories {self.trajectories}"
+
 
 @component
 class Budget:
@@ -69,6 +75,15 @@ class Budget:
     trials: Annotated[int, setting("trials of each", ge=1)]
     known: Known = None
 
+    def __post_init__(self) -> None:
+        """Refuse a study of nothing.
+
+        Raises:
+            ConfigError: No method is left.
+        """
+        if not self.methods:
+            raise ConfigError("methods", "none is left; leave one in")
+
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
         return known_parent("known", self.known, DATA)
@@ -77,12 +92,12 @@ class Budget:
         """Run all trials, write the points, the table and the figure.
 
         Raises:
-            ConfigError: A grounding learns nothing from trajectories.
+            ConfigError: A grounding learns nothing from trajectories, or the optimizer is no search.
         """
         for name, grounding in self.methods.items():
             if not learned(grounding):
                 raise ConfigError(f"methods.{name}", "learns nothing from real trajectories; take gat or sgat")
-        console.status(f"{told(self._seconds)} from nothing; a study that was stopped goes on where it was")
+        console.status(f"{told(self._seconds())} from nothing; a study that was stopped goes on where it was")
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
         keys = {number: recipe(replace(self, trials=1, known=None), number) for number in range(1, self.trials + 1)}
@@ -94,15 +109,12 @@ class Budget:
         self._told(folder, points, ledger.close(folder / DATA))
         return {"points": len(points)}
 
-    @property
     def _seconds(self) -> float:
-        """An estimate of the study's duration [s]."""
+        """Return an estimate of the study's duration [s]."""
         study = Compare(self.iterate, {"real": self.iterate.real}, {NONE: NoGrounding()}, self.trials)
-        learning = [
-            replace(study, methods=self.methods, iterate=replace(self.iterate, budget=self._budget(count)))
-            for count in self.budgets
-        ]
-        return sum(map(seconds, [study, *learning]))
+        usual = replace(self.iterate, budget=self._budget(sum(self.budgets) // len(self.budgets)))
+        learning = replace(study, methods=self.methods, iterate=usual)
+        return seconds(study, "iterate") + len(self.budgets) * seconds(learning, "iterate")
 
     def _budget(self, count: int) -> ChainBudget:
         """Return the effort with so many real trajectories to learn from."""
@@ -112,9 +124,10 @@ class Budget:
     def _trial(self, home: Path, number: int, console: Any) -> Iterator[Point]:
         name = f"trial_{number:02d}"
         yield self._ungrounded(home / NONE / name, number, console)
-        for count in self.budgets:
-            for method in self.methods:
-                yield self._point(home / method / f"real_{count:03d}" / name, method, count, number, console)
+        for count, method in product(self.budgets, self.methods):
+            with console.part(f"{method}, {count} trajectories, trial {number}"):
+                point = self._point(home / method / f"real_{count:03d}" / name, method, count, number, console)
+            yield point
 
     def _point(self, place: Path, method: str, count: int, number: int, console: Any) -> Point:
         chain = replace(self.iterate.chain, budget=self._budget(count), accept=True)

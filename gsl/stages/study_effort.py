@@ -22,15 +22,15 @@ APART = 25.0  # of a learned grounding: fits and checks [s]
 DIAGNOSED = {"diagnose": 7.5, "identify": 2.0}  # of a second of motion in the air, on two cores [s]
 
 
-def seconds(study: Compare) -> float:
+def seconds(study: Compare, where: str = "study.iterate") -> float:
     """Return an estimate of a study's duration from nothing [s], good to a factor of two or so.
 
     Raises:
-        ConfigError: The optimizer is no search.
+        ConfigError: The optimizer is no search; `where` are the settings that it is one of.
     """
     iterate, budget = study.iterate, study.iterate.budget
     if not isinstance(iterate.optimizer, CmaEs):
-        raise ConfigError("study.iterate.optimizer", "studies of robots search: take cma_es")
+        raise ConfigError(f"{where}.optimizer", "studies of robots search: take cma_es")
     workers = threads(iterate.workers)
     sims = study.simulators or {"": iterate.sim}
     real = sum(_rollout(study, world, REAL) for world in study.worlds.values()) / len(study.worlds)

@@ -132,8 +132,8 @@ class Trial(NamedTuple):
                 return f"{few} {less}, {many} {more}"
         if not 0 <= self.falls <= self.episodes:
             return f"falls {self.falls}, episodes {self.episodes}"
-        gain = self.improvement
-        if gain is not None and not math.isclose(gain, _improvement(self.start, self.value), abs_tol=1e-6):
+        right = _improvement(self.start, self.value) if self.start > 0.0 else math.nan
+        if self.improvement is not None and not math.isclose(self.improvement, right, abs_tol=1e-6):
             return f"improvement {self.improvement}, but start {self.start} and value {self.value}"
         return "" if self.number > 0 else f"number {self.number}"
 

@@ -1,0 +1,67 @@
+"""The file of a study's trials: what stands in it is checked before any of it is believed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from pydantic import TypeAdapter, ValidationError
+
+from gsl.errors import ArtifactError
+
+RECIPE, MADE_BY = "recipe", "made_by"
+
+
+class Figures(Protocol):
+    """What a row holds besides the trial's recipe and who made it: a named tuple of figures."""
+
+    @property
+    def contradiction(self) -> str:
+        """What cannot be, in words; nothing if the figures fit together."""
+
+
+def read(path: Path, kind: type[Figures]) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows of each trial, by recipe.
+
+    Raises:
+        ArtifactError: The file holds something else, a trial twice, or figures that cannot be.
+    """
+    adapter, found, last = TypeAdapter[Figures](kind), dict[str, list[dict[str, Any]]](), None
+    for index, row in enumerate(_parsed(path), start=1):
+        if problem := _problem(row, adapter, tuple(kind.__annotations__)):
+            raise ArtifactError(path, f"row {index} {problem}")
+        if row[RECIPE] in found and row[RECIPE] != last:
+            raise ArtifactError(path, f"row {index} is of a trial that the file has already; leave one of the two out")
+        last = row[RECIPE]
+        found.setdefault(last, []).append(row)
+    return found
+
+
+def _parsed(path: Path) -> list[dict[str, Any]]:
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_figure)
+    except (ValueError, OSError) as error:
+        raise ArtifactError(path, f"is no file of trials: {error}") from error
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise ArtifactError(path, "is no file of trials: not a list of rows")
+    return rows
+
+
+def _problem(row: Mapping[str, Any], adapter: TypeAdapter[Figures], fields: Sequence[str]) -> str:
+    if wrong := sorted({*fields, RECIPE, MADE_BY} ^ row.keys()):
+        return f"is no trial of such a study: {', '.join(wrong)} lacking or unknown"
+    if odd := [name for name in (RECIPE, MADE_BY) if not isinstance(row[name], str)]:
+        return f"has {odd[0]} {row[odd[0]]!r}: that has to be text"
+    try:
+        figures = adapter.validate_python({name: row[name] for name in fields}, strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        return f"has {where} {first['input']!r}: {first['msg'].lower()}"
+    return f"contradicts itself: {figures.contradiction}" if figures.contradiction else ""
+
+
+def _no_figure(name: str) -> None:
+    raise ValueError(f"{name} is no figure")
