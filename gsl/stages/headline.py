@@ -80,7 +80,7 @@ def headline(artifact: Artifact) -> str:
 
 
 def gained(share: float | None) -> str:
-    """Return a gain as a share of π0's value [%], nothing where that may be nothing or is next to it."""
+    """Return a gain as a share of π0's value [%]; nothing without a share, or with more than `MANY`."""
     return "" if share is None or share > MANY else f"{100 * share:+.1f} %"
 
 
