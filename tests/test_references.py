@@ -63,6 +63,10 @@ def test_the_likely_name_is_suggested(runs: Path) -> None:
         resolve("quick_start", kind="optimize")
     with pytest.raises(ArtifactError, match="did you mean quick-start/optimize?"):
         resolve("quick-start/optimise")
+    with pytest.raises(ArtifactError, match="did you mean quick-start/optimize?"):
+        resolve("quikc-start/optimize")
+    with pytest.raises(ArtifactError, match="; gsl train-forward name=mine makes it$"):
+        resolve("mine/train_forward")
     with pytest.raises(ArtifactError, match="no such run"):
         resolve("anything", runs=Path("nowhere"))
     with pytest.raises(ArtifactError, match="empty"):

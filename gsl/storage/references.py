@@ -12,6 +12,14 @@ from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 
 RUNS = Path("runs")
+MAKERS = {
+    "collect_real": "collect",
+    "collect_sim": "collect role=sim",
+    "train_forward": "train-forward",
+    "train_inverse": "train-inverse",
+    "optimize": "optimize",
+}
+"""Commands that make an artifact of a run, by the name that it has there."""
 
 
 def resolve(reference: str | Path, *, kind: str | tuple[str, ...] | None = None, runs: Path = RUNS) -> Path:
@@ -81,10 +89,12 @@ def _place(reference: str, runs: Path) -> Path:
 
 
 def _alternatives(reference: str, runs: Path) -> str:
+    run, _, stage = reference.rpartition("/")
+    maker = f"; gsl {MAKERS[stage]} name={run} makes it" if run and stage in MAKERS else ""
     names = {path.name for path in runs.iterdir() if not path.name.startswith(".")} if runs.is_dir() else set()
     names |= {_named(one.folder, runs) for one in _artifacts(runs)}
-    close = difflib.get_close_matches(reference, sorted(names), n=1, cutoff=0.6)
-    return f", did you mean {close[0]}?" if close else ""
+    close = difflib.get_close_matches(reference, sorted(names), n=1, cutoff=0.85 if maker else 0.6)
+    return f", did you mean {close[0]}?" if close else maker
 
 
 def _artifacts(folder: Path) -> list[Artifact]:
