@@ -245,7 +245,7 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
 )
 def test_a_study_of_nothing_is_refused(study: str, of: str, names: tuple[str, ...], tmp_path: Path) -> None:
     refused = gsl("reproduce", study, "preset=toy", *(f"~{of}methods.{name}" for name in names), folder=tmp_path)
-    assert refused.lines == [f"gsl reproduce {study}: {of}methods: none is left; leave one in"]
+    assert refused.lines == [f"gsl reproduce {study}: {of}methods = {{}}: needs 1 at least"]
     misspelt = gsl("reproduce", study, "preset=toy", f"~{of}methods.gatt", folder=tmp_path)
     assert "did you mean" in misspelt.lines[0] and misspelt.code == 2
 

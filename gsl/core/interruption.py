@@ -42,12 +42,13 @@ def checkpoint() -> None:
 def held() -> Iterator[None]:
     """Let an interruption wait for the end of the block: one in the middle of an import of torch aborts the process."""
     global _held
-    _held = True
+    before, _held = _held, True
     try:
         yield
     finally:
-        _held = False
-    checkpoint()
+        _held = before
+    if not _held:
+        checkpoint()
 
 
 @contextmanager

@@ -23,6 +23,7 @@ _RULES = {
     "literal_error": "must be one of {expected}",
     "is_instance_of": "must be a {class}",
     "string_too_short": "must not be empty",
+    "too_short": "needs {min_length} at least",
     "truth_value": "must be a number",
     "missing": "has no value",
     "missing_argument": "has no value",

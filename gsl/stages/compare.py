@@ -10,7 +10,6 @@ from typing import Annotated, Any, ClassVar
 
 from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
-from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
@@ -47,24 +46,14 @@ class Compare:
     kind: ClassVar[str] = "compare"
 
     iterate: Annotated[Iterate, setting("what a trial is; its worlds and grounding are replaced")]
-    worlds: Annotated[Mapping[str, World], setting("the real worlds, by name")]
-    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name")]
+    worlds: Annotated[Mapping[str, World], setting("the real worlds, by name", min_length=1)]
+    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name", min_length=1)]
     trials: Annotated[int, setting("trials of each method", ge=1)]
     simulators: Annotated[
         Mapping[str, World] | None, setting("the simulators, by name; none for the one of iterate")
     ] = None
     rank: Annotated[bool, setting("set a fixed set of policies in simulation against real")] = False
     known: Known = None
-
-    def __post_init__(self) -> None:
-        """Refuse a study of nothing.
-
-        Raises:
-            ConfigError: No method or no world is left.
-        """
-        for name in ("methods", "worlds"):
-            if not getattr(self, name):
-                raise ConfigError(name, "none is left; leave one in")
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -89,10 +78,10 @@ class Compare:
         named = {f"simulators.{name}" if name else "iterate.sim": one for name, one in simulators.items()}
         try_out({**named, **{f"worlds.{name}": one for name, one in self.worlds.items()}})
         ledger = Ledger(home / DATA, self.parents(), Trial, console)
-        cells = product(range(1, self.trials + 1), self.methods, simulators, self.worlds)
+        cells = [Cell(sim, world, method, 1) for method, sim, world in product(self.methods, simulators, self.worlds)]
         keys = {
-            (number, Cell(sim, world, method, 1)): self._recipe(number, Cell(sim, world, method, 1), simulators[sim])
-            for number, method, sim, world in cells
+            (number, cell): self._recipe(number, cell, simulators[cell.simulator])
+            for number, cell in product(range(1, self.trials + 1), cells)
         }
         ledger.announce(keys.values())
         for (number, cell), key in keys.items():

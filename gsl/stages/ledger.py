@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -36,6 +37,12 @@ def recipe(*parts: Any) -> str:
     files = {name: file_hash(path) for name, path in read_files(list(parts)).items()}
     told = text([_effective(described(list(parts))), files])
     return hashlib.sha256(told.encode()).hexdigest()[:DIGITS]
+
+
+def recipes(study: Any) -> dict[int, str]:
+    """Return by number the recipes of a study whose trials need all of its settings but how many they are."""
+    one = replace(study, trials=1, known=None)
+    return {number: recipe(one, number) for number in range(1, study.trials + 1)}
 
 
 def known_parent(role: str, known: str | None, name: str) -> dict[str, Path]:
@@ -143,7 +150,7 @@ def _effective(told: Any) -> Any:
 
 
 def _told(values: Sequence[Any]) -> str:
-    return ", ".join(map(str, dict.fromkeys(values))) if len(set(values)) == 1 else ", ".join(map(str, values))
+    return ", ".join(map(str, dict.fromkeys(values)))
 
 
 def _number(row: Mapping[str, Any]) -> int:

@@ -26,7 +26,7 @@ from gsl.stages.comparison_table import told as bounds
 from gsl.stages.grounding_check import BARE, GROUNDED, OFF, check
 from gsl.stages.grounding_gate import settled
 from gsl.stages.iterate import Iterate
-from gsl.stages.ledger import Known, Ledger, known_parent, recipe
+from gsl.stages.ledger import Known, Ledger, known_parent, recipes
 from gsl.stages.link import built
 from gsl.stages.rollout import Scenario
 from gsl.stages.study_effort import seconds, told
@@ -70,19 +70,12 @@ class Budget:
     kind: ClassVar[str] = "reproduce"
 
     iterate: Annotated[Iterate, setting("what a trial is; its grounding and real budget are replaced")]
-    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("learned groundings, by name")]
+    methods: Annotated[
+        Mapping[str, Grounding | ActionTransformation], setting("learned groundings, by name", min_length=1)
+    ]
     budgets: Annotated[tuple[int, ...], setting("real trajectories to learn from, the fewest first", min_length=1)]
     trials: Annotated[int, setting("trials of each", ge=1)]
     known: Known = None
-
-    def __post_init__(self) -> None:
-        """Refuse a study of nothing.
-
-        Raises:
-            ConfigError: No method is left.
-        """
-        if not self.methods:
-            raise ConfigError("methods", "none is left; leave one in")
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -100,7 +93,7 @@ class Budget:
         console.status(f"{told(self._seconds())} from nothing; a study that was stopped goes on where it was")
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
-        keys = {number: recipe(replace(self, trials=1, known=None), number) for number in range(1, self.trials + 1)}
+        keys = recipes(self)
         ledger.announce(keys.values())
         for number, key in keys.items():
             if not ledger.take(key, trial=number):

@@ -28,7 +28,7 @@ from gsl.stages.chain import Chain, round_seed
 from gsl.stages.evaluate import TABLE as EVALUATION
 from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate, check_aggregate
-from gsl.stages.ledger import Known, Ledger, known_parent, recipe
+from gsl.stages.ledger import Known, Ledger, known_parent, recipes
 from gsl.stages.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
@@ -50,9 +50,11 @@ class NoiseStudy:
     kind: ClassVar[str] = "reproduce"
 
     iterate: Annotated[Iterate, setting("what a trial is; its real world and grounding are replaced")]
-    worlds: Annotated[Mapping[str, GymnasiumWorld], setting("the real worlds, by name; their noise is replaced")]
+    worlds: Annotated[
+        Mapping[str, GymnasiumWorld], setting("the real worlds, by name; their noise is replaced", min_length=1)
+    ]
     noises: Annotated[tuple[float, ...], setting("standard deviations of the real worlds' noise", min_length=1)]
-    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name")]
+    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name", min_length=1)]
     further: Annotated[CmaEs | Trpo, setting("how it goes on from π0")]
     trials: Annotated[int, setting("trials of each method", ge=1)]
     sims: Annotated[Mapping[str, GymnasiumWorld], setting("simulators of worlds that have one of their own")] = field(
@@ -83,7 +85,7 @@ class NoiseStudy:
         try_out({"iterate.sim": self.iterate.sim, **named})
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
-        keys = {number: recipe(replace(self, trials=1, known=None), number) for number in range(1, self.trials + 1)}
+        keys = recipes(self)
         ledger.announce(keys.values())
         known = {number for number, key in keys.items() if ledger.take(key, trial=number)}
         jobs = [(number, home) for number in keys if number not in known]
