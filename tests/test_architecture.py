@@ -10,6 +10,7 @@ import pytest
 
 HOUSE = Path(__file__).parents[1] / "gsl"
 COMPONENTS = ("robots", "worlds", "tasks", "policies", "models", "grounding", "optimizers")
+PARTS = ("core", "effects", *COMPONENTS, "diagnosis", "runner", "storage", "report")
 MAY_IMPORT = {
     "core": (),
     "effects": ("core",),
@@ -19,7 +20,8 @@ MAY_IMPORT = {
     "storage": ("core", "effects", *COMPONENTS, "runner"),
     "report": ("core", "effects", *COMPONENTS),
     "blind": ("core", "effects", *COMPONENTS, "diagnosis", "storage", "report"),
-    "stages": ("core", "effects", *COMPONENTS, "diagnosis", "blind", "runner", "storage", "report"),
+    "stages": (*PARTS, "blind"),
+    "studies": (*PARTS, "stages"),
 }
 ANYWHERE = ("errors", "console")
 COMPOSING = ("composer", "config_errors", "known_settings", "multirun")

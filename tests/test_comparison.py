@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from gsl.stages.comparison import differences, orders, summaries
-from gsl.stages.comparison_table import markdown
 from gsl.stages.headline import Unit
-from gsl.stages.trial import Cell, Trial
+from gsl.studies.comparison import differences, orders, summaries
+from gsl.studies.comparison_table import markdown
+from gsl.studies.trial import Cell, Trial
 from gsl.tasks.own_reward import OwnReward
 from gsl.tasks.walk import Walk
 

@@ -33,7 +33,6 @@ from gsl.optimizers.trpo import Trpo
 from gsl.policies.mlp import Mlp
 from gsl.policies.policy import sized
 from gsl.stages.grounding_states import ValueReport, value_report
-from gsl.stages.noise_table import Point
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.simulator import GroundedSimulator
 from gsl.stages.train_states import forward_of_states, inverse_of_states
@@ -41,6 +40,7 @@ from gsl.stages.training import Parts
 from gsl.stages.uncharged import uncharged
 from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.storage.trajectories import read, write
+from gsl.studies.noise_table import Point
 from gsl.tasks.own_reward import OwnReward
 from gsl.worlds.control_cost import Charged, Quadratic
 from gsl.worlds.environments import own_module

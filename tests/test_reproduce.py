@@ -17,11 +17,11 @@ from gsl.errors import ArtifactError
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
-from gsl.stages.ledger import Ledger, recipe
-from gsl.stages.paper_table_2 import Table2
-from gsl.stages.paper_tables import Figure5, LinearWalkTable, Table3, Table4
-from gsl.stages.study_effort import told
-from gsl.stages.trial import Cell, Trial
+from gsl.studies.effort import told
+from gsl.studies.ledger import Ledger, recipe, recipes
+from gsl.studies.paper_table_2 import Table2
+from gsl.studies.paper_tables import Figure5, LinearWalkTable, Table3, Table4
+from gsl.studies.trial import Cell, Trial
 from gsl.tasks.arm import Arm
 from gsl.tasks.distance import Distance
 from gsl.tasks.walk import Walk
@@ -214,6 +214,14 @@ def test_the_committed_trials_are_still_known() -> None:
     cell = Cell("", "nao_worn", "none", 1)
     key = recipe(study.iterate, 1, cell, study.iterate.sim, study.worlds["nao_worn"], study.methods["none"], study.rank)
     assert key in {row["recipe"] for row in rows if (row["number"], row["method"]) == (1, "none")}
+
+
+@pytest.mark.parametrize("what", ["fig12", "fig13"])
+def test_the_committed_points_are_still_known(what: str) -> None:
+    with opened(None):
+        study, *_ = prepared(resolved(compose(f"reproduce_{what}", ["preset=study"])))
+    rows = json.loads((RESULTS / what / "points.json").read_text())
+    assert {row["trial"]: row["recipe"] for row in rows} == recipes(study)
 
 
 @pytest.mark.parametrize(

@@ -14,15 +14,15 @@ from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.stages.chain import Chain, round_seed
-from gsl.stages.comparison import summaries
-from gsl.stages.comparison_table import markdown
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.headline import Unit
 from gsl.stages.iterate import Iterate, check_aggregate
-from gsl.stages.ledger import Known, Ledger, known_parent, recipe
-from gsl.stages.trial import Cell, Trial
 from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
+from gsl.studies.comparison import summaries
+from gsl.studies.comparison_table import markdown
+from gsl.studies.ledger import Known, Ledger, known_parent, recipe
+from gsl.studies.trial import Cell, Trial
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import try_out
 from gsl.worlds.world import World

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from gsl.core.statistics import Interval
 from gsl.report.markdown import table
-from gsl.stages.comparison import Summary
-from gsl.stages.comparison_table import told
 from gsl.stages.headline import Unit
-from gsl.stages.trial import Trial
+from gsl.studies.comparison import Summary
+from gsl.studies.comparison_table import told
+from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import wilcoxon
 
 from gsl.core.statistics import Interval, mean_interval
-from gsl.stages.trial import Cell, Trial
+from gsl.studies.trial import Cell, Trial
 
 Figure = Callable[[Trial], Any]  # of a trial
 IMPROVEMENT: Figure = attrgetter("improvement")

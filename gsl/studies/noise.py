@@ -28,10 +28,10 @@ from gsl.stages.chain import Chain, round_seed
 from gsl.stages.evaluate import TABLE as EVALUATION
 from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate, check_aggregate
-from gsl.stages.ledger import Known, Ledger, known_parent, recipes
-from gsl.stages.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
+from gsl.studies.ledger import Known, Ledger, known_parent, recipes
+from gsl.studies.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import GymnasiumWorld, try_out
 from gsl.worlds.world import World

@@ -21,16 +21,16 @@ from gsl.report.markdown import table
 from gsl.stages.chain import Budget as ChainBudget
 from gsl.stages.collect import FILE as TRAJECTORIES
 from gsl.stages.collect import Collect
-from gsl.stages.compare import Compare
-from gsl.stages.comparison_table import told as bounds
 from gsl.stages.grounding_check import BARE, GROUNDED, OFF, check
 from gsl.stages.grounding_gate import settled
 from gsl.stages.iterate import Iterate
-from gsl.stages.ledger import Known, Ledger, known_parent, recipes
 from gsl.stages.link import built
 from gsl.stages.rollout import Scenario
-from gsl.stages.study_effort import seconds, told
 from gsl.storage.trajectories import read
+from gsl.studies.compare import Compare
+from gsl.studies.comparison_table import told as bounds
+from gsl.studies.effort import seconds, told
+from gsl.studies.ledger import Known, Ledger, known_parent, recipes
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.external import asking
 

@@ -15,10 +15,10 @@ import numpy as np
 from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval, wilson
 from gsl.report.markdown import table
-from gsl.stages.comparison import differences, summaries
-from gsl.stages.comparison_table import told
-from gsl.stages.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, value_cells, worth
-from gsl.stages.trial import Trial
+from gsl.studies.comparison import differences, summaries
+from gsl.studies.comparison_table import told
+from gsl.studies.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, value_cells, worth
+from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
 
 TABLE_3 = {1: ("26.3 and 26.9", "34.6 and 37.8"), 2: ("28.0", "43.3")}  # cm/s, %; SimSpark and Gazebo as simulators

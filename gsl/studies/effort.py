@@ -8,11 +8,11 @@ from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
-from gsl.stages.compare import Compare
 from gsl.stages.headline import several
 from gsl.stages.population import threads
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.values import Values
+from gsl.studies.compare import Compare
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.world import World
 

@@ -12,13 +12,13 @@ from typing import Annotated, Any
 from gsl.core.described import described
 from gsl.core.setting import setting
 from gsl.errors import ArtifactError
-from gsl.stages.ledger_file import MADE_BY, RECIPE, Figures, read
 from gsl.storage.documents import text, write_json
 from gsl.storage.hashing import file_hash, sources_hash
 from gsl.storage.identity import WITHOUT_EFFECT
 from gsl.storage.read_files import read_files
 from gsl.storage.references import resolve
 from gsl.storage.versions import commit
+from gsl.studies.ledger_file import MADE_BY, RECIPE, Figures, read
 
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
 MADE = ("forward_model", "inverse_model", "diagnosis")  # of a grounding: names of what a trial makes itself

@@ -7,9 +7,9 @@ from operator import attrgetter
 
 from gsl.core.statistics import Interval
 from gsl.report.markdown import in_unit, table
-from gsl.stages.comparison import Summary, differences
 from gsl.stages.headline import Unit
-from gsl.stages.trial import Cell, Trial
+from gsl.studies.comparison import Summary, differences
+from gsl.studies.trial import Cell, Trial
 
 SHARE = Unit(name="%")
 BY_FALLS = ("stable winners", "falls in fresh episodes")

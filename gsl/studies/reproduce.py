@@ -13,13 +13,13 @@ from gsl.grounding.grounding import Grounding
 from gsl.optimizers.cma_es import CmaEs
 from gsl.report.style import EFFECTS, GAT, SGAT, UNINFORMED
 from gsl.report.trial_dots import Dots, trial_dots
-from gsl.stages.compare import DATA, TABLE, Compare
-from gsl.stages.comparison import summaries
 from gsl.stages.headline import several
-from gsl.stages.ledger import known_parent
-from gsl.stages.paper_cells import Drawn
-from gsl.stages.study_effort import seconds, told
-from gsl.stages.trial import Trial
+from gsl.studies.compare import DATA, TABLE, Compare
+from gsl.studies.comparison import summaries
+from gsl.studies.effort import seconds, told
+from gsl.studies.ledger import known_parent
+from gsl.studies.paper_cells import Drawn
+from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
 
 FIGURE = "trials.png"

@@ -1,0 +1,1 @@
+"""Studies: what many iterations come to, as the tables and figures of the paper."""
