@@ -89,7 +89,7 @@ def stage(name: str, summary: str) -> None:
 def _run(
     name: str, overrides: list[str], *, multirun: bool, cfg: Shown | None, config_dir: Path | None, json: bool
 ) -> None:
-    from gsl.config import run
+    from gsl.commandline.run import run
 
     show = cfg is not None
     code = run(name, overrides, multirun=multirun, cfg=show, config_dir=config_dir, json=json)

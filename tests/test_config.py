@@ -11,8 +11,8 @@ from example_stage import ExampleWorld
 from gsl.cli import call
 from gsl.commandline.composer import compose, configuration_folder, opened
 from gsl.commandline.multirun import job_level
-from gsl.config import build, prepared, resolved
-from gsl.core.described import described
+from gsl.config import prepared, resolved
+from gsl.core.described import described, rebuilt
 from gsl.errors import ConfigError
 
 CONF = Path(__file__).parent / "conf_example"
@@ -276,24 +276,28 @@ def test_every_option_of_ours_composes_and_builds(line: tuple[str, ...]) -> None
     with opened(None):
         stage, settings, _ = prepared(resolved(compose(command, choices)))
     assert stage.kind in (command.replace("-", "_"), command.partition("-")[0])
-    assert build(described(stage)) == stage
+    assert rebuilt(described(stage)) == stage
     assert not {"preset", "recipe", "name", "out"} & settings.keys()
 
 
 def test_a_saved_component_is_built_again() -> None:
     saved = {"_target_": "gsl.config.CommandSettings", "name": "mine"}
-    assert build(saved).name == "mine"
+    assert rebuilt(saved).name == "mine"
+
+
+def test_a_saved_text_is_no_reference() -> None:
+    text = "${oc.create:'{_target_: os.getcwd}'}"
+    assert rebuilt({"_target_": "gsl.config.CommandSettings", "name": text}).name == text
 
 
 @pytest.mark.parametrize(
     "saved",
     [
         {"_target_": "os.getcwd"},
-        {"_target_": "gsl.config.shlex.join", "split_command": []},
-        {"_target_": "gsl.config.build", "mapping": {}, "trust": True},
+        {"_target_": "gsl.config.inspect.isclass", "object": 3},
+        {"_target_": "gsl.config.prepared", "config": {}},
         {"_target_": "gsl.config.CommandSettings", "name": {"_target_": "os.getcwd"}},
         {"_target_": "gsl.config.CommandSettings", "name": [{"_target_": "os.getcwd"}]},
-        {"_target_": "gsl.config.CommandSettings", "name": "${oc.create:'{_target_: os.getcwd}'}"},
         {"_target_": "${oc.env:HOME}"},
         {"_target_": "gsl.no_such.Thing"},
         {"_target_": 3},
@@ -301,11 +305,11 @@ def test_a_saved_component_is_built_again() -> None:
 )
 def test_a_saved_component_names_classes_of_gsl_and_plain_values_only(saved: dict[str, object]) -> None:
     with pytest.raises(ConfigError):
-        build(saved)
+        rebuilt(saved)
 
 
 def test_a_saved_component_of_the_users_own_needs_trust() -> None:
     saved = {"_target_": "example_stage.ExampleWorld", "control_period": 0.02}
     with pytest.raises(ConfigError, match="trust=true"):
-        build(saved)
-    assert build(saved, trust=True) == ExampleWorld(control_period=0.02)
+        rebuilt(saved)
+    assert rebuilt(saved, trust=True) == ExampleWorld(control_period=0.02)

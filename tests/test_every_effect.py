@@ -9,7 +9,8 @@ import pytest
 from bodies import STANCE, followed, held, walked
 
 from gsl.commandline.composer import compose, opened
-from gsl.config import build, resolved
+from gsl.config import resolved
+from gsl.core.described import rebuilt
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import Setting, settings_of
 from gsl.effects.effect import KINDS, applied, built, effect_class, names
@@ -62,7 +63,7 @@ def from_command_line(name: str, entry: dict[str, Any]) -> BulletWorld:
     where = [f"world.floating={str(on_ground).lower()}", "world.settle=0.1", "world.start_noise=0"]
     with opened(None):
         config = resolved(compose("collect", ["world=nao_ideal", *where, *said]))
-    made: BulletWorld = build(config["world"])
+    made: BulletWorld = rebuilt(config["world"])
     return made
 
 

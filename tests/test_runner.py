@@ -13,8 +13,7 @@ import pytest
 from omegaconf import OmegaConf
 from robots_elsewhere import requested, run
 
-from gsl.config import build
-from gsl.core.described import described
+from gsl.core.described import described, rebuilt
 from gsl.core.seeds import grounding_generator
 from gsl.errors import ArtifactError, ConfigError, GslError
 from gsl.grounding.ane import ActionNoise
@@ -60,7 +59,7 @@ print(json.dumps({"acted": told, "strange": strange}))
 def _policy(name: str) -> Policy:
     if name == "excitation":
         return Excitation(robot="nao", motions=("steps_large", "chirp"), duration=1.5)
-    return build(OmegaConf.to_container(OmegaConf.load(CONF / f"policy/{name}.yaml")))
+    return rebuilt(OmegaConf.to_container(OmegaConf.load(CONF / f"policy/{name}.yaml")))
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])

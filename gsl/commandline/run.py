@@ -1,0 +1,60 @@
+"""One command, or the jobs of a multirun: from its overrides to an exit code."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from omegaconf import OmegaConf
+
+from gsl.commandline.composer import compose, opened
+from gsl.commandline.multirun import run_jobs
+from gsl.config import execute, prepared, resolved
+from gsl.console import Console
+
+
+def run(
+    command: str,
+    overrides: Sequence[str],
+    *,
+    multirun: bool = False,
+    cfg: bool = False,
+    config_dir: Path | None = None,
+    json: bool = False,
+) -> int:
+    """Run one command and return its exit code.
+
+    Args:
+        command: Name of the command, which is also that of its yaml file.
+        overrides: Arguments of the form key=value.
+        multirun: Whether keys with several values make several jobs.
+        cfg: Only print the composed configuration.
+        config_dir: The user's folder of yaml files, which wins over ours.
+        json: Print one JSON document instead of tables.
+
+    Raises:
+        GslError: The configuration is wrong, or the stage failed.
+    """
+    console = Console(json=json)
+    flags = [*(["--multirun"] if multirun else []), *([f"--config-dir={config_dir}"] if config_dir else [])]
+    line = shlex.join(["gsl", *command.split(), *flags, *overrides])
+    with opened(config_dir):
+        composition = compose(command, overrides, multirun=multirun)
+        if cfg:
+            console.result(resolved(composition), text=OmegaConf.to_yaml(OmegaConf.create(resolved(composition))))
+            return 0
+        if multirun:
+            prepared(resolved(composition))
+            return run_jobs(command, line, composition, console)
+        document = execute(command, line, resolved(composition), console)
+        console.result(document, text=said(document))
+        return int(document.get("exit_code", 0))
+
+
+def said(document: Mapping[str, Any]) -> str:
+    """Return the last line of a command: where its results are, or what it said without writing any."""
+    if "said" in document:
+        return str(document["said"])
+    return f"{document['folder']}{' (unchanged)' if document['unchanged'] else ''}"
