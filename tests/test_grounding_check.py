@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ from gsl.stages.grounding_check import (
     check,
     largest_stable,
 )
-from gsl.stages.grounding_replay import TICKS, Deviations
+from gsl.stages.grounding_replay import PAST, TICKS, Deviations, places, replay
 from gsl.stages.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld
@@ -66,6 +67,21 @@ def test_a_grounding_that_does_nothing_replays_as_no_grounding() -> None:
     assert errors[BARE]["10_ticks"]["joints_deg"] < 0.5 * errors[STILL]["10_ticks"]["joints_deg"]
     assert report.acceptable
     assert report.metrics()["pi0"]["falls"] == 0
+
+
+@pytest.mark.parametrize("span", [3, 9])
+def test_a_replay_begins_with_all_the_ticks_at_which_a_model_looks(span: int) -> None:
+    grounding, n, size = a_transformation(0.0), len(JOINTS), History(span).size(len(JOINTS))
+    looks_back = ForwardModel(Network([(np.zeros((n, size)), np.zeros(n))]), History(span), JOINTS)
+    assert replace(grounding, forward=looks_back).span == span
+    env = SCENARIO.world.make()
+    for place in places(heldout().episodes, env.layout, 2):
+        watching = Mock(span=span)
+        watching.start.return_value.transform.side_effect = lambda seen, action: action
+        next(replay(env, watching, place, np.random.default_rng(1), 1))
+        seen = [call.args[0] for call in watching.start.return_value.transform.call_args_list]
+        first = max(0, place.tick - max(PAST, span))
+        np.testing.assert_array_equal(seen[:-1], place.seen[first : place.tick])
 
 
 def test_a_grounding_that_makes_things_worse_is_not_acceptable_and_says_why() -> None:

@@ -149,6 +149,11 @@ class LoadedTransformation:
     draws: bool = False
     gate: float | None = None
 
+    @property
+    def span(self) -> int:
+        """Ticks before the present one at which its models look."""
+        return max(self.forward.history.span, self.inverse.history.span)
+
     def start(self, layout: Layout, rng: np.random.Generator) -> TransformationRun:
         """Return the grounding at the beginning of an episode.
 

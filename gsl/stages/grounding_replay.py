@@ -19,7 +19,7 @@ from gsl.worlds.engine import Reading
 from gsl.worlds.start import Start
 
 TICKS = 10  # of a replay: 0.2 s at 50 Hz
-PAST = 6  # ticks for which the grounding watches the real robot before
+PAST = 6  # ticks for which a grounding watches the real robot before, at least; as many as its models look back
 STRIDE = 15  # ticks from one replay to the next
 
 
@@ -87,7 +87,8 @@ def replay(
 ) -> Iterator[np.ndarray]:
     """Yield the observations after each tick; the simulator takes over from the real robot at `place.tick`."""
     run, tick = grounding.start(env.layout, rng), place.tick
-    sent = [run.transform(place.seen[k], place.actions[k]) for k in range(tick - PAST, tick)]
+    watched = max(0, tick - max(PAST, getattr(grounding, "span", 0)))
+    sent = [run.transform(place.seen[k], place.actions[k]) for k in range(watched, tick)]
     start = _start(env, place.seen[tick], np.array(sent[::-1]))
     observation, _ = env.reset(seed=int(rng.integers(2**31)), options={"start": start})
     observation[env.layout["foot_force"]] = place.seen[tick][env.layout["foot_force"]]  # no contact is solved yet
