@@ -76,7 +76,7 @@ class Console:
         widths = fitting(columns, rows, place.width, leave_out=place.is_terminal)
         if not place.is_terminal:
             place.width = max(WIDTH_WITHOUT_TERMINAL, total(widths))
-        place.print(drawn(columns, rows, widths=widths))
+        place.print(drawn(columns, rows, widths))
         left = columns[len(widths) :]
         more = f"{len(left)} more in a wider window: {', '.join(left)}" if left else ""
         if below := "\n".join(filter(None, [more, caption])):
@@ -130,9 +130,8 @@ class Console:
             return
         from rich.live import Live
 
-        table = drawn(columns, [], title)
-        with Live(table, console=self._stderr, transient=True) as live:
-            self._live = RichLiveTable(table, live.refresh)
+        with Live(console=self._stderr, transient=True) as live:
+            self._live = RichLiveTable(title, columns, live)
             try:
                 yield self._live
             finally:

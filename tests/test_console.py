@@ -77,6 +77,16 @@ def test_a_terminal_gets_a_bar_and_a_growing_table(
     assert printed.out == ""
 
 
+def test_words_of_a_growing_table_stay_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    console = Console()
+    console._stderr = RichConsole(width=60, force_terminal=True, color_system=None, stderr=True)
+    titles = ["iteration", "policy", "in simulation", "in real", "95 % interval", "falls", "gain over the last"]
+    with console.live_table("rounds [cm/s]", titles) as table:
+        table.row(1, "generation_01", "24.5", "25.3", "24.3 to 26.3", "0 of 3", "+8.1 %")
+    said = capsys.readouterr().err
+    assert all(word in said for word in ("generation_01", "simulation", "interval", "[cm/s]"))
+
+
 def test_what_is_said_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO, logger="gsl"):
         Console().status("collecting")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
+    import rich.live
     import rich.table
 
 CELL = 13
@@ -40,42 +41,46 @@ class LineTable:
 class RichLiveTable:
     """A table that grows while a person watches, with what is going on as its caption."""
 
-    def __init__(self, table: rich.table.Table, refresh: Callable[[], None]) -> None:
-        self._table, self._refresh = table, refresh
+    def __init__(self, title: str, columns: Sequence[str], live: rich.live.Live) -> None:
+        self._title, self._columns, self._live = title, columns, live
+        self._rows: list[Sequence[object]] = []
+        self._caption = ""
+        self._draw()
 
     def row(self, *cells: object) -> None:
         """Add one row."""
-        from rich.text import Text
-
-        self._table.add_row(*(Text(str(cell)) for cell in cells))
-        self._refresh()
+        self._rows.append(cells)
+        self._draw()
 
     def caption(self, text: str) -> None:
         """Say below the table what is going on."""
-        from rich.text import Text
+        self._caption = text
+        self._draw()
 
-        self._table.caption = Text(text)
-        self._refresh()
+    def _draw(self) -> None:
+        """Draw it anew: which columns there is room for depends on what is in them."""
+        widths = fitting(self._columns, self._rows, self._live.console.width)
+        self._live.update(drawn(self._columns, self._rows, widths, self._title, self._caption), refresh=True)
 
 
 def drawn(
     columns: Sequence[str],
     rows: Sequence[Sequence[object]],
+    widths: Sequence[int],
     title: str | None = None,
-    widths: Sequence[int | None] | None = None,
+    caption: str = "",
 ) -> rich.table.Table:
-    """Return a table as rich draws it; a column of numbers is aligned to the right, and brackets are only brackets.
+    """Return a table as rich draws it, of as many columns as `widths`.
 
-    Of columns there are as many as `widths`.
+    A column of numbers is aligned to the right, and brackets are only brackets.
     """
-    widths = [None] * len(columns) if widths is None else widths
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
-    heading = None if title is None else Text(title)
     table = Table(
-        title=heading,
+        title=None if title is None else Text(title),
+        caption=Text(caption) if caption else None,
         box=box.SIMPLE_HEAD,
         show_header=any(columns),
         title_justify="left",
@@ -84,7 +89,7 @@ def drawn(
     for index, (column, width) in enumerate(zip(columns, widths, strict=False)):
         numbers = bool(rows) and all(_is_number(row[index]) for row in rows)
         aligned: Literal["right", "left"] = "right" if numbers else "left"
-        table.add_column(Text(column), justify=aligned, no_wrap=not index and not width, overflow="fold", width=width)
+        table.add_column(Text(column), justify=aligned, overflow="fold", width=width)
     for row in rows:
         table.add_row(*(Text(str(cell)) for cell in row[: len(widths)]))
     return table
