@@ -67,7 +67,7 @@ class Reproduce:
 def _sizes(study: Compare) -> str:
     """Return the sizes behind a table."""
     budget, optimizer = study.iterate.budget, study.iterate.optimizer
-    assert isinstance(optimizer, CmaEs), "study_effort has refused others"
+    assert isinstance(optimizer, CmaEs), "seconds() has refused others"
     searched = (
         f"{optimizer.generations} generations of {optimizer.candidates} candidates, {budget.rollouts} rollouts each"
     )
