@@ -100,6 +100,7 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     rows = json.loads(first.read_text())
     assert [one["number"] for one in rows] == [1, 1]
     rows[0]["made_by"] = "a1b2c3d"
+    del rows[0]["last_falls"]  # which files have not had from the beginning
     elsewhere = tmp_path / "elsewhere.json"
     elsewhere.write_text(json.dumps([*rows, {**rows[0], "recipe": "of another study"}]))
     said = done("reproduce", "fig5", *few, "study.trials=2", "study.known=elsewhere.json", "name=on", folder=tmp_path)
@@ -300,9 +301,14 @@ def test_table_2_marks_the_noise_that_only_real_figures_choose() -> None:
 
 
 def test_table_2_counts_how_often_the_last_generation_improves() -> None:
-    trials = [a_trial("gat", k, last={"speed [cm/s]": speed}) for k, speed in ((1, 19.9), (2, 20.1), (3, 30.0))]
+    trials = [
+        a_trial("gat", k, last={"speed [cm/s]": speed}, last_falls=falls)
+        for k, speed, falls in ((1, 19.9, 0), (2, 20.1, 0), (3, 30.0, 0), (4, 30.0, 1))
+    ]
     row = next(line for line in Table2().markdown(trials, Walk()).splitlines() if line.startswith("| w | gat"))
-    assert "| 12 of 15 | 9 of 15 | 2 of 3 |" in row  # π0 walks 20 cm/s
+    assert "| 16 of 20 | 12 of 20 | 2 of 4 |" in row  # π0 walks 20 cm/s
+    before = Table2().markdown([trials[0]._replace(last_falls=None)], Walk())
+    assert "| 4 of 5 | 3 of 5 |  |" in before  # a trial of a file that does not tell
 
 
 def test_table_3_counts_where_chains_stop() -> None:

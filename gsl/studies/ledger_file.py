@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from inspect import signature
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -15,7 +16,10 @@ RECIPE, MADE_BY = "recipe", "made_by"
 
 
 class Figures(Protocol):
-    """What a row holds besides the trial's recipe and who made it: a named tuple of figures."""
+    """What a row holds besides the trial's recipe and who made it: a named tuple of figures.
+
+    Those with a default came later: a file may lack them.
+    """
 
     @property
     def contradiction(self) -> str:
@@ -30,7 +34,7 @@ def read(path: Path, kind: type[Figures]) -> dict[str, list[dict[str, Any]]]:
     """
     adapter, found, last = TypeAdapter[Figures](kind), dict[str, list[dict[str, Any]]](), None
     for index, row in enumerate(_parsed(path), start=1):
-        if problem := _problem(row, adapter, tuple(kind.__annotations__)):
+        if problem := _problem(row, adapter, kind):
             raise ArtifactError(path, f"row {index} {problem}")
         if row[RECIPE] in found and row[RECIPE] != last:
             raise ArtifactError(path, f"row {index} is of a trial that the file has already; leave one of the two out")
@@ -49,7 +53,9 @@ def _parsed(path: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _problem(row: Mapping[str, Any], adapter: TypeAdapter[Figures], fields: Sequence[str]) -> str:
+def _problem(row: Mapping[str, Any], adapter: TypeAdapter[Figures], kind: type[Figures]) -> str:
+    known = signature(kind).parameters.values()
+    fields = [one.name for one in known if one.name in row or one.default is one.empty]
     if wrong := sorted({*fields, RECIPE, MADE_BY} ^ row.keys()):
         return f"is no trial of such a study: {', '.join(wrong)} lacking or unknown"
     if odd := [name for name in (RECIPE, MADE_BY) if not isinstance(row[name], str)]:

@@ -83,11 +83,12 @@ def _apart(trials: Sequence[Trial], one: Summary, other: str) -> str:
 
 
 def _last(trials: Sequence[Trial], one: Summary, task: Task) -> str:
-    """Return in how many trials the last generation's best, which nothing real has chosen, is faster than π0."""
+    """Return in how many trials the last generation's best, which nothing real has chosen, is stable and faster."""
     own = one.own(trials)
-    if not all(SPEED in trial.last for trial in own):
+    if not all(SPEED in trial.last and trial.last_falls is not None for trial in own):
         return ""
-    return f"{sum(trial.last[SPEED] > task.shown * trial.start for trial in own)} of {len(own)}"
+    better = (trial.last_falls == 0 and trial.last[SPEED] > task.shown * trial.start for trial in own)
+    return f"{sum(better)} of {len(own)}"
 
 
 def _best_noise(found: Sequence[Summary], world: str) -> tuple[str, str]:

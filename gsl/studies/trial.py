@@ -41,6 +41,7 @@ class Trial(NamedTuple):
         outcome: What the task reports of the returned policy, by name with unit.
         last: The same of the last generation's winner, which nothing real has chosen, in the episodes of the choice: up
             to its first fall where none is tolerated.
+        last_falls: Of these episodes; None of trials that were written down before it was.
     """
 
     simulator: str
@@ -65,6 +66,7 @@ class Trial(NamedTuple):
     real_episodes: int
     outcome: Mapping[str, float]
     last: Mapping[str, float]
+    last_falls: int | None = None
 
     @classmethod
     def of(
@@ -110,6 +112,7 @@ class Trial(NamedTuple):
             real_episodes=spent + measured["real_episodes"],
             outcome=after["outcome"],
             last=measured["last"]["outcome"],
+            last_falls=measured["last"]["falls"],
         )
 
     @property
