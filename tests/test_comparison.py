@@ -73,6 +73,22 @@ def test_the_tables_show_every_method_and_every_trial() -> None:
     assert "paired by trial" not in markdown(summaries(alone), alone, Unit.of(Walk))
 
 
+def test_iterations_are_told_apart_where_there_are_several() -> None:
+    trials = [*TRIALS, *(trial._replace(iteration=2, value=0.3, improvement=20.0) for trial in TRIALS)]
+    text = markdown(summaries(trials), trials, Unit.of(Walk))
+    assert "| nao_worn | 1 | gat | 20.0, 10.0 |" in text and "| nao_worn | 2 | gat | 20.0, 20.0 |" in text
+    assert "| nao_worn | 1 | gat - none | +17.5 |" in text and "| nao_worn | 2 | gat - none | +0.0 |" in text
+    assert "stable improvement by that iteration:" in text and "iteration" not in markdown(
+        summaries(TRIALS), TRIALS, Unit.of(Walk)
+    )
+
+
+def test_a_mean_improvement_is_one_of_all_trials() -> None:
+    trials = [TRIALS[0], TRIALS[1]._replace(improvement=None)]
+    assert {trial.method for trial in trials} == {TRIALS[0].method}
+    assert summaries(trials)[0].improvement is None
+
+
 def test_without_falls_and_percentages_the_tables_tell_returns() -> None:
     trials = [trial._replace(improvement=None) for trial in TRIALS]
     text = markdown(summaries(trials), trials, Unit.of(OwnReward))

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,9 +85,29 @@ def test_an_mlp_fits_what_a_line_cannot_and_auto_notices() -> None:
     def error(network: Network) -> float:
         return float(np.mean((network.predict_many(unseen[0]) - unseen[1]) ** 2))
 
-    network, choice = best(QUICK, lambda config: fit_network(training, validation, config, seed=1), error)
+    network, choice = best(QUICK, lambda config, _: fit_network(training, validation, config, seed=1), error)
     assert choice.config.family == "mlp"
     assert error(network) == choice.scores["mlp"] < 0.2 * choice.scores["linear"]
+
+
+def test_what_is_compared_has_not_seen_validation_and_a_chosen_line_learns_from_it() -> None:
+    training, validation = ((x := RNG.normal(size=(count, 2)), x @ [[1.0], [2.0]]) for count in (30, 20))
+    fitted: list[bool] = []
+
+    def fit(config: ModelConfig, whole: bool) -> Network:
+        fitted.append(whole)
+        return fit_network(training, validation, config, seed=1, whole=whole)
+
+    def error(network: Network) -> float:
+        return float(np.mean((network.predict_many(validation[0]) - validation[1]) ** 2))
+
+    network, choice = best(replace(QUICK, ridge=0.1), fit, error)
+    both = tuple(np.concatenate(pair) for pair in zip(training, validation, strict=True))
+    assert choice.config.family == "linear" and fitted == [False, False, True]
+    np.testing.assert_array_equal(network.layers[0][0], fit_linear(*both, ridge=0.1).layers[0][0])
+    assert choice.scores["linear"] == error(fit_linear(*training, ridge=0.1))
+    assert not replace(choice.config, members=5).learns_from_all
+    assert not replace(choice.config, likelihood="gaussian").learns_from_all
 
 
 def test_the_same_seed_fits_the_same_weights_and_leaves_torch_alone() -> None:

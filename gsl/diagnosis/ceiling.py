@@ -29,10 +29,10 @@ def learned_residual(found: Experiment, told: np.ndarray, *, seed: int = 0) -> n
     """
     inputs, targets = _samples(found, told)
     train, check = found.train[np.arange(len(found.train)) % VALIDATION > 0], found.train[::VALIDATION]
-    sets = [_flat(inputs[part], targets[part]) for part in (train, check)]
+    sets = _flat(inputs[train], targets[train]), _flat(inputs[check], targets[check])
 
-    def fit(config: ModelConfig) -> Network:
-        return fit_network(sets[0], sets[1], config, seed=seed)
+    def fit(config: ModelConfig, whole: bool) -> Network:
+        return fit_network(*sets, config, seed=seed, whole=whole)
 
     def score(network: Network) -> float:
         return float(np.mean((network.predict_many(sets[1][0]) - sets[1][1]) ** 2))

@@ -24,15 +24,13 @@ class Choice(NamedTuple):
 
 
 def fit_network(
-    training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT
+    training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT, whole: bool = False
 ) -> Network:
-    """Return a network of one family.
-
-    The linear one needs no early stopping and learns from all samples, but for those that are to calibrate its spread.
-    """
+    """Return a network of one family; validation stops the fit of an MLP, and a linear one learns from the `whole`."""
     if config.family == "linear":
-        both = (np.concatenate(pair) for pair in zip(training, validation, strict=True))
-        inputs, targets = training if head.draws else both
+        inputs, targets = (
+            (np.concatenate(pair) for pair in zip(training, validation, strict=True)) if whole else training
+        )
         network = fit_linear(inputs, targets, ridge=config.ridge)
         return with_spread(network, inputs, targets) if head.draws else network
     with held():
@@ -41,10 +39,18 @@ def fit_network(
     return fit_mlp(training, validation, config, seed=seed, head=head)
 
 
-def best(config: ModelConfig, fit: Callable[[ModelConfig], M], score: Callable[[M], float]) -> tuple[M, Choice]:
-    """Fit every variant and return the model with the least score; at a tie the simpler one."""
+def best(config: ModelConfig, fit: Callable[[ModelConfig, bool], M], score: Callable[[M], float]) -> tuple[M, Choice]:
+    """Fit every variant and return the model with the least score; at a tie the simpler one.
+
+    Args:
+        config: What is allowed.
+        fit: Of a variant, to the training samples alone, or if it is told so to those of the validation as well.
+        score: Of a model on validation trajectories. All that are compared have been fitted without them; the one that
+            is chosen learns from them too, if nothing else needs them.
+    """
     variants = config.variants
-    models = {name: fit(variant) for name, variant in variants.items()}
+    models = {name: fit(variant, False) for name, variant in variants.items()}
     scores = {name: score(model) for name, model in models.items()}
     name = min(scores, key=lambda one: scores[one])
-    return models[name], Choice(variants[name], scores)
+    chosen = variants[name]
+    return fit(chosen, True) if chosen.learns_from_all else models[name], Choice(chosen, scores)

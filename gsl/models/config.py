@@ -129,6 +129,11 @@ class ModelConfig:
         }
 
     @property
+    def learns_from_all(self) -> bool:
+        """Whether validation neither stops its fit, nor calibrates its spread, nor tells how members disagree."""
+        return self.family == "linear" and not self.head.draws and self.members == 1
+
+    @property
     def head(self) -> Head:
         """How the outputs of a forward model are read."""
         return Head(self.likelihood, self.components if self.likelihood == "mixture" else 1)

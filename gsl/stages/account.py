@@ -136,7 +136,8 @@ def returned(metrics: Mapping[str, Any], unit: Unit) -> str:
     """Return in a line what an evaluation chose, what that is worth beside π0, and what it cost."""
     spent = f"{metrics['real_episodes']} real episodes"
     if not metrics["best_generation"]:
-        better = "stable policy was faster" if unit.falls else "policy was better"
+        faster = "stable policy was faster" if unit.falls else "policy was better"
+        better = "faster policy passed its check" if metrics["failed_check"] else faster
         return f"no {better}: {metrics['best']} is returned; {spent}"
     gain, after, before = metrics["gain"], metrics["returned"], metrics["baseline"]
     bounds = unit.interval(gain["interval"], sign=True)

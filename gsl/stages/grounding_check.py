@@ -146,7 +146,7 @@ TITLES = (
 
 
 def allowed_falls(heldout: Batch) -> int:
-    """Return how often π0 may fall in the grounded simulator: not surely more often than in real."""
+    """Return how often π0 may fall in the grounded simulator: not surely more often than by its share in real."""
     share = float(heldout.metadata.get(FALLS, 0.0))
     return max(k for k in range(EPISODES + 1) if stats.binom.sf(k - 1, EPISODES, share) >= SURELY)
 

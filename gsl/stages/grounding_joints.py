@@ -23,7 +23,7 @@ def fewest(env: Any, grounding: LoadedTransformation, starts: Sequence[Place], s
     Args:
         env: The simulator.
         grounding: Of all joints that its models know.
-        starts: On trajectories that neither fitted the models nor judge the grounding.
+        starts: On validation trajectories, which do not judge the grounding; a linear f has learned from them, too.
         seed: Of all randomness.
 
     Raises:

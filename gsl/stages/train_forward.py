@@ -148,13 +148,13 @@ def fitted(config: ModelConfig, data: Parts, seed: int, base: ForwardModel | Non
         base: What is corrected, none for a robot learned from nothing.
     """
     judges = _long(config, of_policy(data.validation, pi0=False)) or _long(config, data.validation.episodes)
-    return best(config, lambda one: _fitted(one, data, seed, base), lambda model: _score(model, judges))
+    return best(config, lambda one, whole: _fitted(one, data, seed, base, whole), lambda model: _score(model, judges))
 
 
-def _fitted(config: ModelConfig, data: Parts, seed: int, base: ForwardModel | None) -> Forward:
+def _fitted(config: ModelConfig, data: Parts, seed: int, base: ForwardModel | None, whole: bool) -> Forward:
     episodes = data.training.episodes
     if config.members == 1:
-        return _member(config, episodes, data, seed, base)
+        return _member(config, episodes, data, seed, base, whole)
     rng = np.random.default_rng(derived_seed(seed, "members"))
     drawn = [rng.integers(len(episodes), size=len(episodes)) for _ in range(config.members)]
     members = [
@@ -177,11 +177,18 @@ def _long(config: ModelConfig, episodes: Sequence[Trajectory]) -> tuple[Trajecto
 
 
 def _member(
-    config: ModelConfig, episodes: Sequence[Trajectory], data: Parts, seed: int, base: ForwardModel | None
+    config: ModelConfig,
+    episodes: Sequence[Trajectory],
+    data: Parts,
+    seed: int,
+    base: ForwardModel | None,
+    whole: bool = False,
 ) -> ForwardModel:
+    """Return a model of some of the training trajectories, and of those of the validation if it is the `whole`."""
     head = config.head
     known, unseen = (_samples(config, part, base) for part in (episodes, data.validation.episodes))
-    network, memory = fit_network(known, unseen, config, seed=seed, head=head), np.zeros(unseen[1].shape[1])
+    network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole)
+    memory = np.zeros(unseen[1].shape[1])
     if head.draws:
         network, memory = calibrated(network, head, [_samples(config, [one], base) for one in data.validation.episodes])
     joints = data.training.joints

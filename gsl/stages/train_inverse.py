@@ -37,8 +37,8 @@ Damping = Annotated[
 class TrainInverse:
     """Fits an inverse model of the simulator; the data need action noise, or it cannot tell one joint from another.
 
-    `auto` takes the family that best recovers the actions of held-out trajectories when it sees its own answers as the
-    past actions.
+    `auto` takes the family that best recovers the actions of validation trajectories when it sees its own answers as
+    the past actions.
     """
 
     kind: ClassVar[str] = "train_inverse"
@@ -74,27 +74,29 @@ class TrainInverse:
 
 
 def fitted(config: ModelConfig, data: Parts, seed: int, method: Method, damping: float) -> tuple[InverseModel, Choice]:
-    """Return the inverse model that a configuration allows and that best recovers held-out actions."""
-    pieces = segments(data.heldout.episodes, config.of_joints, carried_out=True)
+    """Return the inverse model that a configuration allows and that best recovers the actions of validation."""
+    pieces = segments(data.validation.episodes, config.of_joints, carried_out=True)
 
-    def fit(one: ModelConfig) -> InverseModel:
-        return _regression(one, data, seed) if method == "regression" else _solver(one, data, seed, damping)
+    def fit(one: ModelConfig, whole: bool) -> InverseModel:
+        return (
+            _regression(one, data, seed, whole) if method == "regression" else _solver(one, data, seed, damping, whole)
+        )
 
     return best(config, fit, lambda model: degrees(recovered_error(model, pieces)))
 
 
-def _regression(config: ModelConfig, data: Parts, seed: int) -> InverseModel:
+def _regression(config: ModelConfig, data: Parts, seed: int, whole: bool) -> InverseModel:
     n = len(data.training.joints)
     known, unseen = (_turned(_rows(config, part), n, config) for part in (data.training, data.validation))
-    network = fit_network(known, unseen, config, seed=seed)
+    network = fit_network(known, unseen, config, seed=seed, whole=whole)
     return Regression(network, config.of_joints, data.training.joints, config.encoding, config.horizon)
 
 
-def _solver(config: ModelConfig, data: Parts, seed: int, damping: float) -> InverseModel:
+def _solver(config: ModelConfig, data: Parts, seed: int, damping: float, whole: bool) -> InverseModel:
     joints = data.training.joints
     rows = [_rows(config, part) for part in (data.training, data.validation)]
     known, unseen = ((part.windows, encode(part.change, config.encoding)) for part in rows)
-    network = fit_network(known, unseen, config, seed=seed)
+    network = fit_network(known, unseen, config, seed=seed, whole=whole)
     simulator = ForwardModel(network, config.of_joints, joints, config.encoding, config.horizon)
     plain = fit_linear(rows[0].windows, rows[0].change, ridge=config.ridge)
     sensitivity = plain.layers[0][0][:, : len(joints)].astype(float)

@@ -114,14 +114,14 @@ def _steps(batch: Batch, variables: tuple[int, ...]) -> Steps:
     return Steps(np.concatenate([state[:-1] for state in states]), np.concatenate(sent), np.concatenate(changes))
 
 
-def _forward(config: ModelConfig, data: Parts, seed: int, head: Head | None = None) -> StateForward:
+def _forward(config: ModelConfig, whole: bool, *, data: Parts, seed: int, head: Head | None = None) -> StateForward:
     choices, variables = _choices(data), config.of_interest(data.training.states, "model")
     known, unseen = (_steps(part, variables) for part in (data.training, data.validation))
     head = config.head if head is None else head
     training, validation = (
         (np.hstack([part.states, encoded(part.actions, choices)]), part.changes) for part in (known, unseen)
     )
-    network = _fitted(training, validation, config, seed, head)
+    network = _fitted(training, validation, config, seed, whole, head)
     scale = np.maximum(known.changes.std(axis=0), 1e-12)
     actions = choices or known.actions.shape[1]
     full = head.likelihood == "gaussian" and config.covariance == "full"
@@ -129,18 +129,20 @@ def _forward(config: ModelConfig, data: Parts, seed: int, head: Head | None = No
     return StateForward(network, head, data.training.states, actions, choices, variables, scale, together)
 
 
-def _inverse(config: ModelConfig, data: Parts, seed: int) -> StateInverse:
+def _inverse(config: ModelConfig, whole: bool, *, data: Parts, seed: int) -> StateInverse:
     variables = config.of_interest(data.training.states, "model")
     known, unseen = (_turned(_steps(part, variables)) for part in (data.training, data.validation))
-    network = _fitted(known, unseen, config, seed)
+    network = _fitted(known, unseen, config, seed, whole)
     return StateInverse(network, data.training.states, known[1].shape[1], variables)
 
 
-def _fitted(training: Samples, validation: Samples, config: ModelConfig, seed: int, head: Head = POINT) -> Network:
+def _fitted(
+    training: Samples, validation: Samples, config: ModelConfig, seed: int, whole: bool, head: Head = POINT
+) -> Network:
     """Return a network that was fitted in units of each column's own spread; what never changes stays as it is."""
     given, wanted = (_own_units(values) for values in training)
     known, unseen = ((given.apply(x), wanted.apply(y)) for x, y in (training, validation))
-    network = fit_network(known, unseen, config, seed=seed, head=head)
+    network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole)
     return unscaled([(weight, bias) for weight, bias in network.layers], given, head.scaling(wanted))
 
 
@@ -149,8 +151,8 @@ def _own_units(values: np.ndarray) -> Scaling:
     return Scaling(values.mean(axis=0), np.where(sd > ROUNDING * np.abs(values).max(axis=0), sd, 1.0))
 
 
-def _nearest(config: ModelConfig, data: Parts, seed: int) -> NearestChoice:
-    return NearestChoice(_forward(config, data, seed, POINT))
+def _nearest(config: ModelConfig, whole: bool, *, data: Parts, seed: int) -> NearestChoice:
+    return NearestChoice(_forward(config, whole, data=data, seed=seed, head=POINT))
 
 
 def _turned(steps: Steps) -> Samples:

@@ -27,7 +27,7 @@ FALLS = "pi0_falls"  # share of its real episodes, told beside the trajectories 
 
 
 class Parts(NamedTuple):
-    """A batch in three: what models learn from, what stops their fit, and what nobody has seen."""
+    """A batch in three: to learn from; to stop, choose and calibrate by; and what nobody has seen."""
 
     training: Batch
     validation: Batch

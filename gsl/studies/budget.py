@@ -173,7 +173,9 @@ class Budget:
         rows.append((NONE, "0", f"{none.mean:.1f}", bounds(none), "", ""))
         titles = ("grounding", "real trajectories collected", f"in real [{unit}]", "95 % interval")
         titles_of_errors = ("joints after 0.2 s, off π0 [°]", "95 % interval")
-        held = f"Joints are measured on {1 + HELD_OUT} real trajectories more, the same for all of a trial.\n"
+        held = (
+            f"Joints are measured on {HELD_OUT} real trajectories off π0 more at most, the same for all of a trial.\n"
+        )
         told_all = "\n".join([table((*titles, *titles_of_errors), rows), held, made])
         (folder / TABLE).write_text(told_all + "\n", encoding="utf-8")
         plain = mean_interval([one.bare for one in points if one.bare is not None]).mean

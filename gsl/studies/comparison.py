@@ -18,7 +18,10 @@ IMPROVEMENT: Figure = attrgetter("improvement")
 
 
 class Summary(NamedTuple):
-    """All trials of a cell; improvement and rank are means over trials [%, -]; None where no trial has one."""
+    """All trials of a cell; improvement and rank are means over trials [%, -], None where a trial has none.
+
+    The generation is that which found what was returned, on average over trials that returned something new.
+    """
 
     simulator: str
     world: str
@@ -118,7 +121,7 @@ def _summary(cell: Cell, trials: list[Trial]) -> Summary:
         *cell,
         trials=len(trials),
         value=mean_interval([trial.value for trial in trials]),
-        improvement=mean_interval(improvements) if improvements else None,
+        improvement=mean_interval(improvements) if len(improvements) == len(trials) else None,
         without=sum(trial.without for trial in trials),
         stable=sum(trial.stable for trial in trials),
         improving=sum(trial.improving for trial in trials),
@@ -126,6 +129,6 @@ def _summary(cell: Cell, trials: list[Trial]) -> Summary:
         generation=sum(generations) / len(generations) if generations else float("nan"),
         falls=sum(trial.falls for trial in trials),
         refused=sum(trial.refused for trial in trials),
-        rank=mean_interval(ranks) if ranks else None,
+        rank=mean_interval(ranks) if len(ranks) == len(trials) else None,
         real_episodes=sum(trial.real_episodes for trial in trials) / len(trials),
     )

@@ -20,7 +20,7 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
 
     Trials are told as improvements where π0 is surely worth something in each of them, else as what they are worth.
     """
-    first, columns = found[0].method, _columns(found, unit)
+    first, columns, titles = found[0].method, _columns(found, unit), _places(found)
     as_shares = all(trial.improvement is not None for trial in trials)
     figure = "improvement" if as_shares else "value"
     own = SHARE if as_shares else unit
@@ -31,17 +31,19 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
         values = [
             own.bare(trial.improvement if as_shares else trial.value) + "*" * trial.without for trial in one.own(trials)
         ]
-        single.append((one.world, one.method, ", ".join(values)))
+        where = [str(getattr(one, name)) for name in titles.values()]
+        single.append((*where, one.method, ", ".join(values)))
         if one.method != first:
             apart = differences(trials, Cell(*one[:4]), first, attrgetter(figure))
             bounds = own.interval([apart.lower, apart.upper])
-            paired.append((one.world, f"{one.method} - {first}", own.bare(apart.mean, sign=True), bounds))
+            paired.append((*where, f"{one.method} - {first}", own.bare(apart.mean, sign=True), bounds))
     parts = [table(tuple(columns), list(zip(*columns.values(), strict=True)))]
     if paired:
         parts.append(f"Differences of the {shown}, paired by trial{' (percentage points)' * as_shares}:\n")
-        parts.append(table(("real world", "difference", "mean", "95 % interval"), paired))
-    parts.append(f"The {shown} of each trial, in their order; * without a stable improvement:\n")
-    return "\n".join([*parts, table(("real world", "grounding", "trials"), single)])
+        parts.append(table((*titles, "difference", "mean", "95 % interval"), paired))
+    then = " by that iteration" if "iteration" in titles else ""
+    parts.append(f"The {shown} of each trial, in their order; * without a stable improvement{then}:\n")
+    return "\n".join([*parts, table((*titles, "grounding", "trials"), single)])
 
 
 def told(interval: Interval, *, sign: bool = False) -> str:
@@ -49,10 +51,21 @@ def told(interval: Interval, *, sign: bool = False) -> str:
     return SHARE.interval([interval.lower, interval.upper], sign=sign)
 
 
+def _places(found: Sequence[Summary]) -> dict[str, str]:
+    """Return by title the fields that tell where trials were: simulator and iteration only where there are several."""
+    titles = {"simulator": "simulator", "real world": "world", "iteration": "iteration"}
+    several = {name for name in titles.values() if len({getattr(one, name) for one in found}) > 1}
+    return {title: name for title, name in titles.items() if name in {*several, "world"}}
+
+
+def _told_field(name: str) -> Callable[[Summary], str]:
+    return lambda one: str(getattr(one, name))
+
+
 def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]]:
     """Return the cells below each title, but for columns that have none: without falls there are no stable winners."""
     tellers: dict[str, Callable[[Summary], str]] = {
-        "real world": lambda one: one.world,
+        **{title: _told_field(name) for title, name in _places(found).items()},
         "grounding": lambda one: one.method,
         f"{in_unit('in real', unit.name)} (95 %)": lambda one: (
             f"{unit.bare(one.value.mean)} ({unit.interval([one.value.lower, one.value.upper])})"

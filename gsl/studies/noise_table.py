@@ -111,8 +111,9 @@ class NoiseTable:
             for place in self.places
         ]
         shown = [self.shown[method] for method in self.methods]
-        start = " In brackets trials that are where they began." if self.chosen else ""
-        below = f"Mean return where a policy was learned, of a few episodes, and in real.{start}"
+        start = " In brackets trials that are where they began, which do not count." if self.chosen else ""
+        few = "of a few episodes (a search's are those that chose it, and flatter it)"
+        below = f"Mean return where a policy was learned, {few}, and in real.{start}"
         return [markdown(self._titled(*shown), rows), below, ""]
 
     def _differences(self) -> list[str]:
@@ -161,10 +162,13 @@ def _difference(values: Sequence[float], others: Sequence[float]) -> str:
 
 
 def _kept(trials: Sequence[Point]) -> str:
-    """Return what policies promised and what the real world gave, and how many were what all began with."""
-    promised = [one.promised for one in trials if one.promised is not None]
-    value, start = np.mean([one.value for one in trials]), len(trials) - len(promised)
-    return (f"{np.mean(promised):.0f} -> " if promised else "") + f"{value:.0f}" + (f" ({start})" if start else "")
+    """Return what policies promised and what the real world gave them, and how many are what all began with."""
+    new = [(one.promised, one.value) for one in trials if one.promised is not None]
+    start = f" ({len(trials) - len(new)})" if len(new) < len(trials) else ""
+    if not new:
+        return f"{np.mean([one.value for one in trials]):.0f}{start}"
+    promised, value = np.mean(new, axis=0)
+    return f"{promised:.0f} -> {value:.0f}{start}"
 
 
 def _spent(steps: Iterable[int | None]) -> str:

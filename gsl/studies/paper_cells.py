@@ -54,7 +54,8 @@ def every_trial(trials: Sequence[Trial]) -> str:
         + (", ".join(_one(trial) for trial in trials if trial.cell == cell),)
         for cell in cells
     ]
-    head = "Improvement of each trial [%]; * without a stable improvement:\n"
+    then = " by that iteration" if any(trial.iteration > 1 for trial in trials) else ""
+    head = f"Improvement of each trial [%]; * without a stable improvement{then}:\n"
     return "\n".join([head, table(("worlds", "grounding", "iteration", "trials"), rows)])
 
 

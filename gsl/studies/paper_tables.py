@@ -33,7 +33,8 @@ class Table3:
     """Speed after each iteration, with either simulator; all are run, and told is what an `iterate` would return.
 
     With `accept=true` it stops after an iteration whose gain is not sure, and returns the policy before it, or the
-    first if it gained; without, it ends at a grounding that is refused.
+    first if it gained; without, it ends at a grounding that is refused. Where it stops is decided by the very episodes
+    that are told, which flatters it a little where intervals are wide.
     """
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:

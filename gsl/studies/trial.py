@@ -32,12 +32,13 @@ class Trial(NamedTuple):
         generation: That found it, 0 for the policy that the iteration started from.
         falls, episodes: Of the returned policy in fresh episodes.
         stable: Winners of generations that fell in no episode of the choice, or not too often.
-        improving: Those of them that were faster than the start.
+        improving: Those of them that were better than the policy that the iteration started from.
         winners: All winners of generations.
         alpha: How far the grounding went, None where there is none.
         refused: Whether the grounding's check would have refused it.
         rank: Correlation of the simulator with real over a fixed set of policies, None where nobody asked.
-        real_episodes: Of models, choice, check and report, of this iteration and those before.
+        real_episodes: Of models, diagnosis (motions in the air), choice, check and report, of this iteration and those
+            before; not those of `rank`.
         outcome: What the task reports of the returned policy, by name with unit.
         last: The same of the last generation's winner, which nothing real has chosen, in the episodes of the choice: up
             to its first fall where none is tolerated.
