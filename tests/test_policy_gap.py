@@ -23,6 +23,7 @@ from gsl.effects.effect import names
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.stages.choices import policies, record
+from gsl.stages.evaluate import TABLE
 from gsl.stages.policy_gap import Effort, policy_gap
 from gsl.stages.population import Job, episodes
 from gsl.stages.real_returns import MOST, measured_parents, real_returns
@@ -35,6 +36,7 @@ from gsl.worlds.bullet import BulletWorld
 TASK = Arm(duration=0.4)
 WORN = {"servo_gain": {"kp": 0.4}}
 HELD = ("world.floating=false", "world.settle=0.1")
+NAMES = ("pi0", "generation_01", "generation_02")
 LOW = ("episodes=2", "check=1", "confirmation=2", "workers=1")
 
 
@@ -132,7 +134,26 @@ def test_an_iterate_stands_for_its_evaluations(arms: Path, tmp_path: Path, monke
     done("iterate", "name=whole", *sizes, folder=tmp_path)
     monkeypatch.chdir(tmp_path)
     assert [path.name for path in measured_parents("whole").values()] == ["iterate", "evaluate", "optimize"]
-    assert [one.name for one in real_returns("whole", AIR).policies] == ["pi0", "generation_01", "generation_02"]
+    assert [one.name for one in real_returns("whole", AIR).policies] == list(NAMES)
+    done("iterate", "name=twice", "iterations=2", *sizes, folder=tmp_path)
+    found = real_returns("twice", AIR).policies  # the second begins with what the first has returned
+    first, second = ([f"iteration_0{k}/{name}" for name in names] for k, names in ((1, NAMES), (2, NAMES[1:])))
+    assert [one.name for one in found] == [*first, *second]
+
+
+@pytest.mark.parametrize(("episodes", "stopped"), [(2, False), (1, True)])
+def test_a_policy_that_fell_in_all_its_episodes_was_not_stopped(
+    episodes: int, stopped: bool, arms: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(arms, tmp_path / "copy")
+    monkeypatch.chdir(tmp_path / "copy")
+    path = Path("runs/arm/evaluate") / TABLE
+    table = json.loads(path.read_text())
+    chosen = {row["name"] for row in table["confirmation"]}
+    row = next(row for row in table["policies"] if row["name"] not in chosen)
+    row |= {"falls": 1, "episodes": episodes, "values": row["values"][:episodes]}  # of 2
+    path.write_text(json.dumps(table))
+    assert {one.name: one.stopped for one in real_returns("arm", AIR).policies}[row["name"]] == stopped
 
 
 def test_a_policy_that_was_stopped_at_its_fall_is_told_apart(arms: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -61,6 +61,16 @@ def test_the_verdict_says_which_iteration_is_returned_and_why_there_are_no_more(
     assert "The gain of iteration 2 is not sure: no other follows." in rounds.verdict
 
 
+def test_where_pi0_is_returned_nothing_is_gained() -> None:
+    rounds = Rounds(OwnReward())
+    rounds.add(evaluation(-20.0, -21.0, -3.0, 1.0), 10)
+    assert (found := rounds.metrics())["returned"] == measured(-20.0) and found["returned_iteration"] == 0
+    assert found["gain"] == {"value": 0.0, "interval": [0.0, 0.0], "share": None}
+    rounds = Rounds(OwnReward())
+    rounds.add(evaluation(-20.0, -14.6, 3.0, 8.0), 10)
+    assert rounds.metrics()["gain"] == {"value": -14.6 + 20.0, "interval": [3.0, 8.0], "share": None}
+
+
 def test_an_environment_that_ends_has_not_fallen() -> None:
     robot, environment = Rounds(Walk()), Rounds(OwnReward())
     for rounds in (robot, environment):

@@ -109,12 +109,15 @@ class Rounds:
     def metrics(self) -> Mapping[str, Any]:
         """Return the figures of all rounds."""
         best = self._done[0] if self.best is None else self.best
+        gain = best.metrics["gain"]
+        if self.best is None:
+            gain = {"value": 0.0, "interval": [0.0, 0.0], "share": None if gain["share"] is None else 0.0}
         return {
             "iterations": len(self._done),
             "returned_iteration": 0 if self.best is None else 1 + self._done.index(self.best),
             "returned": best.metrics["baseline" if self.best is None else "returned"],
             "baseline": self._done[0].metrics["baseline"],
-            "gain": best.metrics["gain"],
+            "gain": gain,
             "real_episodes": self._spent,
             "learned_from": self._collected,
             **self._of_the_flight(),

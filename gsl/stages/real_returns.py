@@ -102,10 +102,15 @@ def real_returns(reference: str, sim: BulletWorld, *, trust: bool = False) -> Re
     """
     named = _resolved(reference)
     places = _iterations(named) if manifest.read(named).kind == _ITERATE else [named]
-    *_, config = (_checked(place, sim) for place in places)
+    configs = [_checked(place, sim) for place in places]
+    config = configs[-1]
     policy = rebuilt(config["policy"], trust=trust, where="policies.policy")
     task = rebuilt(config["task"], trust=trust, where="policies.task")
-    found = [one for place in places for one in _measured(place, policy, several=len(places) > 1)]
+    found = [
+        one
+        for number, (place, settings) in enumerate(zip(places, configs, strict=True), start=1)
+        for one in _measured(place, policy, settings["episodes"], number if len(places) > 1 else None)
+    ]
     for one in found:
         policy.posture(one.parameters, sim.layout)
     chosen = np.unique(np.linspace(0, len(found) - 1, min(MOST, len(found))).round().astype(int))
@@ -160,19 +165,23 @@ def _file(source: Path) -> Path:
     return source if source.is_file() else source / FILE
 
 
-def _measured(evaluation: Path, policy: Policy, *, several: bool) -> list[MeasuredPolicy]:
-    """Return all policies of one evaluation; fresh episodes count instead of those by which a policy was chosen."""
+def _measured(evaluation: Path, policy: Policy, episodes: int, number: int | None) -> list[MeasuredPolicy]:
+    """Return the policies of an evaluation, in a later one of several but for what the one before has returned.
+
+    Fresh episodes count instead of the `episodes` by which a policy was chosen.
+    """
     table = json.loads((evaluation / TABLE).read_text(encoding="utf-8"))
     fresh = {row["name"]: row for row in table["confirmation"]}
     thetas = {one.name: vector(policy, one) for one in records(policy, str(_source(evaluation)))}
-    prefix = f"{evaluation.parent.name}/" if several else ""
+    prefix = f"{evaluation.parent.name}/" if number else ""
+    new = slice(1 if number and number > 1 else 0, None)
     return [
         MeasuredPolicy(
             f"{prefix}{row['name']}",
             thetas[row["name"]],
             np.array(fresh.get(row["name"], row)["values"]),
             fresh.get(row["name"], row)["falls"],
-            row["falls"] > 0 and row["name"] not in fresh,
+            row["falls"] > 0 and row["name"] not in fresh and row["episodes"] < episodes,
         )
-        for row in table["policies"]
+        for row in table["policies"][new]
     ]
