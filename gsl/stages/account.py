@@ -41,7 +41,8 @@ def _collect(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     if unit.falls:
         row["falls"] = metrics["falls"]
     if metrics["value"] is not None:
-        row[in_unit("value of π0", unit.name)] = unit.bare(metrics["value"])
+        value = f"value of π0{' with noise' * bool(metrics.get('action_noise'))}"
+        row[in_unit(value, unit.name)] = unit.bare(metrics["value"])
     return Told("trajectories", tuple(row), [tuple(map(str, row.values()))])
 
 
