@@ -70,7 +70,8 @@ class Figure6:
         (real, command), (bare, _), (grounded, sent) = played
         time = period * np.arange(1 - PAST, ticks + 1)
         joint_trace(folder / "figure_6.png", Traces(time, command, real, bare, grounded, sent), self.joint)
-        return _told(folder, self.joint, real, {"ungrounded": bare, "grounded": grounded})
+        moved = slice(PAST, None)  # before, all of them rest
+        return _told(folder, self.joint, real[moved], {"ungrounded": bare[moved], "grounded": grounded[moved]})
 
 
 @component
