@@ -28,9 +28,7 @@ def fit_network(
 ) -> Network:
     """Return a network of one family; validation stops the fit of an MLP, and a linear one learns from the `whole`."""
     if config.family == "linear":
-        inputs, targets = (
-            (np.concatenate(pair) for pair in zip(training, validation, strict=True)) if whole else training
-        )
+        inputs, targets = map(np.concatenate, zip(training, validation, strict=True)) if whole else training
         network = fit_linear(inputs, targets, ridge=config.ridge)
         return with_spread(network, inputs, targets) if head.draws else network
     with held():

@@ -106,11 +106,10 @@ def real_returns(reference: str, sim: BulletWorld, *, trust: bool = False) -> Re
     config = configs[-1]
     policy = rebuilt(config["policy"], trust=trust, where="policies.policy")
     task = rebuilt(config["task"], trust=trust, where="policies.task")
-    found = [
-        one
-        for number, (place, settings) in enumerate(zip(places, configs, strict=True), start=1)
-        for one in _measured(place, policy, settings["episodes"], number if len(places) > 1 else None)
-    ]
+    found: list[MeasuredPolicy] = []
+    for place, settings in zip(places, configs, strict=True):
+        rows = _measured(place, policy, settings["episodes"], f"{place.parent.name}/" if len(places) > 1 else "")
+        found += rows[1:] if found else rows  # a later evaluation begins with what the one before has returned
     for one in found:
         policy.posture(one.parameters, sim.layout)
     chosen = np.unique(np.linspace(0, len(found) - 1, min(MOST, len(found))).round().astype(int))
@@ -165,16 +164,11 @@ def _file(source: Path) -> Path:
     return source if source.is_file() else source / FILE
 
 
-def _measured(evaluation: Path, policy: Policy, episodes: int, number: int | None) -> list[MeasuredPolicy]:
-    """Return the policies of an evaluation, in a later one of several but for what the one before has returned.
-
-    Fresh episodes count instead of the `episodes` by which a policy was chosen.
-    """
+def _measured(evaluation: Path, policy: Policy, episodes: int, prefix: str) -> list[MeasuredPolicy]:
+    """Return all policies of one evaluation; fresh episodes count instead of the `episodes` by which one was chosen."""
     table = json.loads((evaluation / TABLE).read_text(encoding="utf-8"))
     fresh = {row["name"]: row for row in table["confirmation"]}
     thetas = {one.name: vector(policy, one) for one in records(policy, str(_source(evaluation)))}
-    prefix = f"{evaluation.parent.name}/" if number else ""
-    new = slice(1 if number and number > 1 else 0, None)
     return [
         MeasuredPolicy(
             f"{prefix}{row['name']}",
@@ -183,5 +177,5 @@ def _measured(evaluation: Path, policy: Policy, episodes: int, number: int | Non
             fresh.get(row["name"], row)["falls"],
             row["falls"] > 0 and row["name"] not in fresh and row["episodes"] < episodes,
         )
-        for row in table["policies"][new]
+        for row in table["policies"]
     ]

@@ -78,9 +78,9 @@ def fitted(config: ModelConfig, data: Parts, seed: int, method: Method, damping:
     pieces = segments(data.validation.episodes, config.of_joints, carried_out=True)
 
     def fit(one: ModelConfig, whole: bool) -> InverseModel:
-        return (
-            _regression(one, data, seed, whole) if method == "regression" else _solver(one, data, seed, damping, whole)
-        )
+        if method == "regression":
+            return _regression(one, data, seed, whole)
+        return _solver(one, data, seed, damping, whole)
 
     return best(config, fit, lambda model: degrees(recovered_error(model, pieces)))
 

@@ -41,14 +41,19 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
     if paired:
         parts.append(f"Differences of the {shown}, paired by trial{' (percentage points)' * as_shares}:\n")
         parts.append(table((*titles, "difference", "mean", "95 % interval"), paired))
-    then = " by that iteration" if "iteration" in titles else ""
-    parts.append(f"The {shown} of each trial, in their order; * without a stable improvement{then}:\n")
+    parts.append(f"The {shown} of each trial, in their order; {starred(trials)}:\n")
     return "\n".join([*parts, table((*titles, "grounding", "trials"), single)])
 
 
 def told(interval: Interval, *, sign: bool = False) -> str:
     """Return the bounds of an interval for people."""
     return SHARE.interval([interval.lower, interval.upper], sign=sign)
+
+
+def starred(trials: Sequence[Trial]) -> str:
+    """Return what a star behind a trial's figure says: of several iterations it is of that one alone."""
+    then = " by that iteration" if any(trial.iteration > 1 for trial in trials) else ""
+    return f"* without a stable improvement{then}"
 
 
 def _places(found: Sequence[Summary]) -> dict[str, str]:
@@ -58,14 +63,10 @@ def _places(found: Sequence[Summary]) -> dict[str, str]:
     return {title: name for title, name in titles.items() if name in {*several, "world"}}
 
 
-def _told_field(name: str) -> Callable[[Summary], str]:
-    return lambda one: str(getattr(one, name))
-
-
 def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]]:
     """Return the cells below each title, but for columns that have none: without falls there are no stable winners."""
-    tellers: dict[str, Callable[[Summary], str]] = {
-        **{title: _told_field(name) for title, name in _places(found).items()},
+    tellers: dict[str, Callable[[Summary], object]] = {
+        **{title: attrgetter(name) for title, name in _places(found).items()},
         "grounding": lambda one: one.method,
         f"{in_unit('in real', unit.name)} (95 %)": lambda one: (
             f"{unit.bare(one.value.mean)} ({unit.interval([one.value.lower, one.value.upper])})"
@@ -82,5 +83,5 @@ def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]
         "rank correlation": lambda one: "" if one.rank is None else f"{one.rank.mean:.2f}",
         "real episodes": lambda one: f"{one.real_episodes:.0f}",
     }
-    columns = {title: [tell(one) for one in found] for title, tell in tellers.items()}
+    columns = {title: [str(tell(one)) for one in found] for title, tell in tellers.items()}
     return {title: cells for title, cells in columns.items() if any(cells) and (unit.falls or title not in BY_FALLS)}

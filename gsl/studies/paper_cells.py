@@ -9,7 +9,7 @@ from gsl.core.statistics import Interval
 from gsl.report.markdown import table
 from gsl.stages.headline import Unit
 from gsl.studies.comparison import Summary
-from gsl.studies.comparison_table import told
+from gsl.studies.comparison_table import starred, told
 from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
 
@@ -54,8 +54,7 @@ def every_trial(trials: Sequence[Trial]) -> str:
         + (", ".join(_one(trial) for trial in trials if trial.cell == cell),)
         for cell in cells
     ]
-    then = " by that iteration" if any(trial.iteration > 1 for trial in trials) else ""
-    head = f"Improvement of each trial [%]; * without a stable improvement{then}:\n"
+    head = f"Improvement of each trial [%]; {starred(trials)}:\n"
     return "\n".join([head, table(("worlds", "grounding", "iteration", "trials"), rows)])
 
 
