@@ -58,7 +58,7 @@ OFFERED = {
     "table4": ("none", "ane_02", "gat", "sgat", "sgat_005"),
     "linear-walk": ("none", "ane_02", "gat", "gat_residual"),
     "fig5": ("none", "ane_02", "gat", "gat_005", "sgat"),
-    "worlds": ("none", "ane_02", "gat", "effects"),
+    "worlds": ("none", "ane_02", "gat_residual_01", "effects"),
 }
 FEW = ("preset=toy", "study.iterate.workers=1", "study.iterate.optimizer.candidates=4")
 
