@@ -57,8 +57,13 @@ def a_transformation(push: float) -> LoadedTransformation:
     return LoadedTransformation(models[0], Solver(models[1], np.eye(n), 1e-9))
 
 
-def test_a_grounding_that_does_nothing_replays_as_no_grounding() -> None:
-    report = check(replace(SCENARIO, grounding=a_transformation(0.0)), POLICY.initial, heldout(), 1)
+GROUNDED_SCENARIO = replace(SCENARIO, grounding=a_transformation(0.0))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_a_grounding_that_does_nothing_replays_as_no_grounding_whatever_noise_is_on_top(noise: float) -> None:
+    grounding = replace(a_transformation(0.0), noise=noise)
+    report = check(replace(SCENARIO, grounding=grounding), POLICY.initial, heldout(), 1)
     assert report.deviations.keys() == {PI0, OFF}
     for simulators in report.deviations.values():
         for ticks in (1, TICKS):
@@ -98,11 +103,11 @@ def test_alpha_stays_at_one_where_nothing_falls_and_sinks_where_all_falls() -> N
 
 def test_trajectories_without_the_body_cannot_be_replayed() -> None:
     with pytest.raises(InputError, match=r"lack gyro\.x"):
-        check(SCENARIO, POLICY.initial, _without("gyro"), 1)
+        check(GROUNDED_SCENARIO, POLICY.initial, _without("gyro"), 1)
 
 
 def test_where_nobody_knows_the_base_only_the_falls_of_pi0_are_checked() -> None:
-    report = check(SCENARIO, POLICY.initial, _without("base"), 1)
+    report = check(GROUNDED_SCENARIO, POLICY.initial, _without("base"), 1)
     assert (report.deviations, report.reach, report.problems, report.rows()) == ({}, None, (), [])
     assert report.metrics()["pi0"]["falls"] == 0
 
@@ -112,7 +117,7 @@ def test_a_neighbour_that_was_cut_short_is_told_as_the_reason() -> None:
     down = np.zeros(11, dtype=bool)
     down[-1] = True
     short = replace(_first(other, 10), fell=down)
-    report = check(SCENARIO, POLICY.initial, replace(heldout(), episodes=(pi0, short)), 1)
+    report = check(GROUNDED_SCENARIO, POLICY.initial, replace(heldout(), episodes=(pi0, short)), 1)
     assert "held out, but fallen or stopped too early: 1; collect neighbours" in report.problems[0]
 
 
@@ -148,7 +153,7 @@ def test_a_body_that_is_farther_is_remarked_on_whatever_its_joints_are() -> None
 
 def test_trajectories_of_another_robot_are_refused() -> None:
     with pytest.raises(InputError, match="differ in joints: their order"):
-        check(SCENARIO, POLICY.initial, replace(heldout(), joints=JOINTS[::-1]), 1)
+        check(GROUNDED_SCENARIO, POLICY.initial, replace(heldout(), joints=JOINTS[::-1]), 1)
 
 
 @pytest.mark.parametrize(("share", "allowed"), [(0.0, 0), (0.1, 2), (0.6, 4), (1.0, 4)])

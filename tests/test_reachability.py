@@ -99,6 +99,6 @@ def test_a_policy_that_does_something_else_drifts_from_the_data() -> None:
     history = grounding.forward.history
     seen, unseen = (transitions(part, history, 1, carried_out=False).windows for part in (walks[:3], walks[3:]))
     other = POLICY.initial + 2.0 * POLICY.scale * np.random.default_rng(1).standard_normal(len(POLICY.initial))
-    still = replace(WALK, grounding=replace(grounding, alpha=0.0))
+    still = replace(WALK, grounding=replace(grounding, alpha=0.0, noise=0.02))
     shares = drifts(still, region(seen, unseen), {"pi0": POLICY.initial, "other": other}, 7)
     assert shares["pi0"] < 0.1 < 0.5 < shares["other"]

@@ -9,7 +9,7 @@ Hanna, Desai, Karnan, Warnell, Stone: Grounded action transformation for sim-to-
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -153,6 +153,11 @@ class LoadedTransformation:
     def span(self) -> int:
         """Ticks before the present one at which its models look."""
         return max(self.forward.history.span, self.inverse.history.span)
+
+    @property
+    def expected(self) -> LoadedTransformation:
+        """The same without noise on top and without draws, whose width would count as error where replays judge it."""
+        return replace(self, noise=0.0, draws=False)
 
     def start(self, layout: Layout, rng: np.random.Generator) -> TransformationRun:
         """Return the grounding at the beginning of an episode.

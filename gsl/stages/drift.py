@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,7 @@ def read_region(folder: Path) -> Region:
 
 
 def drifts(scenario: Scenario, known: Region, found: Mapping[str, np.ndarray], seed: int) -> dict[str, float]:
-    """Return the share of ticks that each policy, in one episode of the simulator, spends outside the data.
+    """Return the share of ticks that each policy spends outside the data, in an episode without draws and noise.
 
     Args:
         scenario: With a `LoadedTransformation`.
@@ -48,6 +49,7 @@ def drifts(scenario: Scenario, known: Region, found: Mapping[str, np.ndarray], s
     """
     grounding = scenario.grounding
     assert isinstance(grounding, LoadedTransformation), "only learned groundings have data"
+    scenario = replace(scenario, grounding=grounding.expected)
     env, shares, columns = scenario.make(), {}, scenario.world.layout.numbers(grounding.forward.joints)
     for index, (name, parameters) in enumerate(found.items()):
         walked = rollout(scenario, env, parameters, derived_seed(seed, index)).only(columns)

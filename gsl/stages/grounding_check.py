@@ -41,7 +41,7 @@ class GroundingReport:
         falls: How many of them ended in a fall.
         values: Their values, shape (episodes,).
         allowed: Falls of π0 in the grounded simulator that are no problem, since it falls in real as well.
-        alpha: How far the grounding goes, where that is known.
+        alpha: How far the grounding goes.
         reach: What of the forward model's predictions the simulator can do, where that was asked.
         cut: How many held-out episodes off π0 ended in a fall or were stopped.
     """
@@ -152,10 +152,10 @@ def allowed_falls(heldout: Batch) -> int:
 
 
 def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int) -> GroundingReport:
-    """Measure a grounding.
+    """Measure a grounding: its replays as it is expected, π0 with its draws and noise.
 
     Args:
-        scenario: The simulator with the task, the policy and the grounding.
+        scenario: The simulator with the task, the policy and a `LoadedTransformation`.
         parameters: Of π0, shape (n_parameters,).
         heldout: Real trajectories that no model has seen.
         seed: Of all randomness.
@@ -170,14 +170,16 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
     if not np.isclose(heldout.control_period, layout.control_period):
         periods = f"{heldout.control_period:g} s, not the world's {layout.control_period:g} s"
         raise InputError(f"the held-out trajectories have a control period of {periods}")
+    grounding = scenario.grounding
+    assert isinstance(grounding, LoadedTransformation), "only learned groundings are checked so"
     env, told = scenario.world.make(), any(map(placed, heldout.episodes))
     try:
         deviations = {
-            group: _compared(env, scenario.grounding, of_policy(heldout, pi0=group == PI0), seed)
+            group: _compared(env, grounding.expected, of_policy(heldout, pi0=group == PI0), seed)
             for group in (PI0, OFF)
             if told
         }
-        reach = _reach(env, scenario.grounding, heldout.episodes, seed) if told else None
+        reach = _reach(env, grounding, heldout.episodes, seed) if told else None
     except KeyError as error:
         raise InputError(f"the real trajectories lack {error.args[0]}: no simulation can start from them") from error
     finally:
@@ -190,7 +192,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         sum(fell for _, fell in ran),
         np.array([value for value, _ in ran]),
         allowed_falls(heldout),
-        getattr(scenario.grounding, "alpha", None),
+        grounding.alpha,
         reach,
         sum(one.ended_in_a_fall for one in of_policy(heldout, pi0=False)),
     )
@@ -216,10 +218,9 @@ def largest_stable(
     return next(stands, last)
 
 
-def _reach(env: Any, grounding: Any, episodes: Sequence[Trajectory], seed: int) -> Reachability | None:
+def _reach(env: Any, grounding: LoadedTransformation, episodes: Sequence[Trajectory], seed: int) -> Reachability | None:
     starts = places(episodes, env.layout, ASKED)
-    asked = isinstance(grounding, LoadedTransformation) and grounding.forward.horizon == 1 and bool(starts)
-    return reachability(env, grounding, starts, seed) if asked else None
+    return reachability(env, grounding, starts, seed) if starts and grounding.forward.horizon == 1 else None
 
 
 def _compared(env: Any, grounding: Any, episodes: Sequence[Any], seed: int) -> dict[str, dict[int, Deviations]]:
