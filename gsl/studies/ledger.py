@@ -6,6 +6,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -130,7 +131,7 @@ class Ledger:
         made = _made(self._rows())
         if len(made) > 1:
             self._console.status(f"these trials were made by {len(made)} versions of gsl; the table says which")
-        return f"Made: {'; '.join(f'trials {trials} by {name}' for name, trials in made.items())}."
+        return f"Made: {'; '.join(f'{trials} by {name}' for name, trials in made.items())}."
 
     def _rows(self) -> list[dict[str, Any]]:
         return sorted((row for rows in self._done.values() for row in rows), key=_number)
@@ -164,12 +165,19 @@ def _made(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
         found.setdefault(row[MADE_BY], {}).setdefault(_number(row), set()).add(row.get("method", ""))
     makers = Counter(number for trials in found.values() for number in trials)
     return {
-        name: ", ".join(
-            f"{number} ({', '.join(sorted(methods))})" if makers[number] > 1 else str(number)
-            for number, methods in sorted(trials.items())
-        )
+        name: _spans({number: ", ".join(sorted(own)) if makers[number] > 1 else "" for number, own in trials.items()})
         for name, trials in found.items()
     }
+
+
+def _spans(trials: Mapping[int, str]) -> str:
+    """Return the trials with what is said of each; those that follow each other with the same are told as one."""
+    parts = []
+    for (_, said), span in groupby(enumerate(sorted(trials)), lambda at: (at[1] - at[0], trials[at[1]])):
+        numbers = [number for _, number in span]
+        through = f" to {numbers[-1]}" if len(numbers) > 1 else ""
+        parts.append(f"{numbers[0]}{through}{f' ({said})' if said else ''}")
+    return f"trial{'s' * (len(trials) > 1)} {', '.join(parts)}"
 
 
 def _made_by() -> str:
