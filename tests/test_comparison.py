@@ -39,6 +39,12 @@ def test_a_loss_counts_as_what_it_is() -> None:
     assert (none.improvement.mean, none.without, none.generation) == (pytest.approx(-2.5), 2, 1.0)
 
 
+def test_where_nothing_new_was_returned_no_generation_is_told() -> None:
+    (none,) = summaries([_trial("none", 1, 0.0, 0, 1)])
+    assert (none.generation, none.best_generation) == (None, "")
+    assert summaries(TRIALS)[0].best_generation == "1.0"
+
+
 def test_a_fall_in_fresh_episodes_is_a_trial_without_improvement() -> None:
     assert _trial("gat", 1, 0.2, 4, falls=1).without and not _trial("gat", 1, 0.2, 4).without
 

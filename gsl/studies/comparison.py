@@ -20,7 +20,7 @@ IMPROVEMENT: Figure = attrgetter("improvement")
 class Summary(NamedTuple):
     """All trials of a cell; improvement and rank are means over trials [%, -], None where a trial has none.
 
-    The generation is that which found what was returned, on average over trials that returned something new.
+    The generation is that which found what was returned, on average over trials that returned something new, if any.
     """
 
     simulator: str
@@ -34,11 +34,16 @@ class Summary(NamedTuple):
     stable: int
     improving: int
     winners: int
-    generation: float
+    generation: float | None
     falls: int
     refused: int
     rank: Interval | None
     real_episodes: float
+
+    @property
+    def best_generation(self) -> str:
+        """The generation as a cell of a table."""
+        return "" if self.generation is None else f"{self.generation:.1f}"
 
     def own(self, trials: Sequence[Trial]) -> list[Trial]:
         """Return those of some trials that it sums up."""
@@ -126,7 +131,7 @@ def _summary(cell: Cell, trials: list[Trial]) -> Summary:
         stable=sum(trial.stable for trial in trials),
         improving=sum(trial.improving for trial in trials),
         winners=sum(trial.winners for trial in trials),
-        generation=sum(generations) / len(generations) if generations else float("nan"),
+        generation=sum(generations) / len(generations) if generations else None,
         falls=sum(trial.falls for trial in trials),
         refused=sum(trial.refused for trial in trials),
         rank=mean_interval(ranks) if len(ranks) == len(trials) else None,

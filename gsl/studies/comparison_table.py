@@ -77,7 +77,7 @@ def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]
         "trials without a gain": lambda one: f"{one.without} of {one.trials}",
         "stable winners": lambda one: f"{one.stable} of {one.winners}",
         "improving winners": lambda one: f"{one.improving} of {one.winners}",
-        "best generation": lambda one: f"{one.generation:.1f}",
+        "best generation": lambda one: one.best_generation,
         "falls in fresh episodes": lambda one: f"{one.falls}",
         "refused by the check": lambda one: f"{one.refused} of {one.trials}",
         "rank correlation": lambda one: "" if one.rank is None else f"{one.rank.mean:.2f}",

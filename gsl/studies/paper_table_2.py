@@ -44,7 +44,7 @@ class Table2:
         )
         rows = [
             (one.world, one.method + (" (best by real)" if (one.world, one.method) in oracles else ""))
-            + (*improvement_cells(one), f"{one.without} of {one.trials}", f"{one.generation:.1f}")
+            + (*improvement_cells(one), f"{one.without} of {one.trials}", one.best_generation)
             + (f"{one.stable} of {one.winners}", f"{one.improving} of {one.winners}", _last(trials, one, task))
             + (_speeds(trials, one, task), str(one.falls), f"{one.refused} of {one.trials}")
             + ("" if one.rank is None else f"{one.rank.mean:.2f}", f"{one.real_episodes:.0f}")

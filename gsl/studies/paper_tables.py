@@ -125,7 +125,7 @@ class LinearWalkTable:
         )
         rows = [
             (one.world, one.method, str(one.iteration), *value_cells(one.value, task))
-            + (f"{one.trials - one.without} of {one.trials}", f"{one.generation:.1f}", str(one.falls))
+            + (f"{one.trials - one.without} of {one.trials}", one.best_generation, str(one.falls))
             + (f"{one.real_episodes:.0f}", *(LINEAR_WALK.get(one.method, NOTHING) if one.iteration == 1 else NOTHING))
             for one in summaries(trials)
         ]
