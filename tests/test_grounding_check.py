@@ -74,6 +74,11 @@ def test_a_grounding_that_does_nothing_replays_as_no_grounding_whatever_noise_is
     assert report.metrics()["pi0"]["falls"] == 0
 
 
+def test_what_is_expected_has_neither_noise_nor_draws() -> None:
+    grounding = replace(a_transformation(0.2), alpha=0.5)
+    assert replace(grounding, noise=0.1, draws=True).expected == grounding
+
+
 @pytest.mark.parametrize("span", [3, 9])
 def test_a_replay_begins_with_all_the_ticks_at_which_a_model_looks(span: int) -> None:
     grounding, n, size = a_transformation(0.0), len(JOINTS), History(span).size(len(JOINTS))
