@@ -28,7 +28,7 @@ COMPOSING = ("composer", "config_errors", "known_settings", "multirun")
 ONLY = {
     "hydra": ("config.py", *(f"commandline/{name}.py" for name in COMPOSING)),
     "pybullet": ("worlds/engine.py", "worlds/camera.py"),
-    "torch": ("models/fitting.py", "optimizers/trpo.py"),
+    "torch": ("models/fitting.py", "models/multi_step.py", "optimizers/trpo.py"),
     "sb3_contrib": ("optimizers/trpo.py",),
     "stable_baselines3": ("optimizers/trpo.py",),
     "mujoco": ("worlds/mujoco.py",),

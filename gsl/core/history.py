@@ -59,12 +59,16 @@ def windows(
         sensed: Body sensors, shape (T + 1, history.sensed).
         ticks: Each at least `history.span` and less than T.
     """
+    return np.concatenate(window_parts(history, position, action, sensed, ticks), axis=1)
+
+
+def window_parts(history: History, position: Any, action: Any, sensed: Any, ticks: Any) -> list[Any]:
+    """Return what windows are laid together from, of whatever `ticks` index: arrays, or tensors by tick."""
     now, back = position[ticks], range(1, history.ticks + 1)
     parts = [action[ticks] - now, now]
     parts += [position[ticks - i] - now for i in back]
     parts += [action[ticks - i] - now for i in back]
-    parts += [sensed[ticks - i] for i in range(history.sensor_ticks if history.sensors else 0)]
-    return np.concatenate(parts, axis=1)
+    return parts + [sensed[ticks - i] for i in range(history.sensor_ticks if history.sensors else 0)]
 
 
 def asked_at_rest(action: np.ndarray, position: np.ndarray) -> np.ndarray:

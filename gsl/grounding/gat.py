@@ -23,6 +23,7 @@ from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
 from gsl.grounding.states import StateTransformation, TableTransformation
+from gsl.models.config import FARTHEST
 from gsl.models.counts import Counts
 from gsl.models.ensemble import Ensemble, Forward
 from gsl.models.head import Likelihood
@@ -57,6 +58,9 @@ class ActionTransformation:
         bool,
         setting("f learns how the robot differs from the simulator, and says as the simulator where data say little"),
     ] = False
+    multi_step: Annotated[
+        int, setting("ticks over which f, where it is an MLP, is fitted to its own answers as well", ge=1, le=FARTHEST)
+    ] = 1
     x: Annotated[
         tuple[str, ...] | Literal["all", "auto"],
         setting("joints that are grounded; auto: the fewest that do as well on validation trajectories"),
@@ -69,9 +73,11 @@ class ActionTransformation:
     ] = None
 
     def __post_init__(self) -> None:
-        """Refuse a residual that would have to be a mixture: it is linear."""
+        """Refuse what no fit can be: a residual is linear, and steps are of a network that predicts a point."""
         if self.residual and self.predicts == "mixture":
             raise ConfigError("residual", "is linear and has no mixture; say predicts=gaussian", given="true")
+        if self.multi_step > 1 and (self.residual or self.predicts != "point"):
+            raise ConfigError("multi_step", "is of a network that predicts a point", given=str(self.multi_step))
 
     def load(self, forward: Callable[[str], Any], inverse: Callable[[str], Any]) -> AnyLoaded:
         """Return the grounding with its models, alpha 1 for `auto`.

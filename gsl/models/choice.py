@@ -9,6 +9,7 @@ import numpy as np
 
 from gsl.core.interruption import held
 from gsl.models.config import ModelConfig
+from gsl.models.free_run import Segments
 from gsl.models.head import POINT, Head
 from gsl.models.linear import fit_linear, with_spread
 from gsl.models.network import Network, Samples
@@ -24,9 +25,19 @@ class Choice(NamedTuple):
 
 
 def fit_network(
-    training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT, whole: bool = False
+    training: Samples,
+    validation: Samples,
+    config: ModelConfig,
+    *,
+    seed: int,
+    head: Head = POINT,
+    whole: bool = False,
+    pieces: tuple[Segments, Segments] | None = None,
 ) -> Network:
-    """Return a network of one family; validation stops the fit of an MLP, and a linear one learns from the `whole`."""
+    """Return a network of one family; validation stops the fit of an MLP, and a linear one learns from the `whole`.
+
+    An MLP's fit goes on with the multi-step loss on `pieces` of both, if there are any.
+    """
     if config.family == "linear":
         inputs, targets = map(np.concatenate, zip(training, validation, strict=True)) if whole else training
         network = fit_linear(inputs, targets, ridge=config.ridge)
@@ -34,7 +45,7 @@ def fit_network(
     with held():
         from gsl.models.fitting import fit_mlp
 
-    return fit_mlp(training, validation, config, seed=seed, head=head)
+    return fit_mlp(training, validation, config, seed=seed, head=head, pieces=pieces)
 
 
 def best(config: ModelConfig, fit: Callable[[ModelConfig, bool], M], score: Callable[[M], float]) -> tuple[M, Choice]:

@@ -61,6 +61,15 @@ class ModelConfig:
         ),
     ] = 0.0
     components: Annotated[int, setting("Gaussians of a mixture", ge=2, le=10)] = 3
+    multi_step: Annotated[
+        int,
+        setting(
+            "ticks over which the fit of an MLP, a forward model, goes on with its own answers fed back to it",
+            source="Venkatraman et al. 2015",
+            ge=1,
+            le=FARTHEST,
+        ),
+    ] = 1
     members: Annotated[int, setting("forward models of an ensemble, each of its own draw of trajectories", ge=1)] = 1
     hidden: Annotated[
         tuple[Annotated[int, setting("", ge=1)], ...], setting("widths of the MLP's hidden layers", min_length=1)
@@ -75,6 +84,15 @@ class ModelConfig:
         """Refuse what no family can be."""
         if self.likelihood == "mixture" and self.family == "linear":
             raise ConfigError("family", "a linear model has no mixture; take mlp or auto", given=self.family)
+        if self.multi_step > 1:
+            for name, only in (("likelihood", "point"), ("encoding", "plain"), ("horizon", 1)):
+                if getattr(self, name) != only:
+                    given = str(getattr(self, name))
+                    raise ConfigError(
+                        name, f"answers that are fed back are {name}={only}; or multi_step=1", given=given
+                    )
+            if self.family == "linear":
+                raise ConfigError("multi_step", "is for an MLP; take family=mlp or auto", given=str(self.multi_step))
         if not self.variables or (self.variables != "all" and len(set(self.variables)) < len(self.variables)):
             raise ConfigError("variables", "names at least one joint or entry of the state, each once")
 
@@ -123,7 +141,9 @@ class ModelConfig:
             families = ("mlp",) if self.likelihood == "mixture" else ("linear", "mlp")
         histories = HISTORIES if self.history == "auto" else (self.history,)
         return {
-            family if len(histories) == 1 else f"{family}_{ticks}": replace(self, family=family, history=ticks)
+            family if len(histories) == 1 else f"{family}_{ticks}": replace(
+                self, family=family, history=ticks, multi_step=self.multi_step if family == "mlp" else 1
+            )
             for family in families
             for ticks in histories
         }

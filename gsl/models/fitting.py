@@ -3,25 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import torch
 
 from gsl.core.scaling import scaling
 from gsl.models.config import ModelConfig
+from gsl.models.free_run import Segments
 from gsl.models.head import POINT, Head
+from gsl.models.multi_step import MultiStep, answering, travelled
 from gsl.models.network import Network, Samples, unscaled
 
-Pair = tuple[torch.Tensor, torch.Tensor]
 Loss = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 LEAST_LOG_SD = -5.0  # in units of the targets' spread: where data are all but exact the likelihood has no end
 
 
-def fit_mlp(training: Samples, validation: Samples, config: ModelConfig, *, seed: int, head: Head = POINT) -> Network:
+def fit_mlp(
+    training: Samples,
+    validation: Samples,
+    config: ModelConfig,
+    *,
+    seed: int,
+    head: Head = POINT,
+    pieces: tuple[Segments, Segments] | None = None,
+) -> Network:
     """Return the network of the epoch with the least loss on `validation`; the same seed, the same weights.
 
     The loss is the squared error of a point, the negative log likelihood of a distribution; a Gaussian's fit weights
-    each term by its variance to the power of `config.beta`.
+    each term by its variance to the power of `config.beta`. Given `pieces` of the same trajectories, a point's fit goes
+    on with the multi-step loss on these.
 
     The caller's number of threads and torch's random state are as before afterwards.
     """
@@ -30,36 +41,52 @@ def fit_mlp(training: Samples, validation: Samples, config: ModelConfig, *, seed
     try:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            return _fitted(training, validation, config, head)
+            return _fitted(training, validation, config, head, pieces)
     finally:
         torch.set_num_threads(threads)
 
 
-def _fitted(training: Samples, validation: Samples, config: ModelConfig, head: Head) -> Network:
+def _fitted(
+    training: Samples, validation: Samples, config: ModelConfig, head: Head, pieces: tuple[Segments, Segments] | None
+) -> Network:
     given, wanted = scaling(training[0]), scaling(training[1])
     known, unseen = ((_tensor(given.apply(x)), _tensor(wanted.apply(y))) for x, y in (training, validation))
     network = _network((training[0].shape[1], *config.hidden, head.width(training[1].shape[1])))
     loss = _surprise(head) if head.draws else torch.nn.functional.mse_loss
     weighted = _surprise(head, config.beta) if head.likelihood == "gaussian" else loss
-    _descend(network, known, unseen, config, weighted, loss)
+    _descend(
+        network,
+        len(known[0]),
+        config,
+        lambda chosen: weighted(network(known[0][chosen]), known[1][chosen]),
+        lambda: loss(network(unseen[0]), unseen[1]),
+    )
+    if pieces is not None:
+        answer, scale = answering(network, given, wanted), travelled(pieces[0])
+        fitted, judging = (MultiStep(part, scale) for part in pieces)
+        _descend(network, len(fitted), config, partial(fitted.loss, answer), partial(judging.loss, answer))
     affine = [layer for layer in network if isinstance(layer, torch.nn.Linear)]
     layers = [(_array(layer.weight), _array(layer.bias)) for layer in affine]
     return unscaled(layers, given, head.scaling(wanted))
 
 
 def _descend(
-    network: torch.nn.Sequential, training: Pair, validation: Pair, config: ModelConfig, descended: Loss, judged: Loss
+    network: torch.nn.Sequential,
+    samples: int,
+    config: ModelConfig,
+    descended: Callable[[torch.Tensor], torch.Tensor],
+    judged: Callable[[], torch.Tensor],
 ) -> None:
-    """Leave the network with the weights of its best epoch: of the least `judged` on `validation`."""
+    """Leave the network with the weights of its best epoch: of the least `judged`, none `descended` of its samples."""
     adam = torch.optim.Adam(network.parameters(), lr=config.rate, weight_decay=config.decay)
     best, weights, without_progress = np.inf, {}, 0
     for _ in range(config.epochs):
-        for chosen in torch.split(torch.randperm(len(training[0])), config.batch):
+        for chosen in torch.split(torch.randperm(samples), config.batch):
             adam.zero_grad()
-            descended(network(training[0][chosen]), training[1][chosen]).backward()  # type: ignore[no-untyped-call]
+            descended(chosen).backward()  # type: ignore[no-untyped-call]
             adam.step()
         with torch.no_grad():
-            loss = judged(network(validation[0]), validation[1]).item()
+            loss = judged().item()
         without_progress += 1
         if loss < best:
             best, without_progress = loss, 0

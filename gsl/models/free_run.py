@@ -23,36 +23,42 @@ def shortest(history: History, horizon: int) -> int:
 
 
 class Segments(NamedTuple):
-    """Pieces of trajectories laid end to end, each of `span + TICKS + 1` ticks.
+    """Pieces of trajectories laid end to end, each of `history.span + ticks + 1` ticks.
 
     Attributes:
+        history: For whose windows they were cut.
+        ticks: That can be predicted.
         position: Joint positions [rad], shape (N * length, n_joints).
         action: [rad], shape (N * length, n_joints).
         sensed: Body sensors, shape (N * length, n_sensed).
         starts: Tick from which each piece is predicted, shape (N,).
     """
 
+    history: History
+    ticks: int
     position: np.ndarray
     action: np.ndarray
     sensed: np.ndarray
     starts: np.ndarray
 
 
-def segments(episodes: Sequence[Trajectory], history: History, *, carried_out: bool) -> Segments:
-    """Cut trajectories into pieces that overlap by their past only."""
-    length, parts = history.span + TICKS + 1, []
+def segments(
+    episodes: Sequence[Trajectory], history: History, *, carried_out: bool, ticks: int = TICKS, every: int = TICKS
+) -> Segments:
+    """Cut trajectories into pieces of some ticks to be predicted and their past, a piece `every` so many ticks."""
+    length, parts = history.span + ticks + 1, []
     for one in episodes:
         columns = one.position, actions(one, carried_out=carried_out), sensed(one, history.sensors)
-        cuts = range(0, usable(one) - length + 1, TICKS)
+        cuts = range(0, usable(one) - length + 1, every)
         parts += [tuple(column[cut : cut + length] for column in columns) for cut in cuts]
     position, action, body = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Segments(position, action, body, history.span + length * np.arange(len(parts)))
+    return Segments(history, ticks, position, action, body, history.span + length * np.arange(len(parts)))
 
 
 def predicted_error(model: Forward, pieces: Segments) -> np.ndarray:
-    """Return the error of the joint positions after `TICKS` ticks [rad], shape (N, n_joints)."""
-    x, last = pieces.position.copy(), pieces.starts + TICKS
-    for tick in range(TICKS):
+    """Return the error of the joint positions at the end of the pieces [rad], shape (N, n_joints)."""
+    x, last = pieces.position.copy(), pieces.starts + pieces.ticks
+    for tick in range(pieces.ticks):
         now = pieces.starts + tick
         x[now + 1] = x[now] + model.effects(windows(model.history, x, pieces.action, pieces.sensed, now))
     error: np.ndarray = x[last] - pieces.position[last]
@@ -61,7 +67,7 @@ def predicted_error(model: Forward, pieces: Segments) -> np.ndarray:
 
 def standstill_error(pieces: Segments) -> np.ndarray:
     """Return the same error of a robot that does not move [rad], shape (N, n_joints)."""
-    error: np.ndarray = pieces.position[pieces.starts] - pieces.position[pieces.starts + TICKS]
+    error: np.ndarray = pieces.position[pieces.starts] - pieces.position[pieces.starts + pieces.ticks]
     return error
 
 
@@ -71,7 +77,7 @@ def recovered_error(model: InverseModel, pieces: Segments) -> np.ndarray:
     The past actions it sees are its own answers; the first tick of a piece, where they are not yet, does not count.
     """
     a, errors = pieces.action.copy(), []
-    for tick in range(TICKS + 1 - model.horizon):
+    for tick in range(pieces.ticks + 1 - model.horizon):
         now = pieces.starts + tick
         wanted = pieces.position[now + model.horizon] - pieces.position[now]
         a[now] = model.actions(windows(model.history, pieces.position, a, pieces.sensed, now), a[now], wanted)

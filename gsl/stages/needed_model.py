@@ -37,6 +37,8 @@ def looking_ahead(model: ModelConfig, extra: int) -> ModelConfig:
 def as_needed(model: ModelConfig, grounding: ActionTransformation) -> ModelConfig:
     """Return the settings of a forward model that can do what a grounding asks of it."""
     wanted = model if grounding.predicts == "point" else replace(model, likelihood=grounding.predicts)
+    if grounding.multi_step > 1:
+        wanted = replace(wanted, multi_step=grounding.multi_step)
     if grounding.residual:
         wanted = replace(wanted, family="linear", encoding="plain", ridge=max(wanted.ridge, SHRINKING))
     return wanted if grounding.gate is None or wanted.members > 1 else replace(wanted, members=MEMBERS)

@@ -21,7 +21,7 @@ from gsl.models.choice import Choice, best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Forward, ensemble
 from gsl.models.forward import ForwardModel
-from gsl.models.free_run import predicted_error, segments, shortest, standstill_error
+from gsl.models.free_run import Segments, predicted_error, segments, shortest, standstill_error
 from gsl.models.inverse import Solver
 from gsl.models.network import Samples
 from gsl.stages.drift import write_region
@@ -109,7 +109,7 @@ class TrainForward:
         write_region(folder, region(seen, unseen))
         groups = {"pi0": of_policy(known.heldout, pi0=True), "off_pi0": of_policy(known.heldout, pi0=False)}
         measured = {name: measures(model, long) for name, part in groups.items() if (long := _long(self.model, part))}
-        return {**summary(choice), "trajectories": len(data.training) + len(data.validation), "heldout": measured}
+        return {**summary(choice, data), "heldout": measured}
 
     def _simulator(self, reference: str, batch: Batch) -> ForwardModel:
         """Return the model of the simulator behind an inverse model, if f can correct it."""
@@ -120,6 +120,8 @@ class TrainForward:
         if base.joints != batch.joints:
             problem = "its model of the simulator knows other joints"
             raise ConfigError("residual_to", f"{problem}; train both on the same trajectories and model.variables")
+        if self.model.multi_step > 1:
+            raise ConfigError("model.multi_step", "is of a model that corrects none", given=str(self.model.multi_step))
         if self.model.encoding != "plain":
             raise ConfigError("model.encoding", "angles that are corrected are plain", given=self.model.encoding)
         if (self.model.history, self.model.horizon) != (base.history.ticks, base.horizon):
@@ -187,7 +189,8 @@ def _member(
     """Return a model of some of the training trajectories, and of those of the validation if it is the `whole`."""
     head = config.head
     known, unseen = (_samples(config, part, base) for part in (episodes, data.validation.episodes))
-    network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole)
+    parted = (_pieces(config, episodes), _pieces(config, data.validation.episodes)) if config.multi_step > 1 else None
+    network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole, pieces=parted)
     memory = np.zeros(unseen[1].shape[1])
     if head.draws:
         network, memory = calibrated(network, head, [_samples(config, [one], base) for one in data.validation.episodes])
@@ -199,6 +202,10 @@ def _samples(config: ModelConfig, episodes: Sequence[Trajectory], base: ForwardM
     rows = _rows(config, episodes)
     known = 0.0 if base is None else base.effects(rows.windows[:, : base.network.inputs])
     return rows.windows, encode(rows.change - known, config.encoding)
+
+
+def _pieces(config: ModelConfig, episodes: Sequence[Trajectory]) -> Segments:
+    return segments(episodes, config.of_body, carried_out=True, ticks=config.multi_step, every=1)
 
 
 def _rows(config: ModelConfig, episodes: Sequence[Trajectory]) -> Transitions:

@@ -12,6 +12,7 @@ from gsl.core.angles import encode
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.core.transitions import Transitions, transitions
+from gsl.errors import ConfigError
 from gsl.models.choice import Choice, best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.forward import ForwardModel
@@ -57,6 +58,8 @@ class TrainInverse:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the model."""
+        if self.model.multi_step > 1:
+            raise ConfigError("model.multi_step", "is of a forward model", given=str(self.model.multi_step))
         path = data_file(self.data)
         data = parts(path, other=REAL, share=self.heldout, seed=self.seed)
         console.status(f"fitting an inverse model to {len(data.training)} trajectories")
@@ -70,7 +73,7 @@ class TrainInverse:
         errors = recovered_error(model, segments(data.heldout.episodes, self.model.of_joints, carried_out=True))
         by_joint = degrees_by_joint(errors, model.joints)
         measured = {"recovered_action_deg": degrees(errors), "recovered_action_by_joint_deg": by_joint}
-        return {**summary(choice), "method": self.method, "trajectories": len(data.training), "heldout": measured}
+        return {**summary(choice, data), "method": self.method, "heldout": measured}
 
 
 def fitted(config: ModelConfig, data: Parts, seed: int, method: Method, damping: float) -> tuple[InverseModel, Choice]:

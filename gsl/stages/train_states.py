@@ -58,8 +58,8 @@ def forward_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int)
     by_variable = {
         str(variable): explained(errors[:, [k]], rows.changes[:, [k]]) for k, variable in enumerate(model.variables)
     }
-    told = {"space": StateForward.space, "trajectories": len(data.training) + len(data.validation)}
-    return {**summary(choice), **told, "heldout": {**measured, "r2_by_variable": by_variable}}
+    heldout = {**measured, "r2_by_variable": by_variable}
+    return {**summary(choice, data), "space": StateForward.space, "heldout": heldout}
 
 
 def inverse_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int) -> Mapping[str, Any]:
@@ -74,9 +74,9 @@ def inverse_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int)
     choices, make = data.training.metadata.get("choices", 0), _nearest if _choices(data) else _inverse
     model, choice = best(config, partial(make, data=data, seed=seed), partial(_recovery, data=data.validation))
     write_model(folder, model)
-    told = {"space": StateForward.space, "method": model.method, "trajectories": len(data.training)}
+    told = {"space": StateForward.space, "method": model.method}
     name = "recovered_choices" if choices else "action_r2"
-    return {**summary(choice), **told, "heldout": {name: 1.0 - _recovery(model, data.heldout)}}
+    return {**summary(choice, data), **told, "heldout": {name: 1.0 - _recovery(model, data.heldout)}}
 
 
 def few(batch: Batch) -> bool:
@@ -85,8 +85,9 @@ def few(batch: Batch) -> bool:
 
 
 def _refuse_robots(config: ModelConfig) -> None:
-    for name, asked in (("horizon", config.horizon > 1), ("members", config.members > 1), ("sensors", config.sensors)):
-        if asked:
+    usual = ModelConfig()
+    for name in ("horizon", "members", "sensors", "multi_step"):
+        if getattr(config, name) != getattr(usual, name):
             raise ConfigError(f"model.{name}", "is for robots; a gymnasium environment's state is observed whole")
 
 

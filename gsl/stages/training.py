@@ -13,6 +13,7 @@ from gsl.core.split import split
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
 from gsl.errors import TrajectoryError
+from gsl.models.choice import Choice
 from gsl.robots.catalogue import names, robot
 from gsl.stages.headline import several
 from gsl.storage.references import resolve
@@ -163,6 +164,8 @@ def checked(path: Path, episodes: Sequence[Trajectory], needed: int) -> Sequence
     return long
 
 
-def summary(choice: Any) -> dict[str, Any]:
-    """Return which variant was chosen, and the scores, as metrics."""
-    return {"family": choice.config.family, "history": choice.config.history, "scores": dict(choice.scores)}
+def summary(choice: Choice, data: Parts) -> dict[str, Any]:
+    """Return as metrics which variant was chosen, the scores, and how many trajectories it has learned from."""
+    learned = len(data.training) + len(data.validation) * choice.config.learns_from_all
+    told = {"family": choice.config.family, "history": choice.config.history, "scores": dict(choice.scores)}
+    return {**told, "trajectories": learned}

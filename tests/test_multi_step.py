@@ -1,0 +1,100 @@
+"""The multi-step loss of a forward model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from commands import done, refused
+from toy_plant import QUICK, SLOW, a_batch
+
+from gsl.core.history import History
+from gsl.errors import ConfigError
+from gsl.grounding.gat import ActionTransformation
+from gsl.models.config import ModelConfig
+from gsl.models.forward import ForwardModel
+from gsl.models.free_run import predicted_error, segments
+from gsl.models.multi_step import MultiStep, travelled
+from gsl.models.network import Network
+from gsl.stages.needed_model import as_needed
+from gsl.stages.train_forward import TrainForward
+from gsl.stages.train_inverse import TrainInverse
+from gsl.storage.trajectories import write
+
+QUIET: Any = SimpleNamespace(status=lambda text: None, table=lambda title, columns, rows: None)
+TICKS = 4
+
+
+@pytest.mark.parametrize("history", [History(2), History(1, ("gyro",), 3)])
+def test_the_loss_is_of_what_a_model_says_when_it_is_fed_with_its_own_answers(history: History) -> None:
+    batch, rng = a_batch(SLOW, "real"), np.random.default_rng(3)
+    pieces = segments(batch.episodes, history, carried_out=True, ticks=TICKS, every=1)
+    layer = 0.1 * rng.standard_normal((2, history.size(2))), np.array([0.01, -0.02])
+    model = ForwardModel(Network([layer]), history, batch.joints)
+    errors = [predicted_error(model, pieces._replace(ticks=tick)) for tick in range(1, TICKS + 1)]
+    by_tick, scale = np.array([np.mean(one**2) for one in errors]), np.array([1.0, 2.0, 3.0, 4.0])
+    weight, bias = (torch.as_tensor(part, dtype=torch.float32) for part in layer)
+    loss = MultiStep(pieces, scale).loss(lambda windows: windows @ weight.T + bias)
+    assert loss.item() == pytest.approx(np.mean(by_tick / scale), rel=1e-4)
+    few = torch.arange(3)
+    some = MultiStep(pieces, scale).loss(lambda windows: windows @ weight.T + bias, few)
+    assert some.item() == pytest.approx(np.mean([np.mean(one[:3] ** 2) for one in errors] / scale), rel=1e-4)
+    moved = travelled(pieces)
+    assert len(moved) == TICKS and 0.0 < moved[0] < moved[1]
+
+
+def test_it_brings_answers_that_are_fed_back_nearer_to_the_robot(tmp_path: Path) -> None:
+    write(tmp_path / "real.parquet", a_batch(SLOW, "real", pi0=6, others=12))
+    found = {}
+    for ticks in (1, 10):
+        (tmp_path / str(ticks)).mkdir()
+        model = ModelConfig(family="mlp", hidden=(20,), epochs=15, multi_step=ticks)
+        metrics = TrainForward(str(tmp_path / "real.parquet"), model).run(tmp_path / str(ticks), QUIET)
+        found[ticks] = metrics["heldout"]["off_pi0"]["free_run_deg"]
+    assert found[10] < 0.7 * found[1]
+
+
+def test_a_grounding_asks_for_it_and_a_linear_f_has_none() -> None:
+    needed = as_needed(ModelConfig(), ActionTransformation("f", "i", multi_step=8))
+    assert {name: one.multi_step for name, one in needed.variants.items()} == {"linear": 1, "mlp": 8}
+
+
+@pytest.mark.parametrize(
+    ("settings", "line"),
+    [
+        ({"likelihood": "gaussian"}, "likelihood = gaussian: answers that are fed back are likelihood=point"),
+        ({"encoding": "sincos"}, "encoding = sincos: answers that are fed back are encoding=plain"),
+        ({"horizon": 2}, "horizon = 2: answers that are fed back are horizon=1"),
+        ({"family": "linear"}, "multi_step = 5: is for an MLP"),
+    ],
+)
+def test_answers_that_cannot_be_fed_back_are_refused(settings: dict[str, Any], line: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        ModelConfig(multi_step=5, **settings)
+    assert str(caught.value).startswith(line)
+
+
+def test_it_is_of_a_forward_model_that_corrects_nothing(tmp_path: Path) -> None:
+    for more in ({"residual": True}, {"predicts": "gaussian"}):
+        with pytest.raises(ConfigError, match="multi_step = 5: is of a network that predicts a point"):
+            ActionTransformation("f", "i", multi_step=5, **more)
+    write(tmp_path / "sim.parquet", a_batch(QUICK, "sim", noise=0.02))
+    write(tmp_path / "real.parquet", a_batch(SLOW, "real"))
+    with pytest.raises(ConfigError, match="multi_step = 5: is of a forward model"):
+        TrainInverse(str(tmp_path / "sim.parquet"), ModelConfig(multi_step=5)).run(tmp_path, QUIET)
+    TrainInverse(str(tmp_path / "sim.parquet"), ModelConfig("linear"), method="solve").run(tmp_path, QUIET)
+    inverse = str(tmp_path / "inverse_model.safetensors")
+    with pytest.raises(ConfigError, match="multi_step = 5: is of a model that corrects none"):
+        TrainForward(str(tmp_path / "real.parquet"), ModelConfig(multi_step=5), inverse).run(tmp_path, QUIET)
+
+
+def test_it_is_one_setting_of_the_command(tmp_path: Path) -> None:
+    write(tmp_path / "real.parquet", a_batch(SLOW, "real"))
+    told = done("train-forward", "data=real.parquet", "model=mlp", "model.multi_step=3", folder=tmp_path)
+    assert "forward model (mlp) on held-out real trajectories" in told.out
+    said = refused("train-forward", "data=real.parquet", "model.multi_step=30", folder=tmp_path)
+    assert said == "model.multi_step = 30: must be at most 10"
