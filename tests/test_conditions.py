@@ -236,7 +236,9 @@ def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
     said = refused("cross-validate", "real=logs.parquet", *LINE, "folds=3", folder=tmp_path)
     assert said == "folds = 3: the label gain has 2 values"
     said = refused("cross-validate", "real=logs.parquet", *LINE, "folds=2", "checks=values", folder=tmp_path)
-    assert said == "folds = 2: two groups leave no next one to check on; take three"
+    assert said == "folds = 2: two groups leave no next one to check on; take three, or checks=motions"
+    said = refused("cross-validate", "real=logs.parquet", *LINE, "checks=values", folder=tmp_path)
+    assert said == "by = gain: two groups leave no next one to check on; take three, or checks=motions"
 
 
 def test_values_are_held_out_in_groups(tmp_path: Path) -> None:

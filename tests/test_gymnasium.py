@@ -589,6 +589,7 @@ def test_what_does_not_go_together_is_refused(arguments: str, line: str, tmp_pat
         ({"variables": (0, 2)}, "model.variables = 2: the state has entries 0 to 1"),
         ({"horizon": 2}, "model.horizon: is for robots"),
         ({"members": 3}, "model.members: is for robots"),
+        ({"multi_step": 3}, "model.multi_step: is for robots"),
     ],
 )
 def test_models_that_an_environment_cannot_have(changes: dict[str, Any], line: str, tmp_path: Path) -> None:

@@ -39,8 +39,11 @@ class StateTransformation:
         if (f.states, f.variables) != (f_inv.states, f_inv.variables):
             problem = "its state or variables of interest and those of the forward model differ; train both alike"
             raise ConfigError("inverse_model", problem)
-        if isinstance(f_inv, NearestChoice) and self.alpha != 1.0:
-            raise ConfigError("alpha", "choices cannot be mixed; leave it at 1", given=f"{self.alpha:g}")
+        if isinstance(f_inv, NearestChoice):
+            for name, usual in (("alpha", 1.0), ("noise", 0.0)):
+                if (given := getattr(self, name)) != usual:
+                    problem = f"choices are no numbers to be mixed; leave it at {usual:g}"
+                    raise ConfigError(name, problem, given=f"{given:g}")
 
     def start(self, layout: Layout, rng: np.random.Generator) -> StateTransformationRun:
         """Return the grounding at the beginning of an episode.

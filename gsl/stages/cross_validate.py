@@ -103,7 +103,7 @@ class CrossValidate:
             for group in groups:
                 lengths = [usable(one) for one in self._rest(log, group).episodes]
                 self.gat.check(lengths, f"the trajectories without {self.by} {', '.join(map(str, group))}")
-        after = [*groups[1:], groups[0]] if self.checks == "values" and len(groups) > 2 else [[]] * len(groups)
+        after = [*groups[1:], groups[0]] if self.checks == "values" else [[]] * len(groups)
         folds = [self._fold(log, *pair, console) for pair in zip(groups, after, strict=True)]
         documents.write_json(folder / DATA, [one.told() for one in folds])
         (folder / TABLE).write_text(table(folds, self.by), encoding="utf-8")
@@ -113,13 +113,14 @@ class CrossValidate:
     def _groups(self, log: Batch) -> list[list[Any]]:
         """Return what is held out together: each value alone, or every so many'th of them in order."""
         values = self._values(log)
-        if self.folds is None:
-            return [[value] for value in values]
-        if self.folds == 2 and self.checks == "values":
-            raise ConfigError("folds", "two groups leave no next one to check on; take three", given="2")
-        if self.folds > len(values):
-            raise ConfigError("folds", f"the label {self.by} has {len(values)} values", given=str(self.folds))
-        return [values[k :: self.folds] for k in range(self.folds)]
+        count = len(values) if self.folds is None else self.folds
+        if count > len(values):
+            raise ConfigError("folds", f"the label {self.by} has {len(values)} values", given=str(count))
+        if count == 2 and self.checks == "values":
+            name = "by" if self.folds is None else "folds"
+            problem = "two groups leave no next one to check on; take three, or checks=motions"
+            raise ConfigError(name, problem, given=str(getattr(self, name)))
+        return [values[k::count] for k in range(count)]
 
     def _values(self, log: Batch) -> list[Any]:
         labels = log.metadata.get("episodes") or []

@@ -107,7 +107,7 @@ class Evaluate:
             "gain": gain(fresh[best], fresh[0]),
             "failed_check": [found[index].name for index in checked if index not in (0, best)],
             "stable_policies": len(stable),
-            "improving_policies": sum(mean(done) > mean(tried[0]) for done in stable),
+            "improving_policies": sum(mean(done) > mean(fresh[0]) for done in stable),
             "policies": len(found) - 1,
             "real_episodes": sum(map(len, [*tried, *checked.values(), *fresh.values()])),
         }
