@@ -19,6 +19,7 @@ from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
 from gsl.studies.effort import told
 from gsl.studies.ledger import Ledger, recipe, recipes
+from gsl.studies.paper_cells import one_by_one
 from gsl.studies.paper_table_2 import Table2
 from gsl.studies.paper_tables import Figure5, LinearWalkTable, Table3, Table4
 from gsl.studies.trial import Cell, Trial
@@ -30,7 +31,7 @@ from gsl.worlds.bullet import BulletWorld
 EXAMPLES, RESULTS = (Path(__file__).parents[1] / place for place in ("examples", "docs/results"))
 
 KEPT = {
-    "table2": ("none", "ane_02", "gat", "sgat_residual"),
+    "table2": ("none", "ane_02", "gat", "gat_multi_step", "gat_gated", "identified", "effects_sgat", "randomised"),
     "table2-paper": ("none", "gat"),
     "table3": ("gat",),
     "table4": ("gat", "sgat"),
@@ -39,17 +40,9 @@ KEPT = {
     "worlds": ("none",),
 }
 ALL = (
-    *("none", "ane_005", "ane_01", "ane_02", "ane_04", "randomised", "gat", "gat_005", "gat_gated"),
-    *(
-        "gat_residual",
-        "gat_residual_01",
-        "sgat",
-        "sgat_residual",
-        "identified",
-        "effects",
-        "effects_gat",
-        "effects_sgat",
-    ),
+    *("none", "ane_005", "ane_01", "ane_02", "ane_04", "randomised", "gat", "gat_005", "gat_residual"),
+    *("gat_residual_01", "gat_multi_step", "gat_gated", "sgat"),
+    *("identified", "effects", "effects_gat", "effects_sgat"),
 )
 OFFERED = {
     "table2": ALL,
@@ -80,7 +73,8 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     iterations = {"table3": 2, "table4": 2, "linear-walk": 2}.get(what, 1)
     assert {one["iteration"] for one in trials} == set(range(1, iterations + 1))
     table = (folder / "table.md").read_text()
-    assert all(f"| {name} " in table for name in KEPT[what])
+    assert all(f"| {name} " in table for name in KEPT[what]) and "Sizes: preset=toy." in table
+    assert len((folder / "trials.md").read_text().splitlines()) == 2 + len(trials)
     assert what != "table2-paper" or {one["alpha"] for one in trials} == {None, 1.0}
     assert all((one["rank"] is not None) == (what in ("table2", "worlds")) for one in trials)
     learned = {
@@ -122,6 +116,25 @@ def test_a_file_that_holds_no_trials_is_refused(tmp_path: Path) -> None:
 def test_a_trace_is_of_a_joint_that_the_models_know(tmp_path: Path) -> None:
     said = gsl("reproduce", "fig6", "preset=toy", "joint=RKneePitch", folder=tmp_path)
     assert said.code == 2 and "joint = RKneePitch: the models know no joint of this name" in said.lines[-1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ("fig6 grounding@iterate.grounding=none", "iterate.grounding: only a transformation of actions can be drawn"),
+        ("fig6 duration=0.001", "duration = 0.001: is less than a tick, 0.02 s"),
+        ("fig7 begin=50 iterate.task.duration=1.2", "begin = 50: π0's real walk is over after "),
+        ("budget budgets=[2]", "budgets.0 = 2: must be at least 3"),
+        ("budget iterate.iterations=2", "iterate.iterations = 2: a point of the curve has 1"),
+        ("budget grounding@methods.gat=effects_gat", "methods.gat: learns from real trajectories alone"),
+        ("budget grounding@methods.gat=none", "methods.gat: learns from real trajectories alone"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_before_anything_is_made(arguments: str, line: str, tmp_path: Path) -> None:
+    what, *more = arguments.split()
+    said = gsl("reproduce", what, "preset=toy", *more, folder=tmp_path)
+    assert said.code == 2 and said.lines[-1].startswith(f"gsl reproduce {what}: {line}")
+    assert not list(tmp_path.iterdir())
 
 
 class Silent:
@@ -233,7 +246,8 @@ def test_a_figure_is_one_command(what: str, figures: list[str], tmp_path: Path) 
     said = done("reproduce", what, "preset=toy", "iterate.workers=1", folder=tmp_path)
     folder = tmp_path / "runs" / what / "reproduce"
     assert sorted(path.name for path in folder.glob("*.png")) == figures
-    assert "RMS distance from real" in said.out
+    assert "RMS distance from real" in said.out and "from nothing" in said.err
+    assert "Sizes: preset=toy." in (folder / "table.md").read_text()
 
 
 def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
@@ -245,6 +259,7 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     assert all(one["error"] > 0.0 < one["bare"] for one in points[1:])
     assert points[1]["bare"] == points[2]["bare"]  # measured on the same trajectories
     assert (folder / "budget.png").stat().st_size > 10_000
+    assert "Sizes: preset=toy. Made: trial 1 by " in (folder / "table.md").read_text()
     assert "about " in said.err and "from nothing" in said.err
     assert "gat, 4 trajectories, trial 1: grounded simulator against" in said.err
     assert "grounded simulator against" not in said.out and "real trajectories collected" in said.out
@@ -293,12 +308,40 @@ def test_table_2_marks_the_noise_that_only_real_figures_choose() -> None:
         for k in (1, 2)
     ]
     text = Table2().markdown(trials, Walk())
-    assert "ane_01 (best by real)" in text and "ane_02 (best" not in text
-    assert "best by real" not in Table2().markdown([one for one in trials if one.method != "ane_01"], Walk())
+    assert "| ane_01 (oracle: best by real) |" in text and "| ane_02 (chosen beforehand) |" in text
+    assert "oracle" not in Table2().markdown([one for one in trials if one.method != "ane_01"], Walk())
+    best = Table2(width="ane_01").markdown(trials, Walk())
+    assert "| ane_01 (chosen beforehand; oracle: best by real) |" in best and "| ane_02 |" in best
     assert "| 18.9 | 5 of 10 | 6.6 |" in next(line for line in text.splitlines() if line.startswith("| w | ane_02"))
     assert "| w | ane_02 | +4.0 (4.0 to 4.0) |  |" in text and "| w | none |  | -4.0 (-4.0 to -4.0) |" in text
     assert "| w | ane_01 - none |" not in text  # their order is not what is tested
     assert "| w | gat - none |" in Table2().markdown([*trials, a_trial("gat", 1), a_trial("gat", 2)], Walk())
+
+
+@pytest.mark.parametrize("table", [Table2(), Table4(), Figure5()])
+def test_rows_say_where_trials_were(table: Any) -> None:
+    trials = [
+        a_trial("gat", k, world=world, iteration=iteration, outcome={"mean distance [deg]": 7.0})
+        for k in (1, 2)
+        for world in ("v", "w")
+        for iteration in (1, 2)
+    ]
+    lines = table.markdown(trials, Walk()).split("\n\n")[0].splitlines()[2:6]
+    told = {tuple(cell for cell in line.split(" | ")[:3] if cell in ("| v", "| w", "1", "2")) for line in lines}
+    assert told == {("| v", "1"), ("| v", "2"), ("| w", "1"), ("| w", "2")}
+    paper = [any(value in line for value in ("22.5", "15.7 ± 3.0")) for line in lines]
+    assert isinstance(table, Figure5) or paper == [True, False, True, False]  # which has figures of the first
+
+
+def test_everything_of_a_single_trial_is_told() -> None:
+    trials = [a_trial("gat", 1, alpha=0.9, falls=2), a_trial("none", 2, improvement=None, rank=None, generation=0)]
+    titles, _, first, second = one_by_one(trials, Walk()).splitlines()
+    row = dict(zip(titles.split(" | "), first.split(" | "), strict=True))
+    assert (row["trial"], row["improvement [%]"], row["stable winners"], row["improving winners"]) == (
+        *("1", "25.0", "4 of 5", "3"),
+    )
+    assert (row["falls"], row["rank"], row["alpha"], row["best generation"]) == ("2 of 10", "0.50", "0.9", "2")
+    assert "| 20.0 | 25.0 |  | 1.0 |  | 4 of 5 |" in second
 
 
 def test_table_2_counts_how_often_the_last_generation_improves() -> None:
@@ -338,11 +381,11 @@ def test_table_4_counts_falls_over_episodes() -> None:
     known = [a_trial(method, k, value=0.2) for method in ("none", "gat") for k in (1, 2)]
     trials = [*known, *(a_trial("sgat", k, falls=k, outcome={"speed [cm/s]": 20.0 + k}) for k in (1, 2))]
     lines = Table4().markdown(trials, Walk()).splitlines()
-    row = next(line for line in lines if line.startswith("| sgat"))
+    row = next(line for line in lines if line.startswith("| w | sgat"))
     assert "| 21.5 | 3 of 20 | 0 to 79 |" in row and "0 of 10" in row  # shares .1 and .2: over trials, not over walks
     for other in ("none", "gat"):
         assert f"| w | sgat - {other} | 1 | 5.0 | 5.0 to 5.0 | +1.5 | -4.9 to +7.9 |" in lines
-    assert "| none | 1 | 20.0 | 20.0 to 20.0 | nan | 0 of 20 | 0 to 16 |" in next(x for x in lines if "| none" in x)
+    assert "| w | none | 1 | 20.0 | 20.0 to 20.0 | nan | 0 of 20 | 0 to 16 |" in "\n".join(lines)
 
 
 def test_the_linear_walk_has_distances_where_percentages_mean_nothing() -> None:

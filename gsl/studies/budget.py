@@ -12,7 +12,6 @@ from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import mean_interval
 from gsl.errors import ConfigError
-from gsl.grounding.effects import learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
@@ -26,11 +25,13 @@ from gsl.stages.grounding_gate import settled
 from gsl.stages.iterate import Iterate
 from gsl.stages.link import built
 from gsl.stages.rollout import Scenario
+from gsl.stages.training import FEWEST
 from gsl.storage.trajectories import read
 from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import told as bounds
 from gsl.studies.effort import seconds, told
 from gsl.studies.ledger import Known, Ledger, known_parent, recipes
+from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.external import asking
 
@@ -71,11 +72,15 @@ class Budget:
 
     iterate: Annotated[Iterate, setting("what a trial is; its grounding and real budget are replaced")]
     methods: Annotated[
-        Mapping[str, Grounding | ActionTransformation], setting("learned groundings, by name", min_length=1)
+        Mapping[str, Grounding | ActionTransformation], setting("transformations of actions, by name", min_length=1)
     ]
-    budgets: Annotated[tuple[int, ...], setting("real trajectories to learn from, the fewest first", min_length=1)]
+    budgets: Annotated[
+        tuple[Annotated[int, setting("", ge=FEWEST)], ...],
+        setting("real trajectories to learn from, the fewest first", min_length=1),
+    ]
     trials: Annotated[int, setting("trials of each", ge=1)]
     known: Known = None
+    preset_name: PresetName = ""
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -85,11 +90,15 @@ class Budget:
         """Run all trials, write the points, the table and the figure.
 
         Raises:
-            ConfigError: A grounding learns nothing from trajectories, or the optimizer is no search.
+            ConfigError: A grounding does not learn from trajectories alone, or the optimizer is no search.
         """
         for name, grounding in self.methods.items():
-            if not learned(grounding):
-                raise ConfigError(f"methods.{name}", "learns nothing from real trajectories; take gat or sgat")
+            if not isinstance(grounding, ActionTransformation):
+                raise ConfigError(f"methods.{name}", "learns from real trajectories alone; take gat or sgat")
+            self.iterate.chain.check(grounding)
+        for name, usual in (("iterations", 1), ("pretrained", False)):
+            if (given := getattr(self.iterate, name)) != usual:
+                raise ConfigError(f"iterate.{name}", f"a point of the curve has {usual}", given=str(given))
         console.status(f"{told(self._seconds())} from nothing; a study that was stopped goes on where it was")
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
@@ -176,7 +185,7 @@ class Budget:
         held = (
             f"Joints are measured on {HELD_OUT} real trajectories off π0 more at most, the same for all of a trial.\n"
         )
-        told_all = "\n".join([table((*titles, *titles_of_errors), rows), held, made])
+        told_all = "\n".join([table((*titles, *titles_of_errors), rows), held, f"{sizes_of(self.preset_name)} {made}"])
         (folder / TABLE).write_text(told_all + "\n", encoding="utf-8")
         plain = mean_interval([one.bare for one in points if one.bare is not None]).mean
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}

@@ -18,7 +18,9 @@ from gsl.grounding.states import TableTransformation
 from gsl.models.counts import Counts
 from gsl.report.markdown import table as markdown
 from gsl.report.noise_curve import Curve, noise_curve
+from gsl.stages.headline import several
 from gsl.storage.documents import write_json
+from gsl.studies.sizes import PresetName, sizes_of
 from gsl.worlds.gymnasium import GymnasiumWorld
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "figure_11.png"
@@ -64,6 +66,7 @@ class Figure11:
     rounds: Annotated[int, setting("most rounds", ge=1)] = 30
     evaluations: Annotated[int, setting("real episodes that estimate the return", ge=1)] = 10_000
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
+    preset_name: PresetName = ""
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
@@ -81,7 +84,8 @@ class Figure11:
                     progress.advance()
         write_json(folder / DATA, [one._asdict() for one in points])
         bounds = {noise: self._bounds(start, noise) for noise in self.noises}
-        (folder / TABLE).write_text(_table(points, bounds), encoding="utf-8")
+        sizes = f"{sizes_of(self.preset_name)} {several(self.trials, 'trial')}."
+        (folder / TABLE).write_text(f"{_table(points, bounds)}\n{sizes}\n", encoding="utf-8")
         _draw(folder / FIGURE, points, bounds)
         return {"points": len(points), "noises": len(self.noises)}
 

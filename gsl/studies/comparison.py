@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -44,6 +44,10 @@ class Summary(NamedTuple):
     def best_generation(self) -> str:
         """The generation as a cell of a table."""
         return "" if self.generation is None else f"{self.generation:.1f}"
+
+    def cells(self, fields: Mapping[str, str]) -> list[str]:
+        """Return some fields, told by title, as cells of a table."""
+        return [str(getattr(self, name)) for name in fields.values()]
 
     def own(self, trials: Sequence[Trial]) -> list[Trial]:
         """Return those of some trials that it sums up."""

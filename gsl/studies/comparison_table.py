@@ -20,7 +20,7 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
 
     Trials are told as improvements where π0 is surely worth something in each of them, else as what they are worth.
     """
-    first, columns, titles = found[0].method, _columns(found, unit), _places(found)
+    first, columns, titles = found[0].method, _columns(found, unit), places(found)
     as_shares = all(trial.improvement is not None for trial in trials)
     figure = "improvement" if as_shares else "value"
     own = SHARE if as_shares else unit
@@ -31,7 +31,7 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
         values = [
             own.bare(trial.improvement if as_shares else trial.value) + "*" * trial.without for trial in one.own(trials)
         ]
-        where = [str(getattr(one, name)) for name in titles.values()]
+        where = one.cells(titles)
         single.append((*where, one.method, ", ".join(values)))
         if one.method != first:
             apart = differences(trials, Cell(*one[:4]), first, attrgetter(figure))
@@ -56,17 +56,20 @@ def starred(trials: Sequence[Trial]) -> str:
     return f"* without a stable improvement{then}"
 
 
-def _places(found: Sequence[Summary]) -> dict[str, str]:
-    """Return by title the fields that tell where trials were: simulator and iteration only where there are several."""
+def places(found: Sequence[Summary], told: Sequence[str] = ()) -> dict[str, str]:
+    """Return by title the fields that tell where trials were, but for those that a table has `told` already.
+
+    Simulator and iteration are among them only where there are several.
+    """
     titles = {"simulator": "simulator", "real world": "world", "iteration": "iteration"}
     several = {name for name in titles.values() if len({getattr(one, name) for one in found}) > 1}
-    return {title: name for title, name in titles.items() if name in {*several, "world"}}
+    return {title: name for title, name in titles.items() if name in {*several, "world"} - {*told}}
 
 
 def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]]:
     """Return the cells below each title, but for columns that have none: without falls there are no stable winners."""
     tellers: dict[str, Callable[[Summary], object]] = {
-        **{title: attrgetter(name) for title, name in _places(found).items()},
+        **{title: attrgetter(name) for title, name in places(found).items()},
         "grounding": lambda one: one.method,
         f"{in_unit('in real', unit.name)} (95 %)": lambda one: (
             f"{unit.bare(one.value.mean)} ({unit.interval([one.value.lower, one.value.upper])})"

@@ -9,6 +9,7 @@ from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
 from gsl.stages.headline import several
+from gsl.stages.iterate import Iterate
 from gsl.stages.population import threads
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.values import Values
@@ -33,8 +34,8 @@ def seconds(study: Compare, where: str = "study.iterate") -> float:
         raise ConfigError(f"{where}.optimizer", "studies of robots search: take cma_es")
     workers = threads(iterate.workers)
     sims = study.simulators or {"": iterate.sim}
-    real = sum(_rollout(study, world, REAL) for world in study.worlds.values()) / len(study.worlds)
-    sim = sum(_rollout(study, world, SIM) for world in sims.values()) / len(sims)
+    real = sum(_rollout(iterate, world, REAL) for world in study.worlds.values()) / len(study.worlds)
+    sim = sum(_rollout(iterate, world, SIM) for world in sims.values()) / len(sims)
     searched = iterate.optimizer.generations * iterate.optimizer.candidates * budget.rollouts
     measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
     collected = sum(budget.real), sum(budget.sim)
@@ -59,15 +60,22 @@ def seconds(study: Compare, where: str = "study.iterate") -> float:
     return (rolled / workers + fitted) * study.trials * len(sims)
 
 
+def seconds_of_models(iterate: Iterate) -> float:
+    """Return an estimate of how long an iteration's data and models take from nothing [s]."""
+    real, sim = _rollout(iterate, iterate.real, REAL), _rollout(iterate, iterate.sim, SIM)
+    rolled = sum(iterate.budget.real) * real + sum(iterate.budget.sim) * sim
+    return rolled / threads(iterate.workers) + APART
+
+
 def told(duration: float) -> str:
     """Return a duration for people."""
     minutes = max(1, round(duration / 60.0))
     return f"about {several(minutes, 'minute')}" if minutes < 90 else f"about {minutes / 60.0:.1f} hours"
 
 
-def _rollout(study: Compare, world: World, role: str) -> float:
-    scenario = Scenario(world, study.iterate.task, study.iterate.policy, role, NoGrounding())
-    env, parameters = scenario.make(), study.iterate.policy.initial
+def _rollout(iterate: Iterate, world: World, role: str) -> float:
+    scenario = Scenario(world, iterate.task, iterate.policy, role, NoGrounding())
+    env, parameters = scenario.make(), iterate.policy.initial
     rollout(scenario, env, parameters, 0)
     begin = time.process_time()
     for seed in range(TRIED):

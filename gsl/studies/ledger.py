@@ -25,7 +25,10 @@ DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
 MADE = ("forward_model", "inverse_model", "diagnosis")  # of a grounding: names of what a trial makes itself
 NUMBER = ("number", "trial")  # what rows call their trial
 # Settings that came after trials were written down, at what changes nothing.
-LATER = {"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim", "rested": False}
+LATER = {"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim", "rested": False,
+         "multi_step": 1}  # fmt: skip
+
+LABELS = ("preset_name",)  # that tables tell, and no result depends on
 
 Known = Annotated[str | None, setting("figures of trials that the same study has made before, not to be run again")]
 
@@ -145,7 +148,7 @@ class Ledger:
 def _effective(told: Any) -> Any:
     if isinstance(told, dict):
         later = [key for key, value in LATER.items() if told.get(key) == value]
-        counts = {key: value for key, value in told.items() if key not in {*WITHOUT_EFFECT, *later}}
+        counts = {key: value for key, value in told.items() if key not in {*WITHOUT_EFFECT, *LABELS, *later}}
         return {key: _effective(value) for key, value in counts.items() if not (key in MADE and isinstance(value, str))}
     return [_effective(value) for value in told] if isinstance(told, list) else told
 

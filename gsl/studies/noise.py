@@ -32,6 +32,7 @@ from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
 from gsl.studies.ledger import Known, Ledger, known_parent, recipes
 from gsl.studies.noise_table import REFERENCE, NoiseTable, Place, Point
+from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import GymnasiumWorld, try_out
 from gsl.worlds.world import World
@@ -53,7 +54,10 @@ class NoiseStudy:
     worlds: Annotated[
         Mapping[str, GymnasiumWorld], setting("the real worlds, by name; their noise is replaced", min_length=1)
     ]
-    noises: Annotated[tuple[float, ...], setting("standard deviations of the real worlds' noise", min_length=1)]
+    noises: Annotated[
+        tuple[Annotated[float, setting("", ge=0)], ...],
+        setting("standard deviations of the real worlds' noise", min_length=1),
+    ]
     methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name", min_length=1)]
     further: Annotated[CmaEs | Trpo, setting("how it goes on from π0")]
     trials: Annotated[int, setting("trials of each method", ge=1)]
@@ -63,6 +67,7 @@ class NoiseStudy:
     choice: Annotated[Literal["sim", "real"], setting("where the best of a search's generations is chosen")] = "sim"
     workers: Workers = -1
     known: Known = None
+    preset_name: PresetName = ""
 
     def __post_init__(self) -> None:
         """Refuse what only several rounds know, and rounds that go on from what nothing real has chosen."""
@@ -103,7 +108,9 @@ class NoiseStudy:
             trials=self.trials,
             chosen=self.choice == REAL,
         )
-        (folder / TABLE).write_text(f"{table.told(*self._below)}\n{made}\n", encoding="utf-8")
+        (folder / TABLE).write_text(
+            f"{table.told(*self._below)}\n{sizes_of(self.preset_name)} {made}\n", encoding="utf-8"
+        )
         self._draw(folder / FIGURE, table)
         return {"points": len(points)}
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from gsl.core.statistics import Interval
 from gsl.report.markdown import table
 from gsl.stages.headline import Unit
-from gsl.studies.comparison import Summary
-from gsl.studies.comparison_table import starred, told
+from gsl.studies.comparison import Summary, summaries
+from gsl.studies.comparison_table import places, starred, told
 from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
 
@@ -56,6 +57,33 @@ def every_trial(trials: Sequence[Trial]) -> str:
     ]
     head = f"Improvement of each trial [%]; {starred(trials)}:\n"
     return "\n".join([head, table(("worlds", "grounding", "iteration", "trials"), rows)])
+
+
+def one_by_one(trials: Sequence[Trial], task: Task) -> str:
+    """Return all that is told of each single trial as a table."""
+    where = places(summaries(trials))
+    tellers: dict[str, Callable[[Trial], str]] = {
+        **{title: partial(_field, name) for title, name in where.items()},
+        "grounding": lambda one: one.method,
+        "trial": lambda one: str(one.number),
+        f"π0 [{task.unit}]": lambda one: f"{task.shown * one.start:.1f}",
+        f"returned [{task.unit}]": lambda one: f"{task.shown * one.value:.1f}",
+        "improvement [%]": lambda one: "" if one.improvement is None else f"{one.improvement:.1f}",
+        f"gained at least, 95 % [{task.unit}]": lambda one: f"{task.shown * one.surely:.1f}",
+        "best generation": lambda one: str(one.generation or ""),
+        "stable winners": lambda one: f"{one.stable} of {one.winners}",
+        "improving winners": lambda one: str(one.improving),
+        "falls": lambda one: f"{one.falls} of {one.episodes}",
+        "rank": lambda one: "" if one.rank is None else f"{one.rank:.2f}",
+        "alpha": lambda one: "" if one.alpha is None else f"{one.alpha:g}",
+        "refused": lambda one: "yes" if one.refused else "no",
+        "real episodes": lambda one: str(one.real_episodes),
+    }
+    return table(tuple(tellers), [[tell(one) for tell in tellers.values()] for one in trials])
+
+
+def _field(name: str, trial: Trial) -> str:
+    return str(getattr(trial, name))
 
 
 def _one(trial: Trial) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from gsl.core.setting import component, setting
 from gsl.report.markdown import table
 from gsl.studies.comparison import Summary, differences, orders, summaries
-from gsl.studies.comparison_table import told
+from gsl.studies.comparison_table import places, told
 from gsl.studies.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, worth
 from gsl.studies.trial import Cell, Trial
 from gsl.tasks.task import Task
@@ -25,9 +25,11 @@ class Table2:
     Winners of generations are measured in the episodes of the choice, up to their first fall: a winner is stable if it
     fell in none, and improving if it was faster than π0 besides.
 
-    Action noise is told for every width; the best of them by real figures knows what no user knows beforehand.
+    Action noise is told for every width; the best of them by real figures is an oracle, which knows what no user knows
+    beforehand.
     """
 
+    width: Annotated[str, setting("action noise whose width was chosen beforehand")] = "ane_02"
     tested: Annotated[tuple[str, ...], setting("methods whose order is tested")] = ("gat", "sgat")
     against: Annotated[tuple[str, ...], setting("methods that they are tested against")] = ("none", "ane_02")
     beside: Annotated[tuple[str, ...], setting("methods that improvements are set against")] = ("none", "ane_02")
@@ -35,27 +37,29 @@ class Table2:
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table, differences paired by trial, the test of the order, and the single trials."""
         found = summaries(trials)
-        oracles = {_best_noise(found, world) for world in dict.fromkeys(one.world for one in found)}
+        where = places(found)
         titles = (
-            *("real world", "grounding", "improvement [%]", "95 % interval", "trials without a gain"),
+            *(*where, "grounding", "improvement [%]", "95 % interval", "trials without a gain"),
             *("best generation", "stable winners", "improving winners", "last generation's improves"),
             *(f"π0 and returned [{task.unit}]", "falls", "refused", "rank"),
             *("real episodes", "paper: improvement [%]", "paper: without", "paper: best generation"),
         )
         rows = [
-            (one.world, one.method + (" (best by real)" if (one.world, one.method) in oracles else ""))
+            (*one.cells(where), self._named(one, found))
             + (*improvement_cells(one), f"{one.without} of {one.trials}", one.best_generation)
             + (f"{one.stable} of {one.winners}", f"{one.improving} of {one.winners}", _last(trials, one, task))
             + (_speeds(trials, one, task), str(one.falls), f"{one.refused} of {one.trials}")
             + ("" if one.rank is None else f"{one.rank.mean:.2f}", f"{one.real_episodes:.0f}")
-            + TABLE_2.get("ane" if one.method == "ane_02" else one.method, NOTHING)
+            + self._paper(one)
             for one in found
         ]
         parts = [table(titles, rows)]
-        apart = [(one.world, one.method, *(_apart(trials, one, other) for other in self.beside)) for one in found]
-        if any(any(cells) for _, _, *cells in apart):
+        apart = [[_apart(trials, one, other) for other in self.beside] for one in found]
+        if any(map(any, apart)):
             parts.append("Improvement against others, paired by trial [percentage points] (95 %, each for itself):\n")
-            parts.append(table(("real world", "grounding", *(f"than {other}" for other in self.beside)), apart))
+            beside = (*where, "grounding", *(f"than {other}" for other in self.beside))
+            rows = [(*one.cells(where), one.method, *cells) for one, cells in zip(found, apart, strict=True)]
+            parts.append(table(beside, rows))
         tested = [
             (world, f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
             for world in dict.fromkeys(one.world for one in found)
@@ -65,6 +69,19 @@ class Table2:
             parts.append("Order of methods by their stable winners, Wilcoxon's signed rank over trials:\n")
             parts.append(table(("real world", "difference", "stable winners a trial", "p, Holm-corrected"), tested))
         return "\n".join([*parts, every_trial(trials)])
+
+    def _named(self, one: Summary, found: Sequence[Summary]) -> str:
+        """Return the name of a method, of a width of action noise with how it was chosen."""
+        noisy = [other for other in found if other.method.startswith("ane") and other.improvement is not None]
+        noisy = [other for other in noisy if other[:2] == one[:2] and other.iteration == one.iteration]
+        said = ["chosen beforehand"] if one.method == self.width else []
+        if len(noisy) > 1 and one is max(noisy, key=lambda other: other.improvement.mean if other.improvement else 0.0):
+            said.append("oracle: best by real")
+        return f"{one.method} ({'; '.join(said)})" if said else one.method
+
+    def _paper(self, one: Summary) -> tuple[str, ...]:
+        method = "ane" if one.method == self.width else one.method
+        return TABLE_2.get(method, NOTHING) if one.iteration == 1 else NOTHING
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return what a trial is worth."""
@@ -89,13 +106,6 @@ def _last(trials: Sequence[Trial], one: Summary, task: Task) -> str:
         return ""
     better = (trial.last_falls == 0 and trial.last[SPEED] > task.shown * trial.start for trial in own)
     return f"{sum(better)} of {len(own)}"
-
-
-def _best_noise(found: Sequence[Summary], world: str) -> tuple[str, str]:
-    noisy = [one for one in found if one.world == world and one.method.startswith("ane") and one.improvement]
-    if len(noisy) < 2:
-        return world, ""  # nothing was chosen
-    return world, max(noisy, key=lambda one: one.improvement.mean if one.improvement else 0.0).method
 
 
 def _speeds(trials: Sequence[Trial], one: Summary, task: Task) -> str:

@@ -16,7 +16,7 @@ from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval, wilson
 from gsl.report.markdown import table
 from gsl.studies.comparison import differences, summaries
-from gsl.studies.comparison_table import told
+from gsl.studies.comparison_table import places, told
 from gsl.studies.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, value_cells, worth
 from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
@@ -80,17 +80,20 @@ class Table4:
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
+        found = summaries(trials)
+        where = places(found, told=["iteration"])
         titles = (
-            *("grounding", "step", f"in real, a fall worth 0 [{task.unit}]", "95 % interval", "speed [cm/s]", "falls"),
-            *("95 % interval [%]", "real episodes", "paper: speed [cm/s]", "paper: falls"),
+            *(*where, "grounding", "step", f"in real, a fall worth 0 [{task.unit}]", "95 % interval"),
+            *("speed [cm/s]", "falls", "95 % interval [%]", "real episodes", "paper: speed [cm/s]", "paper: falls"),
         )
         rows = []
-        for one in summaries(trials):
+        for one in found:
             own = one.own(trials)
             low, high = (f"{100 * bound:.0f}" for bound in _share_of_falls(own)[1:])
             speed = np.mean([trial.outcome.get(SPEED, np.nan) for trial in own])
             rows.append(
-                (one.method, str(one.iteration), *value_cells(one.value, task), f"{speed:.1f}")
+                (*one.cells(where), one.method, str(one.iteration))
+                + (*value_cells(one.value, task), f"{speed:.1f}")
                 + (f"{one.falls} of {sum(trial.episodes for trial in own)}", f"{low} to {high}")
                 + (f"{one.real_episodes:.0f}", *TABLE_4.get((one.method, one.iteration), NOTHING[:2]))
             )
@@ -145,8 +148,9 @@ class Figure5:
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the figure's values as a table."""
-        rows, first = [], trials[0].method
-        for one in summaries(trials):
+        rows, first, found = [], trials[0].method, summaries(trials)
+        where = places(found)
+        for one in found:
             own = one.own(trials)
             apart = differences(trials, own[0].cell, first, _on_average)
             cells = (
@@ -157,9 +161,9 @@ class Figure5:
                 *_degrees(trial.outcome[ON_AVERAGE] for trial in own),
                 f"{one.real_episodes:.0f}",
             )
-            rows.append((one.world, one.method, *cells))
+            rows.append((*one.cells(where), one.method, *cells))
         titles = (
-            *("real world", "grounding", "mean distance [°]", "95 % interval", f"minus {first} [°] (95 %)"),
+            *(*where, "grounding", "mean distance [°]", "95 % interval", f"minus {first} [°] (95 %)"),
             *("final distance [°]", "95 % interval", "trials above the goal"),
             *("chosen in real: mean distance [°]", "95 % interval", "real episodes"),
         )

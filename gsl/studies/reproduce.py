@@ -18,11 +18,12 @@ from gsl.studies.compare import DATA, TABLE, Compare
 from gsl.studies.comparison import summaries
 from gsl.studies.effort import seconds, told
 from gsl.studies.ledger import known_parent
-from gsl.studies.paper_cells import Drawn
+from gsl.studies.paper_cells import Drawn, one_by_one
+from gsl.studies.sizes import PresetName, sizes_of
 from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
 
-FIGURE = "trials.png"
+FIGURE, TRIALS = "trials.png", "trials.md"
 
 
 @runtime_checkable
@@ -44,6 +45,7 @@ class Reproduce:
 
     study: Annotated[Compare, setting("what is run")]
     table: Annotated[PaperTable, setting("how it is told")]
+    preset_name: PresetName = ""
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -58,8 +60,9 @@ class Reproduce:
         console.status(f"{told(seconds(self.study))} from nothing; a study that was stopped goes on where it was")
         trials, made = self.study.carried_out(folder, console)
         task = self.study.iterate.task
-        parts = [self.table.markdown(trials, task), f"{_sizes(self.study)}\n", made]
+        parts = [self.table.markdown(trials, task), f"{sizes_of(self.preset_name)} {_sizes(self.study)}\n", made]
         (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
+        (folder / TRIALS).write_text(one_by_one(trials, task), encoding="utf-8")
         _draw(folder / FIGURE, trials, self.study, self.table.drawn(trials, task))
         return {"trials": self.study.trials, "summaries": [one._asdict() for one in summaries(trials)]}
 

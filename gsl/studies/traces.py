@@ -27,6 +27,8 @@ from gsl.stages.needed_model import extra_ticks
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.training import degrees
 from gsl.storage.models import read_forward_model, read_inverse_model
+from gsl.studies.effort import seconds_of_models, told
+from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import REAL
 from gsl.worlds.grounded import GroundedEnv
 from gsl.worlds.world import World
@@ -48,6 +50,7 @@ class Figure6:
     joint: Annotated[str, setting("joint that is told to move")] = "LShoulderPitch"
     change: Annotated[float, setting("command, from the start posture", unit="rad")] = -math.pi / 12
     duration: Annotated[float, setting("what is shown", unit="s", gt=0)] = 1.0
+    preset_name: PresetName = ""
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
@@ -55,7 +58,7 @@ class Figure6:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Train the grounding, play the command in the three worlds, draw."""
-        _check_joint(self.iterate, self.joint)
+        _check(self.iterate, self.joint, self.duration)
         iterate, loaded = self.iterate, trained(self.iterate, folder.parent, console)
         layout = iterate.sim.layout
         index, period = layout.joints.index(self.joint), layout.control_period
@@ -71,7 +74,8 @@ class Figure6:
         time = period * np.arange(1 - PAST, ticks + 1)
         joint_trace(folder / "figure_6.png", Traces(time, command, real, bare, grounded, sent), self.joint)
         moved = slice(PAST, None)  # before, all of them rest
-        return _told(folder, self.joint, real[moved], {"ungrounded": bare[moved], "grounded": grounded[moved]})
+        found = {"ungrounded": bare[moved], "grounded": grounded[moved]}
+        return _told(folder, self, real[moved], found)
 
 
 @component
@@ -84,6 +88,7 @@ class Figure7:
     joint: Annotated[str, setting("joint that is shown")] = "RAnklePitch"
     begin: Annotated[float, setting("when simulators take over from the real robot", unit="s", gt=0)] = 2.0
     duration: Annotated[float, setting("what is shown", unit="s", gt=0)] = 1.0
+    preset_name: PresetName = ""
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
@@ -94,13 +99,16 @@ class Figure7:
         iterate = self.iterate
         if extra_ticks(iterate.sim):
             raise ConfigError("iterate.sim", "acts late: f looks several ticks ahead there and draws no trace")
-        _check_joint(iterate, self.joint)
-        loaded = trained(iterate, folder.parent, console)
+        _check(iterate, self.joint, self.duration)
         walk = _walked(iterate)
         layout = iterate.sim.layout
         index, period = layout.joints.index(self.joint), layout.control_period
         tick = max(PAST, round(self.begin / period))
+        if tick >= len(walk):
+            problem = f"π0's real walk is over after {period * len(walk):.1f} s; begin before"
+            raise ConfigError("begin", problem, given=f"{self.begin:g}")
         ticks = min(round(self.duration / period), len(walk) - tick)
+        loaded = trained(iterate, folder.parent, console)
         place = Place(observations(walk, layout), walk.action, tick)
         env: Any = iterate.sim.make()
         bare, grounded = (
@@ -120,12 +128,13 @@ class Figure7:
         )
         joint_trace(folder / "figure_7b.png", plain._replace(grounded=grounded), self.joint)
         found = {"ungrounded": bare, "forward model": predicted, "grounded": grounded}
-        return _told(folder, self.joint, plain.real, found)
+        return _told(folder, self, plain.real, found)
 
 
 def trained(iterate: Iterate, home: Path, console: Any) -> LoadedTransformation:
     """Return the grounding of an iteration's settings, alpha 1 for `auto`, trained below `home`."""
-    assert isinstance(iterate.grounding, ActionTransformation), "only a transformation of actions can be drawn"
+    assert isinstance(iterate.grounding, ActionTransformation), "_check has refused others"
+    console.status(f"{told(seconds_of_models(iterate))} from nothing; what is built is not built again")
     chain = replace(iterate.chain, accept=True)
     ready = chain.trained(home, iterate.grounding, None, iterate.seed, console)
     loaded = ready.load(read_forward_model, read_inverse_model)
@@ -133,9 +142,15 @@ def trained(iterate: Iterate, home: Path, console: Any) -> LoadedTransformation:
     return loaded
 
 
-def _check_joint(iterate: Iterate, joint: str) -> None:
+def _check(iterate: Iterate, joint: str, duration: float) -> None:
+    """Refuse what cannot be drawn."""
+    if not isinstance(iterate.grounding, ActionTransformation):
+        raise ConfigError("iterate.grounding", "only a transformation of actions can be drawn, such as gat")
     known = iterate.forward_model.joints_of_interest(iterate.sim.layout.joints, "iterate.forward_model")
     check_known([joint], known, "joint")
+    if round(duration / iterate.sim.layout.control_period) < 1:
+        problem = f"is less than a tick, {iterate.sim.layout.control_period:g} s"
+        raise ConfigError("duration", problem, given=f"{duration:g}")
 
 
 def _played(
@@ -168,8 +183,13 @@ def _predicted(forward: Forward, walk: Trajectory, tick: int, ticks: int) -> np.
     return x[tick + 1 : tick + 1 + ticks]
 
 
-def _told(folder: Path, joint: str, real: np.ndarray, found: Mapping[str, np.ndarray]) -> Mapping[str, Any]:
+def _told(
+    folder: Path, figure: Figure6 | Figure7, real: np.ndarray, found: Mapping[str, np.ndarray]
+) -> Mapping[str, Any]:
     errors = {name: degrees(trace - real) for name, trace in found.items()}
-    rows = [(joint, name, f"{error:.2f}") for name, error in errors.items()]
-    (folder / TABLE).write_text(table(TITLES, rows), encoding="utf-8")
-    return {"joint": joint, "distance_deg": errors}
+    rows = [(figure.joint, name, f"{error:.2f}") for name, error in errors.items()]
+    own, neighbours = figure.iterate.budget.real
+    learned = f"The grounding learned from {own} real episodes of π0 and {neighbours} around it."
+    below = f"{sizes_of(figure.preset_name)} {learned}"
+    (folder / TABLE).write_text(f"{table(TITLES, rows)}\n{below}\n", encoding="utf-8")
+    return {"joint": figure.joint, "distance_deg": errors}
