@@ -250,6 +250,23 @@ def test_a_figure_is_one_command(what: str, figures: list[str], tmp_path: Path) 
     assert "Sizes: preset=toy." in (folder / "table.md").read_text()
 
 
+def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
+    left_out = ("gat_residual", "gat_multi_step", "gat_gated", "effects", "effects_gat")
+    few = ("preset=toy", "iterate.workers=1", "iterate.task.duration=1.2", *(f"~methods.{name}" for name in left_out))
+    said = done("reproduce", "replays", *few, "~worlds.nao_weak", folder=tmp_path)
+    assert "from nothing" in said.err
+    folder = tmp_path / "runs/replays/reproduce"
+    rows = {one["method"]: one for one in json.loads((folder / "replays.json").read_text())}
+    assert set(rows) == {"none", "gat", "identified"} and not list(tmp_path.rglob("optimize"))
+    assert rows["identified"]["joints"] < rows["none"]["joints"] != rows["gat"]["joints"]
+    assert rows["none"]["unreached"] is None and 0.0 <= rows["gat"]["unreached"] < 1.0
+    table = (folder / "table.md").read_text()
+    assert all(f"| nao_worn | {name} | {one['joints']:.2f} |" in table for name, one in rows.items())
+    assert (folder / "replays.png").stat().st_size > 10_000
+    refused = gsl("reproduce", "replays", *few, "+grounding@methods.ane=ane", "name=n", folder=tmp_path)
+    assert refused.code == 2 and "methods.ane: is drawn anew each time" in refused.lines[-1]
+
+
 def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     few = ("preset=toy", "iterate.workers=1", "iterate.optimizer.candidates=4", "iterate.task.duration=1.2")
     said = done("reproduce", "budget", *few, "budgets=[4,6]", "~methods.sgat", folder=tmp_path)

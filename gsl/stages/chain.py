@@ -63,6 +63,11 @@ class Budget:
         return self.real_episodes, self.real_neighbours
 
     @property
+    def learned(self) -> str:
+        """The same in words."""
+        return f"{self.real_episodes} real episodes of a policy and {self.real_neighbours} around it to learn from"
+
+    @property
     def sim(self) -> tuple[int, int]:
         """The same of the simulator."""
         return self.sim_episodes, self.sim_neighbours

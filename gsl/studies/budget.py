@@ -18,26 +18,22 @@ from gsl.grounding.none import NoGrounding
 from gsl.report.budget_curve import Line, budget_curve
 from gsl.report.markdown import table
 from gsl.stages.chain import Budget as ChainBudget
-from gsl.stages.collect import FILE as TRAJECTORIES
-from gsl.stages.collect import Collect
 from gsl.stages.grounding_check import BARE, GROUNDED, OFF, check
 from gsl.stages.grounding_gate import settled
 from gsl.stages.iterate import Iterate
-from gsl.stages.link import built
 from gsl.stages.rollout import Scenario
 from gsl.stages.training import FEWEST
-from gsl.storage.trajectories import read
 from gsl.studies.compare import Compare
+from gsl.studies.comparison_table import finely
 from gsl.studies.comparison_table import told as bounds
 from gsl.studies.effort import seconds, told
+from gsl.studies.held_out import MEASURED, held_out
 from gsl.studies.ledger import Known, Ledger, known_parent, recipes
 from gsl.studies.sizes import PresetName, sizes_of
-from gsl.tasks.task import REAL, SIM
-from gsl.worlds.external import asking
+from gsl.tasks.task import SIM
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
 NONE = "none"
-HELD_OUT = 12  # trajectories of neighbours, on which errors are measured
 OWN = 3  # one of so many trajectories is of π0, the others of its neighbours
 
 
@@ -136,29 +132,12 @@ class Budget:
         seed = self.iterate.seed + number - 1
         grounding = chain.diagnosed(place.parents[2] / "diagnosis" / place.name, self.methods[method], seed, console)
         ready = chain.ready(place, grounding, None, seed, console)
-        held = read(self._held_out(place.parents[2] / "held_out" / place.name, seed, console) / TRAJECTORIES)
+        held = held_out(chain, place.parents[2] / "held_out" / place.name, seed, console)
         found = chain.search(place / "optimize", ready, None, seed, console)
         measured = chain.measure(place / "evaluate", found, seed, console)
         bare = Scenario(chain.sim, chain.task, chain.policy, SIM, ready)
         report = check(settled(bare, found.metrics), chain.policy.initial, held, derived_seed(seed, "held out"))
         return Point(method, count, number, measured.metrics["returned"]["value"], *_errors(report.metrics()["errors"]))
-
-    def _held_out(self, place: Path, seed: int, console: Any) -> Path:
-        """Return the folder of real trajectories around π0 that no model of a trial learns from."""
-        chain = self.iterate.chain
-        stage = Collect(
-            world=asking(chain.real, place),
-            task=chain.task,
-            policy=chain.policy,
-            role=REAL,
-            episodes=1,
-            neighbours=HELD_OUT,
-            spread=chain.budget.spread,
-            action_noise=chain.budget.real_action_noise,
-            workers=chain.workers,
-            seed=derived_seed(seed, "held out"),
-        )
-        return built(stage, place, console).folder
 
     def _ungrounded(self, place: Path, number: int, console: Any) -> Point:
         chain, seed = self.iterate.chain, self.iterate.seed + number - 1
@@ -175,18 +154,15 @@ class Budget:
             wrong = [mean_interval([one.error for one in cell if one.error is not None]) for cell in cells]
             values[method], errors[method] = Line(self.budgets, means), Line(self.budgets, wrong)
             rows += [
-                (method, str(n), f"{value.mean:.1f}", bounds(value), f"{error.mean:.2f}", bounds(error))
+                (method, str(n), f"{value.mean:.1f}", bounds(value), f"{error.mean:.2f}", finely(error))
                 for n, value, error in zip(self.budgets, means, wrong, strict=True)
             ]
         none = mean_interval([shown * one.value for one in points if one.method == NONE])
         rows.append((NONE, "0", f"{none.mean:.1f}", bounds(none), "", ""))
         titles = ("grounding", "real trajectories collected", f"in real [{unit}]", "95 % interval")
         titles_of_errors = ("joints after 0.2 s, off π0 [°]", "95 % interval")
-        held = (
-            f"Joints are measured on {HELD_OUT} real trajectories off π0 more at most, the same for all of a trial.\n"
-        )
-        told_all = "\n".join([table((*titles, *titles_of_errors), rows), held, f"{sizes_of(self.preset_name)} {made}"])
-        (folder / TABLE).write_text(told_all + "\n", encoding="utf-8")
+        below = f"{MEASURED}\n\n{sizes_of(self.preset_name)} {made}\n"
+        (folder / TABLE).write_text(f"{table((*titles, *titles_of_errors), rows)}\n{below}", encoding="utf-8")
         plain = mean_interval([one.bare for one in points if one.bare is not None]).mean
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
         bases = dict(zip(panels, (none.mean, plain), strict=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
 
@@ -48,6 +49,11 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
 def told(interval: Interval, *, sign: bool = False) -> str:
     """Return the bounds of an interval for people."""
     return SHARE.interval([interval.lower, interval.upper], sign=sign)
+
+
+def finely(interval: Interval) -> str:
+    """Return the bounds of an interval of degrees for people; a single value has none."""
+    return "-" if math.isinf(interval.lower) else f"{interval.lower:.2f} to {interval.upper:.2f}"
 
 
 def starred(trials: Sequence[Trial]) -> str:

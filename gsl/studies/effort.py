@@ -23,8 +23,10 @@ APART = 25.0  # of a learned grounding: fits and checks [s]
 DIAGNOSED = {"diagnose": 7.5, "identify": 2.0}  # of a second of motion in the air, on two cores [s]
 
 
-def seconds(study: Compare, where: str = "study.iterate") -> float:
+def seconds(study: Compare, where: str = "study.iterate", *, search: bool = True) -> float:
     """Return an estimate of a study's duration from nothing [s], good to a factor of two or so.
+
+    Without searches it is that of data, models and diagnoses.
 
     Raises:
         ConfigError: The optimizer is no search; `where` are the settings that it is one of.
@@ -38,6 +40,8 @@ def seconds(study: Compare, where: str = "study.iterate") -> float:
     sim = sum(_rollout(iterate, world, SIM) for world in sims.values()) / len(sims)
     searched = iterate.optimizer.generations * iterate.optimizer.candidates * budget.rollouts
     measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
+    if not search:
+        searched = measured = 0
     collected = sum(budget.real), sum(budget.sim)
     rounds, worlds = iterate.iterations * len(study.worlds), len(study.worlds)
     flights = {

@@ -7,17 +7,14 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 
 from gsl.core.setting import component, setting
-from gsl.grounding.effects import DiagnosedEffects
-from gsl.grounding.gat import ActionTransformation
-from gsl.grounding.grounding import Grounding
 from gsl.optimizers.cma_es import CmaEs
-from gsl.report.style import EFFECTS, GAT, SGAT, UNINFORMED
 from gsl.report.trial_dots import Dots, trial_dots
 from gsl.stages.headline import several
 from gsl.studies.compare import DATA, TABLE, Compare
 from gsl.studies.comparison import summaries
 from gsl.studies.effort import seconds, told
 from gsl.studies.ledger import known_parent
+from gsl.studies.method_colour import method_colour
 from gsl.studies.paper_cells import Drawn, one_by_one
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.studies.trial import Trial
@@ -74,9 +71,8 @@ def _sizes(study: Compare) -> str:
     searched = (
         f"{optimizer.generations} generations of {optimizer.candidates} candidates, {budget.rollouts} rollouts each"
     )
-    learned = f"{budget.real_episodes} real episodes of a policy and {budget.real_neighbours} around it to learn from"
     measured = f"{budget.episodes} for the choice, {budget.check} for the check, {budget.confirmation} for the report"
-    return f"{several(study.trials, 'trial')}; {searched}; {learned}; {measured}."
+    return f"{several(study.trials, 'trial')}; {searched}; {budget.learned}; {measured}."
 
 
 def _draw(path: Path, trials: Sequence[Trial], study: Compare, drawn: Drawn) -> None:
@@ -89,14 +85,6 @@ def _draw(path: Path, trials: Sequence[Trial], study: Compare, drawn: Drawn) -> 
         shown, failed = zip(*((value, one) for trial, value, one in every if trial.cell == cell), strict=True)
         panel = " ".join(filter(None, (cell.simulator, cell.world)))
         name = f"{cell.method}, iteration {cell.iteration}" if further else cell.method
-        panels.setdefault(panel, {})[name] = Dots(shown, failed, _colour(study.methods[cell.method]))
+        panels.setdefault(panel, {})[name] = Dots(shown, failed, method_colour(study.methods[cell.method]))
     missed = drawn.missed or f"no {'sure' if tolerant else 'stable'} improvement{' by the iteration' * further}"
     trial_dots(path, panels, axis=drawn.axis, title=f"Every trial (hollow: {missed}), mean and 95 % interval")
-
-
-def _colour(grounding: Grounding) -> str:
-    if isinstance(grounding, DiagnosedEffects):
-        return EFFECTS
-    if not isinstance(grounding, ActionTransformation):
-        return UNINFORMED
-    return GAT if grounding.predicts == "point" else SGAT

@@ -1,0 +1,184 @@
+"""What groundings make of the simulator before anything is searched: how far it is from real trajectories off π0."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from gsl.core.layout import check_alike
+from gsl.core.seeds import derived_seed
+from gsl.core.setting import component, setting
+from gsl.core.statistics import mean_interval
+from gsl.errors import ConfigError
+from gsl.grounding.effects import DiagnosedEffects
+from gsl.grounding.gat import ActionTransformation, LoadedTransformation
+from gsl.grounding.grounding import Grounding
+from gsl.grounding.none import NoGrounding
+from gsl.report.markdown import table
+from gsl.report.trial_dots import Dots, trial_dots
+from gsl.stages.grounding_check import ASKED, REPLAYS
+from gsl.stages.grounding_gate import Gate
+from gsl.stages.grounding_replay import TICKS, places, replayed
+from gsl.stages.headline import several
+from gsl.stages.iterate import Iterate
+from gsl.stages.reachability import reachability
+from gsl.stages.rollout import Scenario
+from gsl.stages.training import degrees, of_policy
+from gsl.studies.compare import Compare
+from gsl.studies.comparison_table import finely
+from gsl.studies.effort import seconds, told
+from gsl.studies.held_out import MEASURED, held_out
+from gsl.studies.ledger import Known, Ledger, known_parent, recipe
+from gsl.studies.method_colour import method_colour
+from gsl.studies.sizes import PresetName, sizes_of
+from gsl.tasks.task import REAL, SIM
+from gsl.worlds.world import World
+
+TABLE, DATA, FIGURE = "table.md", "replays.json", "replays.png"
+TITLES = (
+    *("real world", "grounding", "joints after 0.2 s [°]", "95 % interval", "after a tick [°]"),
+    *("pitch [°]", "forward [mm]", "out of reach [%]"),
+)
+MEANS = {"after_a_tick": ".2f", "pitch": ".2f", "forward": ".1f"}
+
+
+class Replay(NamedTuple):
+    """One method, once, in one real world: root mean square errors over replays of real actions off π0.
+
+    Attributes:
+        world, method, trial: What was tried.
+        after_a_tick: Of the joints [deg].
+        joints, pitch: After 0.2 s [deg].
+        forward: Of the body's place after 0.2 s [mm].
+        unreached: Share of steps and joints in which no action of the simulator does what f predicts; None where
+            nothing is predicted a tick ahead.
+        alpha: How far the grounding goes, None where it is no transformation.
+        replays: Their number.
+    """
+
+    world: str
+    method: str
+    trial: int
+    after_a_tick: float
+    joints: float
+    pitch: float
+    forward: float
+    unreached: float | None
+    alpha: float | None
+    replays: int
+
+    @property
+    def contradiction(self) -> str:
+        """What cannot be, of figures that a file told."""
+        return "" if self.trial > 0 < self.replays else f"trial {self.trial}, replays {self.replays}"
+
+
+@component
+class Replays:
+    """Trial k of every method has the same seed, and is judged on the same trajectories of its real world."""
+
+    kind: ClassVar[str] = "reproduce"
+
+    iterate: Annotated[Iterate, setting("what a trial is; its worlds and grounding are replaced")]
+    worlds: Annotated[Mapping[str, World], setting("the real worlds, by name", min_length=1)]
+    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name", min_length=1)]
+    trials: Annotated[int, setting("trials of each method", ge=1)]
+    known: Known = None
+    preset_name: PresetName = ""
+
+    def parents(self) -> Mapping[str, Path]:
+        """Everything is made here, but for what is known."""
+        return known_parent("known", self.known, DATA)
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Build every grounding as a search would have it, replay, and write the figures, the table and the picture.
+
+        Raises:
+            ConfigError: A method cannot be replayed, or there is more than one iteration.
+        """
+        self._check()
+        study = Compare(self.iterate, self.worlds, self.methods, self.trials)
+        console.status(f"{told(seconds(study, 'iterate', search=False))} from nothing; it goes on where it was stopped")
+        home = folder.parent
+        ledger = Ledger(home / DATA, self.parents(), Replay, console)
+        cells = list(product(range(1, self.trials + 1), self.worlds, self.methods))
+        keys = {cell: self._recipe(*cell) for cell in cells}
+        ledger.announce(keys.values())
+        for (number, world, method), key in keys.items():
+            if not ledger.take(key, trial=number, world=world, method=method):
+                with console.part(f"{world}, {method}, trial {number}"):
+                    ledger.add(key, [self._replay(home, number, world, method, console)._asdict()])
+        rows = [Replay(**row) for row in ledger.figures]
+        self._told(folder, rows, ledger.close(folder / DATA))
+        return {"replays": len(rows)}
+
+    def _check(self) -> None:
+        for name, grounding in self.methods.items():
+            inner = grounding.inner if isinstance(grounding, DiagnosedEffects) else grounding
+            if not isinstance(inner, ActionTransformation | NoGrounding):
+                raise ConfigError(f"methods.{name}", "is drawn anew each time; replays are of what is expected")
+            self.iterate.chain.check(grounding)
+        for name, world in self.worlds.items():
+            check_alike(self.iterate.sim.layout, world.layout)
+            if world.layout.states:
+                raise ConfigError(f"worlds.{name}", "is no robot; replays begin in a robot's real states")
+        if self.iterate.iterations != 1:
+            raise ConfigError("iterate.iterations", "replays are of the first", given=str(self.iterate.iterations))
+
+    def _recipe(self, number: int, world: str, method: str) -> str:
+        return recipe(self.iterate, number, world, method, self.worlds[world], self.methods[method])
+
+    def _replay(self, home: Path, number: int, world: str, method: str, console: Any) -> Replay:
+        seed, name, below = self.iterate.seed + number - 1, f"trial_{number:02d}", home / world
+        chain = replace(self.iterate.chain, real=self.worlds[world], accept=True)
+        grounding = chain.diagnosed(below / "diagnosis" / name, self.methods[method], seed, console)
+        data = {REAL: below / "data" / name, SIM: home / "sim" / "data" / name}
+        own = isinstance(grounding, DiagnosedEffects)  # simulations that know the effects
+        chain = replace(chain, shared={REAL: data[REAL]} if own else data)
+        ready = chain.ready(below / method / name, grounding, None, seed, console)
+        held = held_out(chain, below / "held_out" / name, seed, console)
+        gate = Gate(chain.policy.initial, below / method / name, console, accept=True, seed=seed)
+        gate.folder.mkdir(parents=True, exist_ok=True)
+        scenario, found = gate.passed(Scenario(chain.sim, chain.task, chain.policy, SIM, ready))
+        acting, off = scenario.grounding, of_policy(held, pi0=False)
+        env: Any = scenario.world.make()
+        drawn, reach = derived_seed(seed, "replays"), None
+        if isinstance(acting, LoadedTransformation):
+            acting = acting.expected
+            if acting.forward.horizon == 1:
+                reach = reachability(env, acting, places(off, env.layout, ASKED), drawn).share
+        after = replayed(env, acting, places(off, env.layout, REPLAYS), drawn)
+        env.close()
+        return Replay(
+            world,
+            method,
+            number,
+            after_a_tick=degrees(after[1].joints),
+            joints=degrees(after[TICKS].joints),
+            pitch=degrees(after[TICKS].pitch),
+            forward=1000.0 * float(np.sqrt(np.mean(after[TICKS].forward ** 2))),
+            unreached=reach,
+            alpha=found.get("alpha"),
+            replays=len(after[TICKS]),
+        )
+
+    def _told(self, folder: Path, rows: Sequence[Replay], made: str) -> None:
+        shown, panels = [], dict[str, dict[str, Dots]]()
+        for world, method in product(self.worlds, self.methods):
+            own = [one for one in rows if (one.world, one.method) == (world, method)]
+            joints = mean_interval([one.joints for one in own])
+            reach = [one.unreached for one in own if one.unreached is not None]
+            means = [f"{np.mean([getattr(one, name) for one in own]):{form}}" for name, form in MEANS.items()]
+            last = f"{100 * np.mean(reach):.0f}" if reach else ""
+            shown.append((world, method, f"{joints.mean:.2f}", finely(joints), *means, last))
+            dots = Dots([one.joints for one in own], [False] * len(own), method_colour(self.methods[method]))
+            panels.setdefault(world, {})[method] = dots
+        sizes = f"{sizes_of(self.preset_name)} {several(self.trials, 'trial')}; {self.iterate.budget.learned}."
+        below = "\n\n".join([MEASURED, sizes, made])
+        (folder / TABLE).write_text(f"{table(TITLES, shown)}\n{below}\n", encoding="utf-8")
+        trial_dots(folder / FIGURE, panels, axis=TITLES[2], title="How far simulators are from real joints, each trial")
