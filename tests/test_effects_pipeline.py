@@ -110,7 +110,15 @@ def test_identification_fits_the_same_log_without_a_verdict(air: tuple[Path, Sai
     found = loaded(folder / FIRST / "identify/report.json")
     assert 0.01 < found["effects"]["command_latency"][0]["delay"] < 0.025
     assert found["shrinkage"]["after"] < 0.6 * found["shrinkage"]["before"]
-    assert "Diagnosis: identified. 19 parameters of 18 effects were fitted at once: held out, " in said.out
+    assert "Diagnosis: identified. 18 parameters of 17 effects were fitted at once: held out, " in said.out
+
+
+def test_an_identification_that_finds_nothing_better_leaves_the_simulator_as_it_is(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    line = ("identify", f"real={FIRST}/collect_excitation", "sim=nao_ideal", "evaluations=16", "name=short")
+    done(*line, folder=folder)
+    found = loaded(folder / "runs/short/identify/report.json")
+    assert found["shrinkage"]["after"] == pytest.approx(found["shrinkage"]["before"], rel=1e-6)
 
 
 @pytest.mark.parametrize("grounding", ["sgat", "gat_gated", "randomised"])

@@ -1,7 +1,9 @@
 """System identification as it is usual: one value of every parameter for all joints, all of them fitted at once.
 
 CMA-ES within the documented ranges on windowed replays, as in Bjelonic et al.: Towards bridging the gap (PACE, 2025).
-What the library lacks, and what differs from joint to joint, is absorbed by whatever comes nearest.
+What the library lacks, and what differs from joint to joint, is absorbed by whatever comes nearest. Play is not among
+what is fitted: with the least of it come the spring of its teeth and a second mass, a step over which a search of all
+strengths at once does not find back.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from gsl.diagnosis.replay import Bench, Effects
 from gsl.diagnosis.residual import loss
 from gsl.optimizers.cma_es import CmaEs
 
-BLIND = ("action_noise", "encoder_noise", "joint_limit")  # random, or at an end that hardly any log reaches
+LEFT_OUT = ("action_noise", "encoder_noise", "joint_limit", "backlash")  # random, where hardly any log comes, play
 SIGMA = 0.15  # first step, as a share of a range
 CANDIDATES = 16
 
@@ -41,7 +43,7 @@ class Identified(NamedTuple):
 
 
 def identified(arena: Arena, *, evaluations: int, seed: int, tick: Callable[[], None]) -> Identified:
-    """Fit all strengths that act on joints to half of the training windows.
+    """Fit all strengths that act on joints to half of the training windows; no fit is worse than none of them.
 
     Args:
         arena: Whose library and windows.
@@ -49,14 +51,15 @@ def identified(arena: Arena, *, evaluations: int, seed: int, tick: Callable[[], 
         seed: Of the search.
         tick: Called after every replay.
     """
-    chosen = tuple(one for one in arena.library if len(one.free) == 1 and one.on_joints and one.effect not in BLIND)
+    chosen = tuple(one for one in arena.library if len(one.free) == 1 and one.on_joints and one.effect not in LEFT_OUT)
     start, (low, high) = (
         np.array([one.neutral[0] for one in chosen]),
         np.array([one.documented[:, 0] for one in chosen]).T,
     )
     settings = CmaEs(candidates=CANDIDATES, generations=max(1, evaluations // CANDIDATES), sigma=SIGMA)
     search = settings.start(start, high - low, seed, bounds=(low, high))
-    bench, best, least = arena.glance, start, np.inf
+    bench, best = arena.glance, start
+    least = _cost(bench, Identified(chosen, start))
     for _ in range(settings.generations):
         asked, costs = search.ask(), []
         for values in asked:
