@@ -20,7 +20,7 @@ from gsl.models.forward import ForwardModel
 from gsl.models.free_run import predicted_error, segments
 from gsl.models.multi_step import MultiStep, travelled
 from gsl.models.network import Network
-from gsl.stages.needed_model import as_needed
+from gsl.stages.needed_model import as_needed, looking_ahead
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import TrainInverse
 from gsl.storage.trajectories import write
@@ -58,9 +58,21 @@ def test_it_brings_answers_that_are_fed_back_nearer_to_the_robot(tmp_path: Path)
     assert found[10] < 0.7 * found[1]
 
 
-def test_a_grounding_asks_for_it_and_a_linear_f_has_none() -> None:
+def test_a_grounding_asks_for_it_of_a_network() -> None:
     needed = as_needed(ModelConfig(), ActionTransformation("f", "i", multi_step=8))
-    assert {name: one.multi_step for name, one in needed.variants.items()} == {"linear": 1, "mlp": 8}
+    assert (needed.family, needed.multi_step) == ("mlp", 8)
+    assert {name: one.multi_step for name, one in ModelConfig(multi_step=8).variants.items()} == {"linear": 1, "mlp": 8}
+
+
+def test_models_of_a_late_simulator_are_fitted_without_it() -> None:
+    late = looking_ahead(ModelConfig(family="mlp", multi_step=8), extra=2)
+    assert (late.horizon, late.multi_step) == (3, 1)
+
+
+def test_what_cannot_be_is_said_before_anything_is_asked_of_the_robot(tmp_path: Path) -> None:
+    said = refused("iterate", "grounding=gat_multi_step", "forward_model.likelihood=gaussian", folder=tmp_path)
+    assert said.startswith("forward_model.likelihood = gaussian: answers that are fed back are likelihood=point")
+    assert not list(tmp_path.rglob("trajectories.parquet"))
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,8 @@ class ActionTransformation:
         setting("f learns how the robot differs from the simulator, and says as the simulator where data say little"),
     ] = False
     multi_step: Annotated[
-        int, setting("ticks over which f, where it is an MLP, is fitted to its own answers as well", ge=1, le=FARTHEST)
+        int,
+        setting("ticks over which f, then an MLP, is fitted to its own answers as well; 1 for none", ge=1, le=FARTHEST),
     ] = 1
     x: Annotated[
         tuple[str, ...] | Literal["all", "auto"],

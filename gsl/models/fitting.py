@@ -77,9 +77,19 @@ def _descend(
     descended: Callable[[torch.Tensor], torch.Tensor],
     judged: Callable[[], torch.Tensor],
 ) -> None:
-    """Leave the network with the weights of its best epoch: of the least `judged`, none `descended` of its samples."""
+    """Descend one loss, a minibatch of so many samples at a time, and keep the weights with the least of another.
+
+    Args:
+        network: Is left with these; as it was, if no epoch made it better.
+        samples: Their number.
+        config: Of the steps.
+        descended: The loss of some samples, by index.
+        judged: The loss that is looked at after each epoch.
+    """
     adam = torch.optim.Adam(network.parameters(), lr=config.rate, weight_decay=config.decay)
-    best, weights, without_progress = np.inf, {}, 0
+    weights, without_progress = _weights(network), 0
+    with torch.no_grad():
+        best = np.nan_to_num(judged().item(), nan=np.inf)
     for _ in range(config.epochs):
         for chosen in torch.split(torch.randperm(samples), config.batch):
             adam.zero_grad()
@@ -89,11 +99,14 @@ def _descend(
             loss = judged().item()
         without_progress += 1
         if loss < best:
-            best, without_progress = loss, 0
-            weights = {name: value.clone() for name, value in network.state_dict().items()}
+            best, weights, without_progress = loss, _weights(network), 0
         if without_progress == config.patience:
             break
-    network.load_state_dict(weights or network.state_dict())
+    network.load_state_dict(weights)
+
+
+def _weights(network: torch.nn.Sequential) -> dict[str, torch.Tensor]:
+    return {name: value.clone() for name, value in network.state_dict().items()}
 
 
 def _surprise(head: Head, beta: float = 0.0) -> Loss:

@@ -15,6 +15,7 @@ from gsl.core.history import window_parts
 from gsl.core.scaling import Scaling
 from gsl.models.free_run import Segments
 
+STILL = 1e-12  # [rad²]; of a robot that does not move
 Answer = Callable[[torch.Tensor], torch.Tensor]
 """From windows, shape (N, inputs), to changes of the joint positions [rad], shape (N, n_joints)."""
 
@@ -26,9 +27,13 @@ def answering(network: torch.nn.Module, given: Scaling, wanted: Scaling) -> Answ
 
 
 def travelled(pieces: Segments) -> np.ndarray:
-    """Return the mean square of how far joints move from the start of pieces up to each tick [rad²], shape (ticks,)."""
+    """Return the mean square of how far joints move from the start of pieces up to each tick [rad²], shape (ticks,).
+
+    All joints count alike, as in the check's errors: one that moves little has little to be wrong by.
+    """
     starts = pieces.position[pieces.starts]
-    return np.array([np.mean((pieces.position[pieces.starts + k] - starts) ** 2) for k in range(1, pieces.ticks + 1)])
+    moved = [np.mean((pieces.position[pieces.starts + k] - starts) ** 2) for k in range(1, pieces.ticks + 1)]
+    return np.maximum(moved, STILL)
 
 
 class MultiStep:

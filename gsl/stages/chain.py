@@ -110,7 +110,7 @@ class Chain:
         """Refuse what could not be trained, before anything is asked of the real robot.
 
         Raises:
-            ConfigError: Effects of a world that has none, a residual of an environment's states, or too few episodes.
+            ConfigError: Effects of a world that has none, an f that cannot be, or too few episodes.
         """
         if isinstance(grounding, DiagnosedEffects | RandomisedEffects):
             having_effects(self.sim)
@@ -118,12 +118,24 @@ class Chain:
         if not isinstance(inner, ActionTransformation):
             return
         self._check_joints(inner)
-        if inner.residual and self.sim.layout.states:
-            raise ConfigError("grounding.residual", "is for robots; f of an environment's states corrects nothing")
+        self._check_f(inner)
         for role, count in {REAL: sum(self.budget.real), SIM: sum(self.budget.sim)}.items():
             if count < FEWEST:
                 problem = f"{several(count, 'episode')} with neighbours; {FEWEST} are the least for a model: {WHY}"
                 raise ConfigError(f"budget.{role}_episodes", problem)
+
+    def _check_f(self, grounding: ActionTransformation) -> None:
+        """Refuse an f that there cannot be."""
+        if self.sim.layout.states:
+            if grounding.residual:
+                raise ConfigError("grounding.residual", "is for robots; f of an environment's states corrects nothing")
+            if grounding.multi_step > 1:
+                raise ConfigError("grounding.multi_step", "is for robots", given=str(grounding.multi_step))
+            return
+        try:
+            as_needed(self.forward_model, grounding)
+        except ConfigError as error:
+            raise error.under("forward_model") from error
 
     def _check_joints(self, grounding: ActionTransformation) -> None:
         """Refuse models that know different joints, and to ground one that they do not know."""
@@ -201,7 +213,9 @@ class Chain:
         extra = extra_ticks(self.sim)
         inverse_model = looking_ahead(self.inverse_model, extra)
         if extra:
-            console.status(f"actions show late in the simulator: models look {inverse_model.horizon} ticks ahead")
+            without = ", and f is not fitted to its own answers" if grounding.multi_step > 1 else ""
+            looking = f"models look {inverse_model.horizon} ticks ahead{without}"
+            console.status(f"actions show late in the simulator: {looking}")
         inverse = TrainInverse(str(data[SIM]), inverse_model, method=method, seed=seed)
         alike = method == self.inverse_method
         f_inverse = built(inverse, (places[SIM] if alike else home) / inverse.kind, console)

@@ -28,17 +28,20 @@ def extra_ticks_of(servo: Servo, period: float) -> int:
 
 
 def looking_ahead(model: ModelConfig, extra: int) -> ModelConfig:
-    """Return a model that looks some ticks more than one ahead, and back over the actions that are on their way."""
+    """Return a model that looks some ticks more than one ahead, and back over the actions that are on their way.
+
+    It is fitted to no answers of its own: these are a tick apart.
+    """
     horizon = max(model.horizon, min(1 + extra, FARTHEST))
     history = model.history if model.history == "auto" else max(model.history, horizon - 1)
-    return model if horizon == model.horizon else replace(model, horizon=horizon, history=history)
+    return model if horizon == model.horizon else replace(model, horizon=horizon, history=history, multi_step=1)
 
 
 def as_needed(model: ModelConfig, grounding: ActionTransformation) -> ModelConfig:
     """Return the settings of a forward model that can do what a grounding asks of it."""
     wanted = model if grounding.predicts == "point" else replace(model, likelihood=grounding.predicts)
     if grounding.multi_step > 1:
-        wanted = replace(wanted, multi_step=grounding.multi_step)
+        wanted = replace(wanted, family="mlp", multi_step=grounding.multi_step)
     if grounding.residual:
         wanted = replace(wanted, family="linear", encoding="plain", ridge=max(wanted.ridge, SHRINKING))
     return wanted if grounding.gate is None or wanted.members > 1 else replace(wanted, members=MEMBERS)
