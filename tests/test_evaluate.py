@@ -46,12 +46,14 @@ def three(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, dict, Path]:
 
 
 def test_the_best_stable_policy_is_returned(three: tuple[dict, dict, Path]) -> None:
-    metrics, _, folder = three
+    metrics, table, folder = three
     assert metrics["best"] == "fast"
     assert [one.name for one in read_policies(folder / "policies.json").records] == ["fast"]
     assert metrics["gain"]["value"] == pytest.approx(metrics["returned"]["value"] - metrics["baseline"]["value"])
     assert metrics["gain"]["value"] > 0.0
     assert (metrics["stable_policies"], metrics["improving_policies"], metrics["policies"]) == (1, 1, 2)
+    fresh = table["confirmation"][0]["values"]  # of π0, which the choice did not pick for being slow
+    assert sum(not one["falls"] and np.mean(one["values"]) > np.mean(fresh) for one in table["policies"][1:]) == 1
 
 
 def test_a_policy_that_falls_costs_no_further_episode_and_is_worth_nothing(three: tuple[dict, dict, Path]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,20 +10,23 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from commands import done, refused
-from toy_plant import QUICK, SLOW, a_batch
+from commands import done, gsl, refused
+from toy_plant import QUICK, SLOW, a_batch, an_episode
 
 from gsl.core.history import History
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation
-from gsl.models.config import ModelConfig
+from gsl.models.config import FARTHEST, ModelConfig
 from gsl.models.forward import ForwardModel
+from gsl.models.free_run import TICKS as FREE
 from gsl.models.free_run import predicted_error, segments
 from gsl.models.multi_step import MultiStep, travelled
 from gsl.models.network import Network
 from gsl.stages.needed_model import as_needed, looking_ahead
-from gsl.stages.train_forward import TrainForward
+from gsl.stages.train_forward import TrainForward, fitted
 from gsl.stages.train_inverse import TrainInverse
+from gsl.stages.training import Parts
+from gsl.storage.models import FILES, read_forward_model, read_inverse_model
 from gsl.storage.trajectories import write
 
 QUIET: Any = SimpleNamespace(status=lambda text: None, table=lambda title, columns, rows: None)
@@ -69,10 +73,68 @@ def test_models_of_a_late_simulator_are_fitted_without_it() -> None:
     assert (late.horizon, late.multi_step) == (3, 1)
 
 
-def test_what_cannot_be_is_said_before_anything_is_asked_of_the_robot(tmp_path: Path) -> None:
-    said = refused("iterate", "grounding=gat_multi_step", "forward_model.likelihood=gaussian", folder=tmp_path)
-    assert said.startswith("forward_model.likelihood = gaussian: answers that are fed back are likelihood=point")
+FED_BACK = "answers that are fed back are likelihood=point; or multi_step=1"
+
+
+@pytest.mark.parametrize(
+    ("typed", "line"),
+    [
+        (
+            ("iterate", "grounding=gat_multi_step", "forward_model.likelihood=gaussian"),
+            f"forward_model.likelihood = gaussian: {FED_BACK}",
+        ),
+        (
+            ("iterate", "grounding=gat", "inverse_model.multi_step=5", "inverse_model.family=mlp"),
+            "inverse_model.multi_step = 5: is of a forward model",
+        ),
+        (
+            ("iterate", "grounding=gat_residual", "forward_model.multi_step=5"),
+            "forward_model.multi_step = 5: is of a model that corrects none",
+        ),
+        (
+            ("reproduce", "fig6", "grounding@iterate.grounding=gat_multi_step", "iterate.forward_model.sensors=[]")
+            + ("iterate.forward_model.likelihood=gaussian",),
+            f"forward_model.likelihood = gaussian: {FED_BACK}",
+        ),
+        (
+            ("iterate", "experiment=gymnasium", "sim.env_id=CartPole-v1", "real.env_id=CartPole-v1", "grounding=gat")
+            + ("forward_model.multi_step=5", "forward_model.family=mlp"),
+            "forward_model.multi_step: is for robots; a gymnasium environment's state is observed whole",
+        ),
+    ],
+)
+def test_what_cannot_be_is_said_before_anything_is_asked_of_the_robot(
+    typed: tuple[str, ...], line: str, tmp_path: Path
+) -> None:
+    said = gsl(*typed, "preset=toy", folder=tmp_path)
+    assert said.code == 2 and said.lines[-1].endswith(f": {line}")
     assert not list(tmp_path.rglob("trajectories.parquet"))
+
+
+def test_a_model_tells_over_how_many_ticks_it_was_fitted_and_no_other_serves(tmp_path: Path) -> None:
+    write(tmp_path / "real.parquet", a_batch(SLOW, "real"))
+    write(tmp_path / "sim.parquet", a_batch(QUICK, "sim", noise=0.02))
+    TrainInverse(str(tmp_path / "sim.parquet"), ModelConfig("linear"), method="solve").run(tmp_path, QUIET)
+    few: dict[str, Any] = {"family": "mlp", "hidden": (4,), "epochs": 1}
+    for ticks, members in ((1, 1), (3, 1), (3, 2)):
+        model = ModelConfig(multi_step=ticks, members=members, **few)
+        TrainForward(str(tmp_path / "real.parquet"), model).run(tmp_path, QUIET)
+        asked = ActionTransformation(*(str(tmp_path / FILES[kind]) for kind in FILES), multi_step=3)
+        if ticks == 1:
+            with pytest.raises(
+                ConfigError, match="was not fitted to its own answers of 3 ticks; train it with model=mlp"
+            ):
+                asked.load(read_forward_model, read_inverse_model)
+        else:
+            assert asked.load(read_forward_model, read_inverse_model).forward.multi_step == 3
+
+
+def test_a_member_whose_draw_is_over_at_once_is_fitted_to_single_ticks() -> None:
+    batch = a_batch(SLOW, "real", pi0=2, others=2)
+    over = tuple(an_episode(SLOW, seed, steps=8) for seed in range(4))
+    parts = Parts(replace(batch, episodes=over), batch, batch)
+    model, _ = fitted(ModelConfig(family="mlp", hidden=(4,), epochs=1, multi_step=10), parts, 1)
+    assert np.isfinite(model.effects(np.zeros((1, model.network.inputs)))).all()
 
 
 @pytest.mark.parametrize(
@@ -110,3 +172,4 @@ def test_it_is_one_setting_of_the_command(tmp_path: Path) -> None:
     assert "forward model (mlp) on held-out real trajectories" in told.out
     said = refused("train-forward", "data=real.parquet", "model.multi_step=30", folder=tmp_path)
     assert said == "model.multi_step = 30: must be at most 10"
+    assert FARTHEST <= FREE  # what an episode has to be long enough for

@@ -9,6 +9,7 @@ import pytest
 
 from gsl.core.history import History, asked_at_rest
 from gsl.core.region import INSIDE, region
+from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import transitions
 from gsl.grounding.gat import LoadedTransformation
 from gsl.grounding.none import NoGrounding
@@ -17,6 +18,7 @@ from gsl.models.inverse import Solver
 from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
 from gsl.stages.drift import drifts
+from gsl.stages.grounding_check import asked
 from gsl.stages.grounding_replay import places
 from gsl.stages.reachability import FLOOR, TOLERANCE, missed_by, reachability
 from gsl.stages.rollout import Scenario, rollout
@@ -39,6 +41,13 @@ def predicts(bias: np.ndarray, rate: float = 0.05) -> LoadedTransformation:
     return LoadedTransformation(f, Solver(f, rate * np.eye(n), 1e-9))
 
 
+def _begun(walk: Trajectory, ticks: int) -> Trajectory:
+    """The first ticks of a walk."""
+    rows = {name: getattr(walk, name)[: ticks + 1] for name in ("time", "position", "velocity", "fell")}
+    sensors = {name: column[: ticks + 1] for name, column in walk.sensors.items()}
+    return replace(walk, action=walk.action[:ticks], grounded_action=None, reward=None, sensors=sensors, **rows)
+
+
 def test_a_simulator_can_do_what_it_does_and_what_no_servo_can_is_told_joint_by_joint() -> None:
     env = WALK.make()
     walk = rollout(WALK, env, POLICY.initial, 1)
@@ -55,6 +64,20 @@ def test_a_simulator_can_do_what_it_does_and_what_no_servo_can_is_told_joint_by_
     assert impossible.unreached[KNEE] == 1.0
     assert "most often in LKneePitch (100 %)" in impossible.told
     assert impossible.metrics()["by_joint"]["LKneePitch"] == 1.0
+
+
+def test_a_long_past_is_asked_about_where_there_is_one() -> None:
+    env = WALK.make()
+    walk = rollout(WALK, env, POLICY.initial, 1)
+    env.close()
+    n, history = len(JOINTS), History(20)
+    weight = np.zeros((n, history.size(n)))
+    f = ForwardModel(Network([(weight, np.zeros(n))]), history, JOINTS)
+    bare = SIM.make()
+    found = asked(bare, LoadedTransformation(f, Solver(f, np.eye(n), 1e-9)), [walk], 1)
+    none = asked(bare, LoadedTransformation(f, Solver(f, np.eye(n), 1e-9)), [_begun(walk, 25)], 1)
+    bare.close()
+    assert found is not None and found.steps == len(range(20, len(walk) - 9, 15)) and none is None
 
 
 def test_joints_that_the_models_do_not_know_are_not_asked_about() -> None:

@@ -73,7 +73,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     iterations = {"table3": 2, "table4": 2, "linear-walk": 2}.get(what, 1)
     assert {one["iteration"] for one in trials} == set(range(1, iterations + 1))
     table = (folder / "table.md").read_text()
-    assert all(f"| {name} " in table for name in KEPT[what]) and "Sizes: preset=toy." in table
+    assert all(f"| {name} " in table for name in KEPT[what]) and "Sizes: preset=toy, but" in table
     assert len((folder / "trials.md").read_text().splitlines()) == 2 + len(trials)
     assert what != "table2-paper" or {one["alpha"] for one in trials} == {None, 1.0}
     assert all((one["rank"] is not None) == (what in ("table2", "worlds")) for one in trials)
@@ -247,7 +247,7 @@ def test_a_figure_is_one_command(what: str, figures: list[str], tmp_path: Path) 
     folder = tmp_path / "runs" / what / "reproduce"
     assert sorted(path.name for path in folder.glob("*.png")) == figures
     assert "RMS distance from real" in said.out and "from nothing" in said.err
-    assert "Sizes: preset=toy." in (folder / "table.md").read_text()
+    assert "Sizes: preset=toy, but" in (folder / "table.md").read_text()
 
 
 def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
@@ -263,8 +263,22 @@ def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
     table = (folder / "table.md").read_text()
     assert all(f"| nao_worn | {name} | {one['joints']:.2f} |" in table for name, one in rows.items())
     assert (folder / "replays.png").stat().st_size > 10_000
-    refused = gsl("reproduce", "replays", *few, "+grounding@methods.ane=ane", "name=n", folder=tmp_path)
-    assert refused.code == 2 and "methods.ane: is drawn anew each time" in refused.lines[-1]
+    assert "| minus none (95 %, paired) |" in table and "effects from motions in the air" in table
+    replays, again = folder / "replays.json", ("~worlds.nao_weak", "force=true")
+    (tmp_path / "known.json").write_text(replays.read_text())
+    for more in (again, (*again, "name=known", "known=known.json")):  # of this version, and of any
+        said = done("reproduce", "replays", *few, *more, folder=tmp_path)
+        assert "grounded simulator against" not in said.err
+        assert (tmp_path / "runs/known" if "name=known" in more else folder.parent).is_dir()
+    assert json.loads((tmp_path / "runs/known/reproduce/replays.json").read_text()) == json.loads(replays.read_text())
+    assert not (tmp_path / "runs/known/nao_worn").exists()
+    for more, line in (
+        (["+grounding@methods.ane=ane"], "methods.ane: is drawn anew each time; replays are of what is expected"),
+        (["iterate.pretrained=true"], "iterate.pretrained = True: replays are of False"),
+        (["iterate.task.duration=0.3"], "none of 12 real trajectories off π0 has the 16 ticks of a replay"),
+    ):
+        said = gsl("reproduce", "replays", *few, *more, "name=n", folder=tmp_path)
+        assert said.code == 2 - ("trajectories" in line) and line in said.lines[-1]
 
 
 def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
@@ -274,9 +288,12 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     points = json.loads((folder / "points.json").read_text())
     assert [(one["method"], one["trajectories"]) for one in points] == [("none", 0), ("gat", 4), ("gat", 6)]
     assert all(one["error"] > 0.0 < one["bare"] for one in points[1:])
+    assert points[1]["error"] != points[2]["error"]
+    refused = gsl("reproduce", "budget", *few, "budgets=[6,6]", "name=n", folder=tmp_path)
+    assert refused.lines == ["gsl reproduce budget: budgets = [6,6]: are to rise, the fewest first"]
     assert points[1]["bare"] == points[2]["bare"]  # measured on the same trajectories
     assert (folder / "budget.png").stat().st_size > 10_000
-    assert "Sizes: preset=toy. Made: trial 1 by " in (folder / "table.md").read_text()
+    assert " otherwise. Made: trial 1 by " in (folder / "table.md").read_text()
     assert "about " in said.err and "from nothing" in said.err
     assert "gat, 4 trajectories, trial 1: grounded simulator against" in said.err
     assert "grounded simulator against" not in said.out and "real trajectories collected" in said.out
@@ -335,7 +352,7 @@ def test_table_2_marks_the_noise_that_only_real_figures_choose() -> None:
     assert "| w | gat - none |" in Table2().markdown([*trials, a_trial("gat", 1), a_trial("gat", 2)], Walk())
 
 
-@pytest.mark.parametrize("table", [Table2(), Table4(), Figure5()])
+@pytest.mark.parametrize("table", [Table2(), Table3(), Table4(), LinearWalkTable(), Figure5()])
 def test_rows_say_where_trials_were(table: Any) -> None:
     trials = [
         a_trial("gat", k, world=world, iteration=iteration, outcome={"mean distance [deg]": 7.0})
@@ -346,8 +363,24 @@ def test_rows_say_where_trials_were(table: Any) -> None:
     lines = table.markdown(trials, Walk()).split("\n\n")[0].splitlines()[2:6]
     told = {tuple(cell for cell in line.split(" | ")[:3] if cell in ("| v", "| w", "1", "2")) for line in lines}
     assert told == {("| v", "1"), ("| v", "2"), ("| w", "1"), ("| w", "2")}
+    if isinstance(table, Table3 | LinearWalkTable):
+        return
     paper = [any(value in line for value in ("22.5", "15.7 ± 3.0")) for line in lines]
     assert isinstance(table, Figure5) or paper == [True, False, True, False]  # which has figures of the first
+
+
+@pytest.mark.parametrize("table", [Table2(), Table4(), LinearWalkTable()])
+def test_differences_say_in_which_simulator(table: Any) -> None:
+    trials = [
+        a_trial(method, k, simulator=simulator, stable=stable)
+        for k in (1, 2)
+        for simulator, more in (("a", 0), ("b", 4))
+        for method, stable in (("none", 0), ("gat", more))
+    ]
+    text = table.markdown(trials, Walk())
+    for simulator, more in (("a", "+0.0 | 1.000"), ("b", "+4.0 | 0.500")):
+        row = next(line for line in text.splitlines() if line.startswith(f"| {simulator} | w | gat - none |"))
+        assert not isinstance(table, Table2) or more in row
 
 
 def test_everything_of_a_single_trial_is_told() -> None:
@@ -379,7 +412,7 @@ def test_table_3_counts_where_chains_stop() -> None:
         for i, gained, value in ((1, 0.01, 0.25), (2, 0.01, 0.3), (3, -0.01, 0.26))
     ]
     text = Table3().markdown(trials, Walk())
-    rows = [line for line in text.splitlines() if line.startswith("| s | gat")]
+    rows = [line for line in text.splitlines() if line.startswith("| w | gat")]
     assert ["2 of 2" in row for row in rows[:3]] == [False, False, True]
     assert "43.3" in rows[1]
     assert "| 0 of 2 | 2 of 2 | 30.0 |" in rows[2]

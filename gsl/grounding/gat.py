@@ -106,6 +106,11 @@ class ActionTransformation:
         if self.predicts not in ("point", f.head.likelihood):
             problem = f"predicts a {f.head.likelihood}; train it with model.likelihood={self.predicts}"
             raise ConfigError("forward_model", problem)
+        if self.multi_step > 1 and not isinstance(f, Forward):
+            raise ConfigError("multi_step", "is for robots", given=str(self.multi_step))
+        if self.multi_step > 1 and f.horizon == 1 and f.multi_step != self.multi_step:
+            problem = f"was not fitted to its own answers of {self.multi_step} ticks"
+            raise ConfigError("forward_model", f"{problem}; train it with model=mlp model.multi_step={self.multi_step}")
         if self.gate is not None and not isinstance(f, Ensemble):
             raise ConfigError("gate", "needs an ensemble; train the forward model with model.members=5, say")
         alpha = 1.0 if self.alpha == "auto" else self.alpha

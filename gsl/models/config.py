@@ -17,7 +17,7 @@ from gsl.models.head import Head, Likelihood
 
 Sensor = Literal["gyro", "tilt", "foot_force"]
 HISTORIES = (1, 2, 3, 5, 8)  # that `auto` tries
-FARTHEST = 10  # ticks ahead that a model looks, at most
+FARTHEST = 10  # ticks ahead that a model looks, or is fed with its own answers, at most; no more than a free run has
 
 
 @component

@@ -52,6 +52,11 @@ class Ensemble:
         return self.members[0].horizon
 
     @property
+    def multi_step(self) -> int:
+        """Ticks over which its members were fitted to their own answers."""
+        return self.members[0].multi_step
+
+    @property
     def head(self) -> Head:
         """How its members' outputs are read."""
         return self.members[0].head

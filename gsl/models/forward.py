@@ -30,6 +30,7 @@ class ForwardModel:
         head: How its outputs are read.
         memory: Correlation of its errors from one tick to the next, which draws keep, shape (n_outputs,).
         base: A model whose answer the network corrects, of the same joints, past and horizon; none if it needs none.
+        multi_step: Ticks over which it was fitted to its own answers, 1 for none.
     """
 
     kind: ClassVar[str] = "forward_model"
@@ -42,6 +43,7 @@ class ForwardModel:
     head: Head = Head()
     memory: np.ndarray = field(default_factory=lambda: np.zeros(1))
     base: ForwardModel | None = None
+    multi_step: int = 1
 
     def __post_init__(self) -> None:
         """Hold network and windows together."""
@@ -86,6 +88,7 @@ class ForwardModel:
             "history": vars(self.history),
             "encoding": self.encoding,
             "horizon": self.horizon,
+            "multi_step": self.multi_step,
             **vars(self.head),
             **({} if self.base is None else {"base": self.base.description()}),
         }
@@ -98,8 +101,9 @@ class ForwardModel:
         if "base" in about:
             below = {name.removeprefix(BASE): one for name, one in arrays.items() if name.startswith(BASE)}
             base = cls.from_arrays(below, about["base"])
+        joints, multi_step = tuple(about["joints"]), about.get("multi_step", 1)
         return cls(
-            network, history, tuple(about["joints"]), about["encoding"], about["horizon"], head, arrays["memory"], base
+            network, history, joints, about["encoding"], about["horizon"], head, arrays["memory"], base, multi_step
         )
 
 

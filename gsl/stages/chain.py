@@ -28,6 +28,7 @@ from gsl.stages.needed_model import as_needed, extra_ticks, looking_ahead
 from gsl.stages.optimize import BEST, Optimize
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import Method, TrainInverse
+from gsl.stages.train_states import refuse_robots
 from gsl.stages.training import FEWEST, WHY
 from gsl.stages.values import Values
 from gsl.storage.artifact import Artifact
@@ -110,7 +111,7 @@ class Chain:
         """Refuse what could not be trained, before anything is asked of the real robot.
 
         Raises:
-            ConfigError: Effects of a world that has none, an f that cannot be, or too few episodes.
+            ConfigError: Effects of a world that has none, models that cannot be, or too few episodes.
         """
         if isinstance(grounding, DiagnosedEffects | RandomisedEffects):
             having_effects(self.sim)
@@ -118,24 +119,29 @@ class Chain:
         if not isinstance(inner, ActionTransformation):
             return
         self._check_joints(inner)
-        self._check_f(inner)
+        self._check_models(inner)
         for role, count in {REAL: sum(self.budget.real), SIM: sum(self.budget.sim)}.items():
             if count < FEWEST:
                 problem = f"{several(count, 'episode')} with neighbours; {FEWEST} are the least for a model: {WHY}"
                 raise ConfigError(f"budget.{role}_episodes", problem)
 
-    def _check_f(self, grounding: ActionTransformation) -> None:
-        """Refuse an f that there cannot be."""
-        if self.sim.layout.states:
-            if grounding.residual:
-                raise ConfigError("grounding.residual", "is for robots; f of an environment's states corrects nothing")
-            if grounding.multi_step > 1:
-                raise ConfigError("grounding.multi_step", "is for robots", given=str(grounding.multi_step))
-            return
+    def _check_models(self, grounding: ActionTransformation) -> None:
+        """Refuse models that there cannot be."""
+        states = self.sim.layout.states
+        if states and grounding.residual:
+            raise ConfigError("grounding.residual", "is for robots; f of an environment's states corrects nothing")
+        if states and grounding.multi_step > 1:
+            raise ConfigError("grounding.multi_step", "is for robots", given=str(grounding.multi_step))
         try:
-            as_needed(self.forward_model, grounding)
+            needed = as_needed(self.forward_model, grounding)
         except ConfigError as error:
             raise error.under("forward_model") from error
+        if states:
+            refuse_robots(needed, "forward_model")
+            refuse_robots(self.inverse_model, "inverse_model")
+        elif self.inverse_model.multi_step > 1:
+            given = str(self.inverse_model.multi_step)
+            raise ConfigError("inverse_model.multi_step", "is of a forward model", given=given)
 
     def _check_joints(self, grounding: ActionTransformation) -> None:
         """Refuse models that know different joints, and to ground one that they do not know."""
@@ -212,14 +218,15 @@ class Chain:
         method: Method = "solve" if grounding.residual else self.inverse_method
         extra = extra_ticks(self.sim)
         inverse_model = looking_ahead(self.inverse_model, extra)
+        needed, base = as_needed(self.forward_model, grounding), None
         if extra:
-            without = ", and f is not fitted to its own answers" if grounding.multi_step > 1 else ""
+            without = ", and f is not fitted to its own answers" if needed.multi_step > 1 else ""
             looking = f"models look {inverse_model.horizon} ticks ahead{without}"
             console.status(f"actions show late in the simulator: {looking}")
         inverse = TrainInverse(str(data[SIM]), inverse_model, method=method, seed=seed)
         alike = method == self.inverse_method
         f_inverse = built(inverse, (places[SIM] if alike else home) / inverse.kind, console)
-        needed, base = looking_ahead(as_needed(self.forward_model, grounding), extra), None
+        needed = looking_ahead(needed, extra)
         if grounding.residual:
             needed = replace(needed, history=f_inverse.metrics["history"], horizon=inverse_model.horizon)
             base = str(f_inverse.folder)

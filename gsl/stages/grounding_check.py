@@ -15,7 +15,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import InputError
 from gsl.grounding.gat import LoadedTransformation
 from gsl.grounding.none import NoGrounding
-from gsl.stages.grounding_replay import TICKS, Deviations, places, replayed, unmoved
+from gsl.stages.grounding_replay import PAST, TICKS, Deviations, places, replayed, unmoved
 from gsl.stages.reachability import Reachability, reachability
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.training import FALLS, degrees, degrees_by_joint, of_policy
@@ -134,7 +134,7 @@ class GroundingReport:
             "replays": len(one),
             "joints_deg": degrees(one.joints),
             "pitch_deg": degrees(one.pitch),
-            "forward_mm": 1000.0 * float(np.sqrt(np.mean(one.forward**2))),
+            "forward_mm": one.forward_mm,
             "by_joint_deg": degrees_by_joint(one.joints, self.joints),
         }
 
@@ -179,7 +179,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
             for group in (PI0, OFF)
             if told
         }
-        reach = _reach(env, grounding, heldout.episodes, seed) if told else None
+        reach = asked(env, grounding, heldout.episodes, seed) if told else None
     except KeyError as error:
         raise InputError(f"the real trajectories lack {error.args[0]}: no simulation can start from them") from error
     finally:
@@ -218,8 +218,9 @@ def largest_stable(
     return next(stands, last)
 
 
-def _reach(env: Any, grounding: LoadedTransformation, episodes: Sequence[Trajectory], seed: int) -> Reachability | None:
-    starts = places(episodes, env.layout, ASKED)
+def asked(env: Any, grounding: LoadedTransformation, episodes: Sequence[Trajectory], seed: int) -> Reachability | None:
+    """Return how much of what is predicted on real trajectories the simulator can do; None if that is no tick ahead."""
+    starts = places(episodes, env.layout, ASKED, max(PAST, grounding.forward.history.span))
     return reachability(env, grounding, starts, seed) if starts and grounding.forward.horizon == 1 else None
 
 
@@ -249,8 +250,7 @@ def pi0_in(
 
 
 def _cells(one: Deviations) -> tuple[str, str, str]:
-    forward = 1000.0 * float(np.sqrt(np.mean(one.forward**2)))
-    return f"{degrees(one.joints):.2f}", f"{degrees(one.pitch):.2f}", f"{forward:.1f}"
+    return f"{degrees(one.joints):.2f}", f"{degrees(one.pitch):.2f}", f"{one.forward_mm:.1f}"
 
 
 def _named(group: str) -> str:

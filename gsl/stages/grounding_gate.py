@@ -162,7 +162,7 @@ class Gate:
         if not (real := of_policy(heldout, pi0=True)):
             problem = "no real episode of π0 is held out, so the grounding was not checked; collect a few more"
             self.console.status(f"warning: {problem}")
-            return ready, {"grounding_acceptable": True}
+            return ready, {}
         noise = exploration(heldout.metadata.get("action_noise", 0.0), ready.world.layout)
         report = value_report(ready, self.parameters, real, noise, derived_seed(self.seed, "check"))
         write_json(self.folder / REPORT, report.metrics())

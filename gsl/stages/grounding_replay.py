@@ -45,13 +45,24 @@ class Deviations:
     pitch: np.ndarray
     forward: np.ndarray
 
+    @property
+    def forward_mm(self) -> float:
+        """Root mean square of the body's place [mm]."""
+        return 1000.0 * float(np.sqrt(np.mean(self.forward**2)))
+
     def __len__(self) -> int:
         """Number of replays."""
         return len(self.pitch)
 
 
-def places(episodes: Sequence[Trajectory], layout: Layout, limit: int) -> list[Place]:
+def places(episodes: Sequence[Trajectory], layout: Layout, limit: int, past: int = PAST) -> list[Place]:
     """Return where replays begin, `limit` at most, spread evenly over the episodes.
+
+    Args:
+        episodes: Of the real robot.
+        layout: Of the simulator's observations.
+        limit: Number of places.
+        past: Ticks that there are before each, at least.
 
     Raises:
         KeyError: with the name of a column that was not recorded.
@@ -60,7 +71,7 @@ def places(episodes: Sequence[Trajectory], layout: Layout, limit: int) -> list[P
     for episode in episodes:
         seen = observations(episode, layout)
         sent = actions(episode, carried_out=True)
-        found += [Place(seen, sent, tick) for tick in range(PAST, usable(episode) - TICKS + 1, STRIDE)]
+        found += [Place(seen, sent, tick) for tick in range(past, usable(episode) - TICKS + 1, STRIDE)]
     chosen = np.unique(np.linspace(0, len(found) - 1, min(limit, len(found))).round().astype(int)) if found else ()
     return [found[index] for index in chosen]
 

@@ -66,6 +66,8 @@ class LearnedReplay:
             raise ConfigError(
                 "gat.model", "replays are of one model that says a point; leave likelihood and members out"
             )
+        if self.model.multi_step > 1:
+            raise ConfigError("gat.model.multi_step", "is of a search's f", given=str(self.model.multi_step))
         if self.residual and (self.model.history == "auto" or self.model.encoding != "plain"):
             raise ConfigError("gat.model", "a correction has a history of one length, and plain angles")
 

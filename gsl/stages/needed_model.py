@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from gsl.core.plant import Servo
+from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import FARTHEST, ModelConfig
 from gsl.worlds.bullet import BulletWorld
@@ -38,10 +39,16 @@ def looking_ahead(model: ModelConfig, extra: int) -> ModelConfig:
 
 
 def as_needed(model: ModelConfig, grounding: ActionTransformation) -> ModelConfig:
-    """Return the settings of a forward model that can do what a grounding asks of it."""
+    """Return the settings of a forward model that can do what a grounding asks of it.
+
+    Raises:
+        ConfigError: No model can.
+    """
     wanted = model if grounding.predicts == "point" else replace(model, likelihood=grounding.predicts)
     if grounding.multi_step > 1:
         wanted = replace(wanted, family="mlp", multi_step=grounding.multi_step)
     if grounding.residual:
+        if model.multi_step > 1:
+            raise ConfigError("multi_step", "is of a model that corrects none", given=str(model.multi_step))
         wanted = replace(wanted, family="linear", encoding="plain", ridge=max(wanted.ridge, SHRINKING))
     return wanted if grounding.gate is None or wanted.members > 1 else replace(wanted, members=MEMBERS)

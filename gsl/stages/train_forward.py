@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -189,13 +190,15 @@ def _member(
     """Return a model of some of the training trajectories, and of those of the validation if it is the `whole`."""
     head = config.head
     known, unseen = (_samples(config, part, base) for part in (episodes, data.validation.episodes))
-    parted = (_pieces(config, episodes), _pieces(config, data.validation.episodes)) if config.multi_step > 1 else None
-    network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole, pieces=parted)
+    pieces = _pieces(config, episodes, data.validation.episodes) if config.multi_step > 1 else None
+    network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole, pieces=pieces)
     memory = np.zeros(unseen[1].shape[1])
     if head.draws:
         network, memory = calibrated(network, head, [_samples(config, [one], base) for one in data.validation.episodes])
     joints = data.training.joints
-    return ForwardModel(network, config.of_body, joints, config.encoding, config.horizon, head, memory, base)
+    return ForwardModel(
+        network, config.of_body, joints, config.encoding, config.horizon, head, memory, base, config.multi_step
+    )
 
 
 def _samples(config: ModelConfig, episodes: Sequence[Trajectory], base: ForwardModel | None) -> Samples:
@@ -204,8 +207,14 @@ def _samples(config: ModelConfig, episodes: Sequence[Trajectory], base: ForwardM
     return rows.windows, encode(rows.change - known, config.encoding)
 
 
-def _pieces(config: ModelConfig, episodes: Sequence[Trajectory]) -> Segments:
-    return segments(episodes, config.of_body, carried_out=True, ticks=config.multi_step, every=1)
+def _pieces(config: ModelConfig, *parts: Sequence[Trajectory]) -> tuple[Segments, Segments] | None:
+    """Return what the multi-step loss is of in both parts; None where all of a member's draw are over too soon."""
+    needed = config.of_body.span + config.multi_step + 1
+    training, validation = ([one for one in part if usable(one) >= needed] for part in parts)
+    if not training or not validation:
+        return None
+    cut = partial(segments, history=config.of_body, carried_out=True, ticks=config.multi_step, every=1)
+    return cut(training), cut(validation)
 
 
 def _rows(config: ModelConfig, episodes: Sequence[Trajectory]) -> Transitions:

@@ -45,7 +45,7 @@ def forward_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int)
     Raises:
         ConfigError: The model is to be something that is for robots alone.
     """
-    _refuse_robots(config)
+    refuse_robots(config, "model")
     if few(data.training):
         return _counts(folder, data, "forward_model")
     model, choice = best(config, partial(_forward, data=data, seed=seed), partial(_score, data=data))
@@ -68,7 +68,7 @@ def inverse_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int)
     Raises:
         ConfigError: The model is to be something that is for robots alone.
     """
-    _refuse_robots(config)
+    refuse_robots(config, "model")
     if few(data.training):
         return _counts(folder, data, "inverse_model")
     choices, make = data.training.metadata.get("choices", 0), _nearest if _choices(data) else _inverse
@@ -84,11 +84,12 @@ def few(batch: Batch) -> bool:
     return bool(batch.metadata.get("cells") and batch.metadata.get("choices"))
 
 
-def _refuse_robots(config: ModelConfig) -> None:
+def refuse_robots(config: ModelConfig, where: str) -> None:
+    """Refuse what is for robots alone; `where` is the setting that this configuration is."""
     usual = ModelConfig()
     for name in ("horizon", "members", "sensors", "multi_step"):
         if getattr(config, name) != getattr(usual, name):
-            raise ConfigError(f"model.{name}", "is for robots; a gymnasium environment's state is observed whole")
+            raise ConfigError(f"{where}.{name}", "is for robots; a gymnasium environment's state is observed whole")
 
 
 def _counts(folder: Path, data: Parts, kind: str) -> Mapping[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -12,22 +12,22 @@ from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import mean_interval
 from gsl.errors import ConfigError
-from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.report.budget_curve import Line, budget_curve
 from gsl.report.markdown import table
 from gsl.stages.chain import Budget as ChainBudget
-from gsl.stages.grounding_check import BARE, GROUNDED, OFF, check
 from gsl.stages.grounding_gate import settled
+from gsl.stages.grounding_replay import TICKS, replayed
 from gsl.stages.iterate import Iterate
 from gsl.stages.rollout import Scenario
-from gsl.stages.training import FEWEST
+from gsl.stages.training import FEWEST, degrees
 from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import finely
 from gsl.studies.comparison_table import told as bounds
 from gsl.studies.effort import seconds, told
-from gsl.studies.held_out import MEASURED, held_out
+from gsl.studies.held_out import MEASURED, held_out, starts
 from gsl.studies.ledger import Known, Ledger, known_parent, recipes
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import SIM
@@ -77,6 +77,12 @@ class Budget:
     trials: Annotated[int, setting("trials of each", ge=1)]
     known: Known = None
     preset_name: PresetName = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a curve that goes back, or counts a budget twice."""
+        if any(after <= before for before, after in pairwise(self.budgets)):
+            given = ",".join(map(str, self.budgets))
+            raise ConfigError("budgets", "are to rise, the fewest first", given=f"[{given}]")
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -130,14 +136,18 @@ class Budget:
     def _point(self, place: Path, method: str, count: int, number: int, console: Any) -> Point:
         chain = replace(self.iterate.chain, budget=self._budget(count), accept=True)
         seed = self.iterate.seed + number - 1
-        grounding = chain.diagnosed(place.parents[2] / "diagnosis" / place.name, self.methods[method], seed, console)
-        ready = chain.ready(place, grounding, None, seed, console)
-        held = held_out(chain, place.parents[2] / "held_out" / place.name, seed, console)
+        begins = starts(held_out(chain, place.parents[2] / "held_out" / place.name, seed, console), chain)
+        ready = chain.ready(place, self.methods[method], None, seed, console)
         found = chain.search(place / "optimize", ready, None, seed, console)
         measured = chain.measure(place / "evaluate", found, seed, console)
-        bare = Scenario(chain.sim, chain.task, chain.policy, SIM, ready)
-        report = check(settled(bare, found.metrics), chain.policy.initial, held, derived_seed(seed, "held out"))
-        return Point(method, count, number, measured.metrics["returned"]["value"], *_errors(report.metrics()["errors"]))
+        acting = settled(Scenario(chain.sim, chain.task, chain.policy, SIM, ready), found.metrics).grounding
+        assert isinstance(acting, LoadedTransformation), "its world is a robot"
+        env: Any = chain.sim.make()
+        drawn = derived_seed(seed, "replays")
+        grounded, bare = (replayed(env, one, begins, drawn)[TICKS] for one in (acting.expected, NoGrounding()))
+        env.close()
+        errors = degrees(grounded.joints), degrees(bare.joints)
+        return Point(method, count, number, measured.metrics["returned"]["value"], *errors)
 
     def _ungrounded(self, place: Path, number: int, console: Any) -> Point:
         chain, seed = self.iterate.chain, self.iterate.seed + number - 1
@@ -167,11 +177,3 @@ class Budget:
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
         bases = dict(zip(panels, (none.mean, plain), strict=True))
         budget_curve(folder / FIGURE, panels, bases, "What a grounding makes of more real data")
-
-
-def _errors(errors: Mapping[str, Any]) -> tuple[float | None, float | None]:
-    """Return the errors of the grounded and of the plain simulator off π0 [deg], None if all neighbours fell."""
-    if OFF not in errors:
-        return None, None
-    grounded, bare = (errors[OFF][name]["10_ticks"]["joints_deg"] for name in (GROUNDED, BARE))
-    return grounded, bare

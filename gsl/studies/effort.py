@@ -32,16 +32,16 @@ def seconds(study: Compare, where: str = "study.iterate", *, search: bool = True
         ConfigError: The optimizer is no search; `where` are the settings that it is one of.
     """
     iterate, budget = study.iterate, study.iterate.budget
-    if not isinstance(iterate.optimizer, CmaEs):
-        raise ConfigError(f"{where}.optimizer", "studies of robots search: take cma_es")
+    searched = measured = 0
+    if search:
+        if not isinstance(iterate.optimizer, CmaEs):
+            raise ConfigError(f"{where}.optimizer", "studies of robots search: take cma_es")
+        searched = iterate.optimizer.generations * iterate.optimizer.candidates * budget.rollouts
+        measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
     workers = threads(iterate.workers)
     sims = study.simulators or {"": iterate.sim}
     real = sum(_rollout(iterate, world, REAL) for world in study.worlds.values()) / len(study.worlds)
     sim = sum(_rollout(iterate, world, SIM) for world in sims.values()) / len(sims)
-    searched = iterate.optimizer.generations * iterate.optimizer.candidates * budget.rollouts
-    measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
-    if not search:
-        searched = measured = 0
     collected = sum(budget.real), sum(budget.sim)
     rounds, worlds = iterate.iterations * len(study.worlds), len(study.worlds)
     flights = {

@@ -7,12 +7,15 @@ from typing import Any
 
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
+from gsl.errors import GslError
 from gsl.stages.chain import Chain
 from gsl.stages.collect import FILE, Collect
+from gsl.stages.grounding_check import REPLAYS
+from gsl.stages.grounding_replay import PAST, TICKS, Place, places
 from gsl.stages.link import built
+from gsl.stages.training import of_policy
 from gsl.storage.trajectories import read
 from gsl.tasks.task import REAL
-from gsl.worlds.external import asking
 
 HELD_OUT = 12  # trajectories of neighbours, on which errors are measured
 MEASURED = f"Joints are measured on {HELD_OUT} real trajectories off π0 more at most, the same for all of a trial."
@@ -21,7 +24,7 @@ MEASURED = f"Joints are measured on {HELD_OUT} real trajectories off π0 more at
 def held_out(chain: Chain, place: Path, seed: int, console: Any) -> Batch:
     """Return them, collected at `place` if they are not there yet: one of π0, the others around it."""
     stage = Collect(
-        world=asking(chain.real, place),
+        world=chain.real,
         task=chain.task,
         policy=chain.policy,
         role=REAL,
@@ -33,3 +36,16 @@ def held_out(chain: Chain, place: Path, seed: int, console: Any) -> Batch:
         seed=derived_seed(seed, "held out"),
     )
     return read(built(stage, place, console).folder / FILE)
+
+
+def starts(held: Batch, chain: Chain) -> list[Place]:
+    """Return where replays off π0 begin.
+
+    Raises:
+        GslError: All of these trajectories are too short.
+    """
+    found = places(of_policy(held, pi0=False), chain.sim.layout, REPLAYS)
+    if not found:
+        problem = f"none of {HELD_OUT} real trajectories off π0 has the {PAST + TICKS} ticks of a replay"
+        raise GslError(f"{problem}; take a smaller budget.spread, or a longer task")
+    return found

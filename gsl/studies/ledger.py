@@ -102,7 +102,7 @@ class Ledger:
         self._console.status(f"{known or 'none'} of this study's {len(keys)} results are in {self._from}{why}")
 
     def take(self, key: str, **of: Any) -> bool:
-        """Make a trial that is known one of this study; say whether it is known.
+        """Make a trial that is known, or was made here by this very version, one of this study; say whether it is.
 
         Args:
             key: Its recipe.
@@ -111,9 +111,9 @@ class Ledger:
         Raises:
             ArtifactError: They say something else.
         """
-        if key not in self._known:
+        rows = self._known.get(key) or [row for row in self._kept.get(key, []) if row[MADE_BY] == self._me]
+        if not rows:
             return False
-        rows = self._known[key]
         for name, value in of.items():
             right = value if isinstance(value, list) else [value] * len(rows)
             if (told := [row[name] for row in rows]) != right:

@@ -37,7 +37,7 @@ class Table2:
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table, differences paired by trial, the test of the order, and the single trials."""
         found = summaries(trials)
-        where = places(found)
+        where, there = places(found), places(found, told=["iteration"])
         titles = (
             *(*where, "grounding", "improvement [%]", "95 % interval", "trials without a gain"),
             *("best generation", "stable winners", "improving winners", "last generation's improves"),
@@ -61,13 +61,13 @@ class Table2:
             rows = [(*one.cells(where), one.method, *cells) for one, cells in zip(found, apart, strict=True)]
             parts.append(table(beside, rows))
         tested = [
-            (world, f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
-            for world in dict.fromkeys(one.world for one in found)
-            for order in orders(trials, found[0].simulator, world, self.tested, self.against)
+            (*one.cells(there), f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
+            for one in {(one.simulator, one.world): one for one in found}.values()
+            for order in orders(trials, one.simulator, one.world, self.tested, self.against)
         ]
         if tested:
             parts.append("Order of methods by their stable winners, Wilcoxon's signed rank over trials:\n")
-            parts.append(table(("real world", "difference", "stable winners a trial", "p, Holm-corrected"), tested))
+            parts.append(table((*there, "difference", "stable winners a trial", "p, Holm-corrected"), tested))
         return "\n".join([*parts, every_trial(trials)])
 
     def _named(self, one: Summary, found: Sequence[Summary]) -> str:

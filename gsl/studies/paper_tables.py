@@ -39,13 +39,15 @@ class Table3:
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
+        found = summaries(trials)
+        where = places(found, told=["iteration"])
         titles = (
-            *("simulator", "grounding", "iteration", f"in real [{task.unit}]", "95 % interval", "improvement [%]"),
+            *(*where, "grounding", "iteration", f"in real [{task.unit}]", "95 % interval", "improvement [%]"),
             *("95 % interval", "falls", "refused", "stopped by then", f"where they stop [{task.unit}]"),
             *("real episodes", f"paper [{task.unit}]", "paper: improvement [%]"),
         )
         rows = []
-        for one in summaries(trials):
+        for one in found:
             own = one.own(trials)
             chains = [[past for past in trials if past.cell[:3] == one[:3] and past.number == k.number] for k in own]
             so_far = [[past for past in chain if past.iteration <= one.iteration] for chain in chains]
@@ -53,7 +55,8 @@ class Table3:
             stopped = mean_interval([_returned(chain) for chain in so_far])
             paper = TABLE_3.get(one.iteration, NOTHING[:2]) if one.method == "gat" else NOTHING[:2]
             rows.append(
-                (one.simulator, one.method, str(one.iteration), *value_cells(one.value, task), *improvement_cells(one))
+                (*one.cells(where), one.method, str(one.iteration))
+                + (*value_cells(one.value, task), *improvement_cells(one))
                 + (
                     str(one.falls),
                     f"{one.refused} of {one.trials}",
@@ -115,22 +118,18 @@ class LinearWalkTable:
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
+        found = summaries(trials)
+        where = places(found, told=["iteration"])
         titles = (
-            *(
-                "real world",
-                "grounding",
-                "iteration",
-                f"distance in real [{task.unit}]",
-                "95 % interval",
-                "trials that improve",
-            ),
+            *(*where, "grounding", "iteration", f"distance in real [{task.unit}]", "95 % interval"),
+            "trials that improve",
             *("best generation", "falls", "real episodes", "paper [cm]", "paper: improve", "paper: best generation"),
         )
         rows = [
-            (one.world, one.method, str(one.iteration), *value_cells(one.value, task))
+            (*one.cells(where), one.method, str(one.iteration), *value_cells(one.value, task))
             + (f"{one.trials - one.without} of {one.trials}", one.best_generation, str(one.falls))
             + (f"{one.real_episodes:.0f}", *(LINEAR_WALK.get(one.method, NOTHING) if one.iteration == 1 else NOTHING))
-            for one in summaries(trials)
+            for one in found
         ]
         return "\n".join([table(titles, rows), _differences(trials, task, ("none", "gat"))])
 
@@ -180,16 +179,18 @@ class Figure5:
 def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *, falls: bool = False) -> str:
     """Return the table of values, and of falls, against those of other methods, paired by trial."""
     methods, rows = list(dict.fromkeys(trial.method for trial in trials)), []
+    where = places(summaries(trials), told=["iteration"])
     for other, cell in product(against, dict.fromkeys(trial.cell for trial in trials)):
         if other not in methods or methods.index(cell.method) <= methods.index(other):
             continue
         apart = value_cells(differences(trials, cell, other, attrgetter("value")), task)
         fewer = differences(trials, cell, other, attrgetter("falls"))
         counted = (f"{fewer.mean:+.1f}", told(fewer, sign=True)) if falls else ()
-        rows.append((cell.world, f"{cell.method} - {other}", str(cell.iteration), *apart, *counted))
+        places_of = (getattr(cell, name) for name in where.values())
+        rows.append((*places_of, f"{cell.method} - {other}", str(cell.iteration), *apart, *counted))
     counted = ("falls of a trial", "95 % interval") if falls else ()
-    titles = ("real world", "difference", "iteration", f"in real [{task.unit}]", "95 % interval, paired by trial")
-    return table((*titles, *counted), rows)
+    titles = ("difference", "iteration", f"in real [{task.unit}]", "95 % interval, paired by trial")
+    return table((*where, *titles, *counted), rows)
 
 
 def _on_average(trial: Trial) -> float:

@@ -15,24 +15,23 @@ from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import mean_interval
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects
+from gsl.grounding.effects import DiagnosedEffects, innermost
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.report.markdown import table
 from gsl.report.trial_dots import Dots, trial_dots
-from gsl.stages.grounding_check import ASKED, REPLAYS
+from gsl.stages.grounding_check import asked
 from gsl.stages.grounding_gate import Gate
-from gsl.stages.grounding_replay import TICKS, places, replayed
+from gsl.stages.grounding_replay import TICKS, replayed
 from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate
-from gsl.stages.reachability import reachability
 from gsl.stages.rollout import Scenario
 from gsl.stages.training import degrees, of_policy
 from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import finely
 from gsl.studies.effort import seconds, told
-from gsl.studies.held_out import MEASURED, held_out
+from gsl.studies.held_out import MEASURED, held_out, starts
 from gsl.studies.ledger import Known, Ledger, known_parent, recipe
 from gsl.studies.method_colour import method_colour
 from gsl.studies.sizes import PresetName, sizes_of
@@ -44,6 +43,7 @@ TITLES = (
     *("real world", "grounding", "joints after 0.2 s [°]", "95 % interval", "after a tick [°]"),
     *("pitch [°]", "forward [mm]", "out of reach [%]"),
 )
+MOTIONS = ", effects from motions in the air"
 MEANS = {"after_a_tick": ".2f", "pitch": ".2f", "forward": ".1f"}
 
 
@@ -75,7 +75,13 @@ class Replay(NamedTuple):
     @property
     def contradiction(self) -> str:
         """What cannot be, of figures that a file told."""
-        return "" if self.trial > 0 < self.replays else f"trial {self.trial}, replays {self.replays}"
+        if not self.trial > 0 < self.replays:
+            return f"trial {self.trial}, replays {self.replays}"
+        errors = self.after_a_tick, self.joints, self.pitch, self.forward
+        shares = (self.unreached or 0.0, self.alpha or 0.0)
+        if min(errors) < 0.0 or not all(0.0 <= share <= 1.0 for share in shares):
+            return f"errors {errors}, unreached {self.unreached}, alpha {self.alpha}"
+        return ""
 
 
 @component
@@ -119,16 +125,16 @@ class Replays:
 
     def _check(self) -> None:
         for name, grounding in self.methods.items():
-            inner = grounding.inner if isinstance(grounding, DiagnosedEffects) else grounding
-            if not isinstance(inner, ActionTransformation | NoGrounding):
+            if not isinstance(innermost(grounding), ActionTransformation | NoGrounding):
                 raise ConfigError(f"methods.{name}", "is drawn anew each time; replays are of what is expected")
             self.iterate.chain.check(grounding)
         for name, world in self.worlds.items():
             check_alike(self.iterate.sim.layout, world.layout)
             if world.layout.states:
                 raise ConfigError(f"worlds.{name}", "is no robot; replays begin in a robot's real states")
-        if self.iterate.iterations != 1:
-            raise ConfigError("iterate.iterations", "replays are of the first", given=str(self.iterate.iterations))
+        for name, usual in (("iterations", 1), ("pretrained", False)):
+            if (given := getattr(self.iterate, name)) != usual:
+                raise ConfigError(f"iterate.{name}", f"replays are of {usual}", given=str(given))
 
     def _recipe(self, number: int, world: str, method: str) -> str:
         return recipe(self.iterate, number, world, method, self.worlds[world], self.methods[method])
@@ -136,23 +142,23 @@ class Replays:
     def _replay(self, home: Path, number: int, world: str, method: str, console: Any) -> Replay:
         seed, name, below = self.iterate.seed + number - 1, f"trial_{number:02d}", home / world
         chain = replace(self.iterate.chain, real=self.worlds[world], accept=True)
+        held = held_out(chain, below / "held_out" / name, seed, console)
+        begins = starts(held, chain)
         grounding = chain.diagnosed(below / "diagnosis" / name, self.methods[method], seed, console)
         data = {REAL: below / "data" / name, SIM: home / "sim" / "data" / name}
         own = isinstance(grounding, DiagnosedEffects)  # simulations that know the effects
         chain = replace(chain, shared={REAL: data[REAL]} if own else data)
         ready = chain.ready(below / method / name, grounding, None, seed, console)
-        held = held_out(chain, below / "held_out" / name, seed, console)
         gate = Gate(chain.policy.initial, below / method / name, console, accept=True, seed=seed)
         gate.folder.mkdir(parents=True, exist_ok=True)
         scenario, found = gate.passed(Scenario(chain.sim, chain.task, chain.policy, SIM, ready))
-        acting, off = scenario.grounding, of_policy(held, pi0=False)
+        acting, reach = scenario.grounding, None
         env: Any = scenario.world.make()
-        drawn, reach = derived_seed(seed, "replays"), None
+        drawn = derived_seed(seed, "replays")
         if isinstance(acting, LoadedTransformation):
             acting = acting.expected
-            if acting.forward.horizon == 1:
-                reach = reachability(env, acting, places(off, env.layout, ASKED), drawn).share
-        after = replayed(env, acting, places(off, env.layout, REPLAYS), drawn)
+            reach = asked(env, acting, of_policy(held, pi0=False), drawn)
+        after = replayed(env, acting, begins, drawn)
         env.close()
         return Replay(
             world,
@@ -161,24 +167,28 @@ class Replays:
             after_a_tick=degrees(after[1].joints),
             joints=degrees(after[TICKS].joints),
             pitch=degrees(after[TICKS].pitch),
-            forward=1000.0 * float(np.sqrt(np.mean(after[TICKS].forward ** 2))),
-            unreached=reach,
+            forward=after[TICKS].forward_mm,
+            unreached=reach.share if reach else None,
             alpha=found.get("alpha"),
             replays=len(after[TICKS]),
         )
 
     def _told(self, folder: Path, rows: Sequence[Replay], made: str) -> None:
-        shown, panels = [], dict[str, dict[str, Dots]]()
+        first, shown, panels = next(iter(self.methods)), [], dict[str, dict[str, Dots]]()
         for world, method in product(self.worlds, self.methods):
-            own = [one for one in rows if (one.world, one.method) == (world, method)]
+            own, bare = ([one for one in rows if (one.world, one.method) == (world, name)] for name in (method, first))
             joints = mean_interval([one.joints for one in own])
-            reach = [one.unreached for one in own if one.unreached is not None]
+            apart = mean_interval([one.joints - other.joints for one, other in zip(own, bare, strict=True)])
+            reach = [100.0 * one.unreached for one in own if one.unreached is not None]
             means = [f"{np.mean([getattr(one, name) for one in own]):{form}}" for name, form in MEANS.items()]
-            last = f"{100 * np.mean(reach):.0f}" if reach else ""
-            shown.append((world, method, f"{joints.mean:.2f}", finely(joints), *means, last))
+            few = f" ({len(reach)} of {len(own)} trials)" if 0 < len(reach) < len(own) else ""
+            last = f"{np.mean(reach):.0f}{few}" if reach else ""
+            than = "" if method == first else f"{apart.mean:+.2f} ({finely(apart)})"
+            shown.append((world, method, f"{joints.mean:.2f}", finely(joints), than, *means, last))
             dots = Dots([one.joints for one in own], [False] * len(own), method_colour(self.methods[method]))
             panels.setdefault(world, {})[method] = dots
-        sizes = f"{sizes_of(self.preset_name)} {several(self.trials, 'trial')}; {self.iterate.budget.learned}."
+        titles = (*TITLES[:4], f"minus {first} (95 %, paired)", *TITLES[4:])
+        sizes = f"{sizes_of(self.preset_name)} {several(self.trials, 'trial')}; {self.iterate.budget.learned}{MOTIONS}."
         below = "\n\n".join([MEASURED, sizes, made])
-        (folder / TABLE).write_text(f"{table(TITLES, shown)}\n{below}\n", encoding="utf-8")
+        (folder / TABLE).write_text(f"{table(titles, shown)}\n{below}\n", encoding="utf-8")
         trial_dots(folder / FIGURE, panels, axis=TITLES[2], title="How far simulators are from real joints, each trial")

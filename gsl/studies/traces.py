@@ -103,7 +103,7 @@ class Figure7:
         walk = _walked(iterate)
         layout = iterate.sim.layout
         index, period = layout.joints.index(self.joint), layout.control_period
-        tick = max(PAST, round(self.begin / period))
+        tick = max(PAST, iterate.forward_model.of_body.span, round(self.begin / period))
         if tick >= len(walk):
             problem = f"π0's real walk is over after {period * len(walk):.1f} s; begin before"
             raise ConfigError("begin", problem, given=f"{self.begin:g}")
@@ -146,6 +146,7 @@ def _check(iterate: Iterate, joint: str, duration: float) -> None:
     """Refuse what cannot be drawn."""
     if not isinstance(iterate.grounding, ActionTransformation):
         raise ConfigError("iterate.grounding", "only a transformation of actions can be drawn, such as gat")
+    iterate.chain.check(iterate.grounding)
     known = iterate.forward_model.joints_of_interest(iterate.sim.layout.joints, "iterate.forward_model")
     check_known([joint], known, "joint")
     if round(duration / iterate.sim.layout.control_period) < 1:
