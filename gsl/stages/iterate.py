@@ -186,3 +186,22 @@ def check_aggregate(iterate: Iterate, groundings: Iterable[Grounding | ActionTra
     if iterate.aggregate and not (any(map(learned, groundings)) and iterate.iterations > 1):
         problem = "is for a grounding that learns from real trajectories, in two iterations or more"
         raise ConfigError(name, problem, given="true")
+
+
+def check_trainable(iterate: Iterate, name: str, grounding: Grounding | ActionTransformation) -> None:
+    """Refuse what iterations could not train, before anything is asked of the real robot.
+
+    Args:
+        iterate: The setting `iterate` of a study.
+        name: Of the setting that the grounding is there.
+        grounding: In the place of its own.
+
+    Raises:
+        ConfigError: Under the study's names of settings; see `Chain.check`.
+    """
+    try:
+        iterate.chain.check(grounding)
+    except ConfigError as error:
+        whose, _, below = error.setting.partition(".")
+        where = f"{name}.{below}" if whose == "grounding" else f"iterate.{error.setting}"
+        raise ConfigError(where, error.problem, given=error.given) from error

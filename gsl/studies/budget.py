@@ -20,7 +20,7 @@ from gsl.report.markdown import table
 from gsl.stages.chain import Budget as ChainBudget
 from gsl.stages.grounding_gate import settled
 from gsl.stages.grounding_replay import TICKS, replayed
-from gsl.stages.iterate import Iterate
+from gsl.stages.iterate import Iterate, check_trainable
 from gsl.stages.rollout import Scenario
 from gsl.stages.training import FEWEST, degrees
 from gsl.studies.compare import Compare
@@ -97,7 +97,7 @@ class Budget:
         for name, grounding in self.methods.items():
             if not isinstance(grounding, ActionTransformation):
                 raise ConfigError(f"methods.{name}", "learns from real trajectories alone; take gat or sgat")
-            self.iterate.chain.check(grounding)
+            check_trainable(self.iterate, f"methods.{name}", grounding)
         for name, usual in (("iterations", 1), ("pretrained", False)):
             if (given := getattr(self.iterate, name)) != usual:
                 raise ConfigError(f"iterate.{name}", f"a point of the curve has {usual}", given=str(given))

@@ -16,7 +16,7 @@ from gsl.grounding.grounding import Grounding
 from gsl.stages.chain import Chain, round_seed
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.headline import Unit
-from gsl.stages.iterate import Iterate, check_aggregate
+from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
 from gsl.studies.comparison import summaries
@@ -69,8 +69,8 @@ class Compare:
 
     def carried_out(self, folder: Path, console: Any) -> tuple[list[Trial], str]:
         """Return all trials, built beside `folder` and told as they end, and who made them; write them down."""
-        for grounding in self.methods.values():
-            self.iterate.chain.check(grounding)
+        for name, grounding in self.methods.items():
+            check_trainable(self.iterate, f"methods.{name}", grounding)
         check_aggregate(self.iterate, self.methods.values(), "iterate.aggregate")
         home, simulators = folder.parent, self.simulators or {"": self.iterate.sim}
         for sim, real in product(simulators.values(), self.worlds.values()):

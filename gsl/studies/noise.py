@@ -27,7 +27,7 @@ from gsl.report.noise_bars import Bars, noise_bars
 from gsl.stages.chain import Chain, round_seed
 from gsl.stages.evaluate import TABLE as EVALUATION
 from gsl.stages.headline import several
-from gsl.stages.iterate import Iterate, check_aggregate
+from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
 from gsl.studies.ledger import Known, Ledger, known_parent, recipes
@@ -84,8 +84,8 @@ class NoiseStudy:
         """Run all trials; write the points, the table and the figure."""
         for name, world in self.worlds.items():
             check_alike(self.sims.get(name, self.iterate.sim).layout, world.layout)
-        for grounding in self.methods.values():
-            self.iterate.chain.check(grounding)
+        for name, grounding in self.methods.items():
+            check_trainable(self.iterate, f"methods.{name}", grounding)
         named = {f"{group}.{name}": one for group in ("worlds", "sims") for name, one in getattr(self, group).items()}
         try_out({"iterate.sim": self.iterate.sim, **named})
         home = folder.parent

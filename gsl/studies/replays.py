@@ -25,7 +25,7 @@ from gsl.stages.grounding_check import asked
 from gsl.stages.grounding_gate import Gate
 from gsl.stages.grounding_replay import TICKS, replayed
 from gsl.stages.headline import several
-from gsl.stages.iterate import Iterate
+from gsl.stages.iterate import Iterate, check_trainable
 from gsl.stages.rollout import Scenario
 from gsl.stages.training import degrees, of_policy
 from gsl.studies.compare import Compare
@@ -127,7 +127,7 @@ class Replays:
         for name, grounding in self.methods.items():
             if not isinstance(innermost(grounding), ActionTransformation | NoGrounding):
                 raise ConfigError(f"methods.{name}", "is drawn anew each time; replays are of what is expected")
-            self.iterate.chain.check(grounding)
+            check_trainable(self.iterate, f"methods.{name}", grounding)
         for name, world in self.worlds.items():
             check_alike(self.iterate.sim.layout, world.layout)
             if world.layout.states:

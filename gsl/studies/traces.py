@@ -22,7 +22,7 @@ from gsl.models.ensemble import Forward
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.markdown import table
 from gsl.stages.grounding_replay import PAST, Place, replay
-from gsl.stages.iterate import Iterate
+from gsl.stages.iterate import Iterate, check_trainable
 from gsl.stages.needed_model import extra_ticks
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.training import degrees
@@ -146,7 +146,7 @@ def _check(iterate: Iterate, joint: str, duration: float) -> None:
     """Refuse what cannot be drawn."""
     if not isinstance(iterate.grounding, ActionTransformation):
         raise ConfigError("iterate.grounding", "only a transformation of actions can be drawn, such as gat")
-    iterate.chain.check(iterate.grounding)
+    check_trainable(iterate, "iterate.grounding", iterate.grounding)
     known = iterate.forward_model.joints_of_interest(iterate.sim.layout.joints, "iterate.forward_model")
     check_known([joint], known, "joint")
     if round(duration / iterate.sim.layout.control_period) < 1:
