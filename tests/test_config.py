@@ -137,7 +137,7 @@ def test_wrong_usage_is_one_line_too(arguments: list[str], message: str, capsys:
     [
         ("known", 1, "gsl collect: the robot is on fire; put it out\n"),
         ("bug", 1, "gsl collect: internal error: ZeroDivisionError: division by zero in two lines; GSL_TRACEBACK=1"),
-        ("ctrl-c", 130, "gsl collect: interrupted\n"),
+        ("ctrl-c", 130, "gsl collect: interrupted; the same command goes on from what is built\n"),
     ],
 )
 def test_a_stage_that_fails_leaves_nothing_behind(

@@ -66,7 +66,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     left_out += short if what in ("table4", "linear-walk", "worlds") else []
     left_out += ["study.iterate.aggregate=true"] if what == "table4" else []
     said = done("reproduce", what, *FEW, "study.iterate.task.duration=1.2", *left_out, folder=tmp_path)
-    assert "from nothing" in said.err
+    assert " for all of its results; a study that was stopped goes on where it was" in said.err
     folder = next((tmp_path / "runs").glob("*/reproduce"))
     trials = json.loads((folder / "trials.json").read_text())
     assert {one["method"] for one in trials} == set(KEPT[what])
@@ -110,7 +110,7 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
 def test_a_file_that_holds_no_trials_is_refused(tmp_path: Path) -> None:
     (tmp_path / "figures.json").write_text('[{"value": 1}]')
     said = gsl("reproduce", "fig5", *FEW, "study.known=figures.json", folder=tmp_path)
-    assert said.code == 2 and "figures.json: row 1 is no trial of such a study: " in said.lines[-1]
+    assert said.code == 2 and "figures.json: row 1 is no result of such a study: " in said.lines[-1]
 
 
 def test_a_trace_is_of_a_joint_that_the_models_know(tmp_path: Path) -> None:
@@ -197,13 +197,28 @@ def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
     said: list[str] = []
     given, console = tmp_path / "given.json", Mock(status=said.append)
     given.write_text(json.dumps([{"number": 1, "value": 1.0, "recipe": "a", "made_by": "b"}]))
-    Ledger(tmp_path / "t.json", {}, Figure, console).announce(["a"])
-    for keys in (["a", "b"], ["b"]):
-        Ledger(tmp_path / "t.json", {"known": given}, Figure, console).announce(keys)
+    path = tmp_path / "t.json"
+    wanted = {"a": "none", "b": "gat", "c": "gat", "d": "sgat"}
+    Ledger(path, {}, Figure, console).announce(wanted, lambda: 6000.0)
+    ledger = Ledger(path, {"known": given}, Figure, console)
+    ledger.announce(wanted, lambda: 6000.0)
+    ledger.add("d", [{"number": 4, "value": 1.0}])
+    Ledger(path, {"known": given}, Figure, console).announce(wanted, lambda: 6000.0)
+    Ledger(path, {"known": given}, Figure, console).announce({"a": "none"}, lambda: 6000.0)
+    goes_on = "; a study that was stopped goes on where it was"
+    known = f"1 of this study's 4 results are in {given}"
     assert said == [
-        f"1 of this study's 2 results are in {given}",
-        f"none of this study's 1 results are in {given}: its trials have other settings, seeds or files",
+        f"about 1.7 hours for all of its results{goes_on}",
+        *(known, f"about 75 minutes for 3 of 4 results, gat (2), sgat (1){goes_on}"),
+        *(
+            known,
+            f"1 of this study's 4 results are in {path}",
+            f"about 50 minutes for 2 of 4 results, gat (2){goes_on}",
+        ),
+        f"1 of this study's 1 results are in {given}",
     ]
+    with pytest.raises(ArtifactError, match="holds no result of this study: its trials have other settings, seeds"):
+        Ledger(path, {"known": given}, Figure, console).announce({"b": "gat"})
 
 
 def test_a_recipe_is_of_what_a_trial_comes_from(tmp_path: Path) -> None:
@@ -254,7 +269,7 @@ def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
     left_out = ("gat_residual", "gat_multi_step", "gat_gated", "effects", "effects_gat")
     few = ("preset=toy", "iterate.workers=1", "iterate.task.duration=1.2", *(f"~methods.{name}" for name in left_out))
     said = done("reproduce", "replays", *few, "~worlds.nao_weak", folder=tmp_path)
-    assert "from nothing" in said.err
+    assert "about 1 minute for all of its results" in said.err
     folder = tmp_path / "runs/replays/reproduce"
     rows = {one["method"]: one for one in json.loads((folder / "replays.json").read_text())}
     assert set(rows) == {"none", "gat", "identified"} and not list(tmp_path.rglob("optimize"))
@@ -294,7 +309,7 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     assert points[1]["bare"] == points[2]["bare"]  # measured on the same trajectories
     assert (folder / "budget.png").stat().st_size > 10_000
     assert " otherwise. Made: trial 1 by " in (folder / "table.md").read_text()
-    assert "about " in said.err and "from nothing" in said.err
+    assert "for all of its results" in said.err
     assert "gat, 4 trajectories, trial 1: grounded simulator against" in said.err
     assert "grounded simulator against" not in said.out and "real trajectories collected" in said.out
 

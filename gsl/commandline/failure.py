@@ -15,7 +15,7 @@ INTERRUPTED = 130
 def report(failure: BaseException, console: Console, *, command: str = "gsl") -> int:
     """Say what ended a command and return its exit code: 2 usage, input; 1 a stage failed; 130 interrupted; 0 waits."""
     if isinstance(failure, KeyboardInterrupt) or asked():
-        return console.error("interrupted", INTERRUPTED, command=command)
+        return console.error("interrupted; the same command goes on from what is built", INTERRUPTED, command=command)
     if isinstance(failure, Waiting):
         console.status(str(failure))
         console.result({"waiting": failure.request, "missing": failure.missing}, text=failure.request.as_posix())

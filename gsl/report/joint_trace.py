@@ -35,24 +35,25 @@ class Traces(NamedTuple):
     name: str = "grounded simulation"
 
 
-def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = None) -> None:
+def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = None, rest: int = 0) -> None:
     """Write the figure of one joint as a PNG file; arguments as those of `joint_trace_figure`."""
-    save(joint_trace_figure(traces, joint, title=title), path)
+    save(joint_trace_figure(traces, joint, title=title, rest=rest), path)
 
 
-def joint_trace_figure(traces: Traces, joint: str, *, title: str | None = None) -> Figure:
+def joint_trace_figure(traces: Traces, joint: str, *, title: str | None = None, rest: int = 0) -> Figure:
     """Return the figure of one joint in degrees; each simulator is labelled with its RMS distance from the real robot.
 
     Args:
         traces: What to draw.
         joint: Its name.
         title: By default what grounding does to that distance.
+        rest: Ticks in the beginning in which nothing moves, and which no distance is of.
     """
-    distances = [_rms_degrees(traces.simulation - traces.real)]
+    distances = [_rms_degrees((traces.simulation - traces.real)[rest:])]
     lines = [("command", traces.command, COMMAND, 1.3, (0, (5, 3))), ("real", traces.real, REAL, 3.2, "-")]
     lines.append((f"simulation,\n{distances[0]:.1f}° from real", traces.simulation, SIMULATION, 1.8, "-"))
     if traces.grounded is not None:
-        distances.append(_rms_degrees(traces.grounded - traces.real))
+        distances.append(_rms_degrees((traces.grounded - traces.real)[rest:]))
         label = f"{traces.name},\n{distances[1]:.1f}° from real"
         lines.append((label, traces.grounded, GROUNDED, 1.8, "-"))
     if traces.sent is not None:

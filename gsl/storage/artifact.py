@@ -85,7 +85,8 @@ def build(stage: Stage, *, config: Mapping[str, Any], out: Path, command: str, f
     """
     identity = identify(stage.kind, config, _sources(stage))
     with locked(out), stoppable(), explained(out.parent):
-        if (existing := _existing(out, identity, config, force=force)) is not None:
+        forced = getattr(stage, "forced", "rebuilds it")
+        if (existing := _existing(out, identity, config, force=force, forced=forced)) is not None:
             os.utime(out / manifest.NAME)
             return existing
         with workplace(out, identity.key, progress=getattr(stage, "progress", "")) as folder:
@@ -96,7 +97,8 @@ def build(stage: Stage, *, config: Mapping[str, Any], out: Path, command: str, f
     return Artifact(out, made)
 
 
-def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force: bool) -> Artifact | None:
+def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force: bool, forced: str) -> Artifact | None:
+    """Return an artifact that is what is wanted; `forced` says what force=true does to one that is not."""
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return None
     try:
@@ -109,7 +111,7 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
     if force:
         return None
     reason = f"changed since: {damaged}" if damaged else changes(found.manifest, found.config, identity, config)
-    raise ArtifactError(out, f"was built otherwise ({reason}); force=true rebuilds it, out= keeps both")
+    raise ArtifactError(out, f"was built otherwise ({reason}); force=true {forced}, out= keeps both")
 
 
 def _work(

@@ -26,9 +26,9 @@ from gsl.stages.training import FEWEST, degrees
 from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import finely
 from gsl.studies.comparison_table import told as bounds
-from gsl.studies.effort import seconds, told
+from gsl.studies.effort import check_search, seconds
 from gsl.studies.held_out import MEASURED, held_out, starts
-from gsl.studies.ledger import Known, Ledger, known_parent, recipes
+from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipes
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import SIM
 
@@ -65,6 +65,7 @@ class Budget:
     """Trial k of every method and budget has the same seed; without grounding there is one search a trial."""
 
     kind: ClassVar[str] = "reproduce"
+    forced: ClassVar[str] = GOES_ON
 
     iterate: Annotated[Iterate, setting("what a trial is; its grounding and real budget are replaced")]
     methods: Annotated[
@@ -101,11 +102,11 @@ class Budget:
         for name, usual in (("iterations", 1), ("pretrained", False)):
             if (given := getattr(self.iterate, name)) != usual:
                 raise ConfigError(f"iterate.{name}", f"a point of the curve has {usual}", given=str(given))
-        console.status(f"{told(self._seconds())} from nothing; a study that was stopped goes on where it was")
+        check_search(self.iterate, "iterate")
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
         keys = recipes(self)
-        ledger.announce(keys.values())
+        ledger.announce({key: f"trial {number}" for number, key in keys.items()}, self._seconds)
         for number, key in keys.items():
             if not ledger.take(key, trial=number):
                 ledger.add(key, [one._asdict() for one in self._trial(home, number, console)])
@@ -118,7 +119,7 @@ class Budget:
         study = Compare(self.iterate, {"real": self.iterate.real}, {NONE: NoGrounding()}, self.trials)
         usual = replace(self.iterate, budget=self._budget(sum(self.budgets) // len(self.budgets)))
         learning = replace(study, methods=self.methods, iterate=usual)
-        return seconds(study, "iterate") + len(self.budgets) * seconds(learning, "iterate")
+        return seconds(study) + len(self.budgets) * seconds(learning)
 
     def _budget(self, count: int) -> ChainBudget:
         """Return the effort with so many real trajectories to learn from."""

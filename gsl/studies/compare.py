@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -21,7 +21,7 @@ from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
 from gsl.studies.comparison import summaries
 from gsl.studies.comparison_table import markdown
-from gsl.studies.ledger import Known, Ledger, known_parent, recipe
+from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipe
 from gsl.studies.trial import Cell, Trial
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import try_out
@@ -44,6 +44,7 @@ class Compare:
     """
 
     kind: ClassVar[str] = "compare"
+    forced: ClassVar[str] = GOES_ON
 
     iterate: Annotated[Iterate, setting("what a trial is; its worlds and grounding are replaced")]
     worlds: Annotated[Mapping[str, World], setting("the real worlds, by name", min_length=1)]
@@ -67,24 +68,27 @@ class Compare:
         (folder / TABLE).write_text(f"{text}\n{made}\n", encoding="utf-8")
         return {"trials": self.trials, "summaries": [one._asdict() for one in summary]}
 
-    def carried_out(self, folder: Path, console: Any) -> tuple[list[Trial], str]:
-        """Return all trials, built beside `folder` and told as they end, and who made them; write them down."""
+    def carried_out(
+        self, folder: Path, console: Any, seconds: Callable[[], float] | None = None
+    ) -> tuple[list[Trial], str]:
+        """Return all trials, built beside `folder` and told as they end, and who made them; write them down.
+
+        Args:
+            folder: Of the study's artifact.
+            console: Where it is told.
+            seconds: Returns about how long all of it takes from nothing [s].
+        """
         for name, grounding in self.methods.items():
             check_trainable(self.iterate, f"methods.{name}", grounding)
         check_aggregate(self.iterate, self.methods.values(), "iterate.aggregate")
-        home, simulators = folder.parent, self.simulators or {"": self.iterate.sim}
+        home, simulators = folder.parent, self._simulators
         for sim, real in product(simulators.values(), self.worlds.values()):
             check_alike(sim.layout, real.layout)
         named = {f"simulators.{name}" if name else "iterate.sim": one for name, one in simulators.items()}
         try_out({**named, **{f"worlds.{name}": one for name, one in self.worlds.items()}})
         ledger = Ledger(home / DATA, self.parents(), Trial, console)
-        cells = [Cell(sim, world, method, 1) for method, sim, world in product(self.methods, simulators, self.worlds)]
-        keys = {
-            (number, cell): self._recipe(number, cell, simulators[cell.simulator])
-            for number, cell in product(range(1, self.trials + 1), cells)
-        }
-        ledger.announce(keys.values())
-        for (number, cell), key in keys.items():
+        ledger.announce({key: cell.method for (_, cell), key in self.recipes.items()}, seconds)
+        for (number, cell), key in self.recipes.items():
             of = {"number": number, "simulator": cell.simulator, "world": cell.world, "method": cell.method}
             if ledger.take(key, **of, iteration=list(range(1, self.iterate.iterations + 1))):
                 continue
@@ -97,9 +101,21 @@ class Compare:
             ledger.add(key, [trial._asdict() for trial in trials])
         return [Trial(**row) for row in ledger.figures], ledger.close(folder / DATA)
 
-    def _recipe(self, number: int, cell: Cell, sim: World) -> str:
-        world, method = self.worlds[cell.world], self.methods[cell.method]
-        return recipe(self.iterate, number, cell, sim, world, method, self.rank)
+    @property
+    def recipes(self) -> dict[tuple[int, Cell], str]:
+        """By trial and cell, in the order in which they are run."""
+        sims = self._simulators
+        cells = [Cell(sim, world, method, 1) for method, sim, world in product(self.methods, sims, self.worlds)]
+        return {
+            (k, cell): recipe(
+                self.iterate, k, cell, sims[cell[0]], self.worlds[cell[1]], self.methods[cell[2]], self.rank
+            )
+            for k, cell in product(range(1, self.trials + 1), cells)
+        }
+
+    @property
+    def _simulators(self) -> Mapping[str, World]:
+        return self.simulators or {"": self.iterate.sim}
 
     def _trial(self, home: Path, sim: World, cell: Cell, number: int, console: Any) -> Iterator[Trial]:
         """Yield a trial iteration by iteration."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import TYPE_CHECKING
 
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
@@ -13,9 +14,11 @@ from gsl.stages.iterate import Iterate
 from gsl.stages.population import threads
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.values import Values
-from gsl.studies.compare import Compare
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.world import World
+
+if TYPE_CHECKING:
+    from gsl.studies.compare import Compare
 
 TRIED = 2  # rollouts of π0 in each world, after one that compiles
 LEARNED = 1.4  # how much longer a rollout takes with a learned grounding
@@ -23,19 +26,25 @@ APART = 25.0  # of a learned grounding: fits and checks [s]
 DIAGNOSED = {"diagnose": 7.5, "identify": 2.0}  # of a second of motion in the air, on two cores [s]
 
 
-def seconds(study: Compare, where: str = "study.iterate", *, search: bool = True) -> float:
+def check_search(iterate: Iterate, where: str) -> None:
+    """Refuse an optimizer that does not search; `where` is the setting that the iteration is.
+
+    Raises:
+        ConfigError: It is another.
+    """
+    if not isinstance(iterate.optimizer, CmaEs):
+        raise ConfigError(f"{where}.optimizer", "studies of robots search: take cma_es")
+
+
+def seconds(study: Compare, *, search: bool = True) -> float:
     """Return an estimate of a study's duration from nothing [s], good to a factor of two or so.
 
     Without searches it is that of data, models and diagnoses.
-
-    Raises:
-        ConfigError: The optimizer is no search; `where` are the settings that it is one of.
     """
     iterate, budget = study.iterate, study.iterate.budget
     searched = measured = 0
     if search:
-        if not isinstance(iterate.optimizer, CmaEs):
-            raise ConfigError(f"{where}.optimizer", "studies of robots search: take cma_es")
+        assert isinstance(iterate.optimizer, CmaEs), "check_search() has refused others"
         searched = iterate.optimizer.generations * iterate.optimizer.candidates * budget.rollouts
         measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
     workers = threads(iterate.workers)

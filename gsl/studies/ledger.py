@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -19,6 +19,7 @@ from gsl.storage.identity import WITHOUT_EFFECT
 from gsl.storage.read_files import read_files
 from gsl.storage.references import resolve
 from gsl.storage.versions import commit
+from gsl.studies.effort import told
 from gsl.studies.ledger_file import MADE_BY, RECIPE, Figures, read
 
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
@@ -28,6 +29,7 @@ NUMBER = ("number", "trial")  # what rows call their trial
 LATER = {"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim", "rested": False,
          "multi_step": 1}  # fmt: skip
 
+GOES_ON = "goes on from the results that are there"  # what force=true does to a study
 LABELS = ("preset_name",)  # that tables tell, and no result depends on
 
 Known = Annotated[str | None, setting("figures of trials that the same study has made before, not to be run again")]
@@ -93,13 +95,30 @@ class Ledger:
         """The rows of all trials so far, by trial, without recipe and maker."""
         return [{name: value for name, value in row.items() if name not in (RECIPE, MADE_BY)} for row in self._rows()]
 
-    def announce(self, keys: Collection[str]) -> None:
-        """Say how many of a study's trials are known, if a file of such was given."""
-        if self._from is None:
-            return
-        known = sum(key in self._known for key in keys)
-        why = "" if known else ": its trials have other settings, seeds or files"
-        self._console.status(f"{known or 'none'} of this study's {len(keys)} results are in {self._from}{why}")
+    def announce(self, wanted: Mapping[str, str], seconds: Callable[[], float] | None = None) -> None:
+        """Say how many of a study's results are there, and how long the others will take.
+
+        Args:
+            wanted: By recipe, whose results they are.
+            seconds: Returns about how long all of them would take [s]; none if nobody knows.
+
+        Raises:
+            ArtifactError: A file of earlier trials was given and holds none of this study's.
+        """
+        known, found = sum(key in self._known for key in wanted), {key for key in wanted if self._rows_of(key)}
+        if self._from is not None:
+            if not known:
+                problem = "holds no result of this study: its trials have other settings, seeds or files"
+                raise ArtifactError(self._from, f"{problem}; without it the study runs them all")
+            self._console.status(f"{known} of this study's {len(wanted)} results are in {self._from}")
+        if len(found) > known:
+            self._console.status(f"{len(found) - known} of this study's {len(wanted)} results are in {self._path}")
+        counts = Counter(name for key, name in wanted.items() if key not in found)
+        if counts and seconds is not None:
+            lasting = told(seconds() * counts.total() / len(wanted))
+            which = ", ".join(f"{name} ({count})" for name, count in counts.items())
+            whose = f"{counts.total()} of {len(wanted)} results, {which}" if found else "all of its results"
+            self._console.status(f"{lasting} for {whose}; a study that was stopped goes on where it was")
 
     def take(self, key: str, **of: Any) -> bool:
         """Make a trial that is known, or was made here by this very version, one of this study; say whether it is.
@@ -111,7 +130,7 @@ class Ledger:
         Raises:
             ArtifactError: They say something else.
         """
-        rows = self._known.get(key) or [row for row in self._kept.get(key, []) if row[MADE_BY] == self._me]
+        rows = self._rows_of(key)
         if not rows:
             return False
         for name, value in of.items():
@@ -135,6 +154,10 @@ class Ledger:
         if len(made) > 1:
             self._console.status(f"these trials were made by {len(made)} versions of gsl; the table says which")
         return f"Made: {'; '.join(f'{trials} by {name}' for name, trials in made.items())}."
+
+    def _rows_of(self, key: str) -> list[dict[str, Any]]:
+        """Return the rows of a trial that is known, or that this version of gsl has made here."""
+        return self._known.get(key) or [row for row in self._kept.get(key, []) if row[MADE_BY] == self._me]
 
     def _rows(self) -> list[dict[str, Any]]:
         return sorted((row for rows in self._done.values() for row in rows), key=_number)

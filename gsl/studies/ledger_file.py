@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from inspect import signature
 from pathlib import Path
 from typing import Any, Protocol
@@ -13,6 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 from gsl.errors import ArtifactError
 
 RECIPE, MADE_BY = "recipe", "made_by"
+SHOWN = 3  # of names that are wrong
 
 
 class Figures(Protocol):
@@ -47,17 +48,20 @@ def _parsed(path: Path) -> list[dict[str, Any]]:
     try:
         rows = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_figure)
     except (ValueError, OSError) as error:
-        raise ArtifactError(path, f"is no file of trials: {error}") from error
+        raise ArtifactError(path, f"is no file of a study's results; move it away: {error}") from error
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise ArtifactError(path, "is no file of trials: not a list of rows")
+        raise ArtifactError(path, "is no file of a study's results: not a list of rows")
     return rows
 
 
 def _problem(row: Mapping[str, Any], adapter: TypeAdapter[Figures], kind: type[Figures]) -> str:
     known = signature(kind).parameters.values()
     fields = [one.name for one in known if one.name in row or one.default is one.empty]
-    if wrong := sorted({*fields, RECIPE, MADE_BY} ^ row.keys()):
-        return f"is no trial of such a study: {', '.join(wrong)} lacking or unknown"
+    due = {*fields, RECIPE, MADE_BY}
+    if wrong := [
+        f"{_few(names)} {how}" for names, how in ((due - row.keys(), "lacking"), (row.keys() - due, "unknown")) if names
+    ]:
+        return f"is no result of such a study: {', '.join(wrong)}"
     if odd := [name for name in (RECIPE, MADE_BY) if not isinstance(row[name], str)]:
         return f"has {odd[0]} {row[odd[0]]!r}: that has to be text"
     try:
@@ -67,6 +71,12 @@ def _problem(row: Mapping[str, Any], adapter: TypeAdapter[Figures], kind: type[F
         where = ".".join(map(str, first["loc"]))
         return f"has {where} {first['input']!r}: {first['msg'].lower()}"
     return f"contradicts itself: {figures.contradiction}" if figures.contradiction else ""
+
+
+def _few(names: Set[str]) -> str:
+    """Return the first of some names, and how many more there are."""
+    shown, more = sorted(names)[:SHOWN], len(names) - SHOWN
+    return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
 def _no_figure(name: str) -> None:

@@ -30,7 +30,7 @@ from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
-from gsl.studies.ledger import Known, Ledger, known_parent, recipes
+from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipes
 from gsl.studies.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import REAL, SIM
@@ -49,6 +49,7 @@ class NoiseStudy:
     """
 
     kind: ClassVar[str] = "reproduce"
+    forced: ClassVar[str] = GOES_ON
 
     iterate: Annotated[Iterate, setting("what a trial is; its real world and grounding are replaced")]
     worlds: Annotated[
@@ -91,7 +92,7 @@ class NoiseStudy:
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
         keys = recipes(self)
-        ledger.announce(keys.values())
+        ledger.announce({key: f"trial {number}" for number, key in keys.items()})
         known = {number for number, key in keys.items() if ledger.take(key, trial=number)}
         jobs = [(number, home) for number in keys if number not in known]
         with console.progress(len(jobs), "trials") as progress:

@@ -30,9 +30,9 @@ from gsl.stages.rollout import Scenario
 from gsl.stages.training import degrees, of_policy
 from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import finely
-from gsl.studies.effort import seconds, told
+from gsl.studies.effort import seconds
 from gsl.studies.held_out import MEASURED, held_out, starts
-from gsl.studies.ledger import Known, Ledger, known_parent, recipe
+from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipe
 from gsl.studies.method_colour import method_colour
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import REAL, SIM
@@ -45,6 +45,16 @@ TITLES = (
 )
 MOTIONS = ", effects from motions in the air"
 MEANS = {"after_a_tick": ".2f", "pitch": ".2f", "forward": ".1f"}
+
+
+class Silent:
+    """Hears what the gate says of its own check, which is of other trajectories than the study's."""
+
+    def status(self, text: str) -> None:
+        """Say nothing."""
+
+    def table(self, *parts: Any) -> None:
+        """Show nothing."""
 
 
 class Replay(NamedTuple):
@@ -89,6 +99,7 @@ class Replays:
     """Trial k of every method has the same seed, and is judged on the same trajectories of its real world."""
 
     kind: ClassVar[str] = "reproduce"
+    forced: ClassVar[str] = GOES_ON
 
     iterate: Annotated[Iterate, setting("what a trial is; its worlds and grounding are replaced")]
     worlds: Annotated[Mapping[str, World], setting("the real worlds, by name", min_length=1)]
@@ -109,12 +120,11 @@ class Replays:
         """
         self._check()
         study = Compare(self.iterate, self.worlds, self.methods, self.trials)
-        console.status(f"{told(seconds(study, 'iterate', search=False))} from nothing; it goes on where it was stopped")
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Replay, console)
         cells = list(product(range(1, self.trials + 1), self.worlds, self.methods))
         keys = {cell: self._recipe(*cell) for cell in cells}
-        ledger.announce(keys.values())
+        ledger.announce({key: cell[2] for cell, key in keys.items()}, lambda: seconds(study, search=False))
         for (number, world, method), key in keys.items():
             if not ledger.take(key, trial=number, world=world, method=method):
                 with console.part(f"{world}, {method}, trial {number}"):
@@ -149,7 +159,7 @@ class Replays:
         own = isinstance(grounding, DiagnosedEffects)  # simulations that know the effects
         chain = replace(chain, shared={REAL: data[REAL]} if own else data)
         ready = chain.ready(below / method / name, grounding, None, seed, console)
-        gate = Gate(chain.policy.initial, below / method / name, console, accept=True, seed=seed)
+        gate = Gate(chain.policy.initial, below / method / name, Silent(), accept=True, seed=seed)
         gate.folder.mkdir(parents=True, exist_ok=True)
         scenario, found = gate.passed(Scenario(chain.sim, chain.task, chain.policy, SIM, ready))
         acting, reach = scenario.grounding, None

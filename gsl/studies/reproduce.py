@@ -12,8 +12,8 @@ from gsl.report.trial_dots import Dots, trial_dots
 from gsl.stages.headline import several
 from gsl.studies.compare import DATA, TABLE, Compare
 from gsl.studies.comparison import summaries
-from gsl.studies.effort import seconds, told
-from gsl.studies.ledger import known_parent
+from gsl.studies.effort import check_search, seconds
+from gsl.studies.ledger import GOES_ON, known_parent
 from gsl.studies.method_colour import method_colour
 from gsl.studies.paper_cells import Drawn, one_by_one
 from gsl.studies.sizes import PresetName, sizes_of
@@ -39,6 +39,7 @@ class Reproduce:
     """What is built is not built again: a stopped study goes on."""
 
     kind: ClassVar[str] = "reproduce"
+    forced: ClassVar[str] = GOES_ON
 
     study: Annotated[Compare, setting("what is run")]
     table: Annotated[PaperTable, setting("how it is told")]
@@ -54,8 +55,8 @@ class Reproduce:
         Raises:
             ConfigError: Its optimizer is no search.
         """
-        console.status(f"{told(seconds(self.study))} from nothing; a study that was stopped goes on where it was")
-        trials, made = self.study.carried_out(folder, console)
+        check_search(self.study.iterate, "study.iterate")
+        trials, made = self.study.carried_out(folder, console, lambda: seconds(self.study))
         task = self.study.iterate.task
         parts = [self.table.markdown(trials, task), f"{sizes_of(self.preset_name)} {_sizes(self.study)}\n", made]
         (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
@@ -67,7 +68,7 @@ class Reproduce:
 def _sizes(study: Compare) -> str:
     """Return the sizes behind a table."""
     budget, optimizer = study.iterate.budget, study.iterate.optimizer
-    assert isinstance(optimizer, CmaEs), "seconds() has refused others"
+    assert isinstance(optimizer, CmaEs), "check_search() has refused others"
     searched = (
         f"{optimizer.generations} generations of {optimizer.candidates} candidates, {budget.rollouts} rollouts each"
     )

@@ -72,9 +72,10 @@ class Figure6:
         ]
         (real, command), (bare, _), (grounded, sent) = played
         time = period * np.arange(1 - PAST, ticks + 1)
-        joint_trace(folder / "figure_6.png", Traces(time, command, real, bare, grounded, sent), self.joint)
         moved = slice(PAST, None)  # before, all of them rest
         found = {"ungrounded": bare[moved], "grounded": grounded[moved]}
+        traces = Traces(time, command, real, bare, grounded, sent)
+        joint_trace(folder / "figure_6.png", traces, self.joint, rest=PAST)
         return _told(folder, self, real[moved], found)
 
 

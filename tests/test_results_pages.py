@@ -1,0 +1,72 @@
+"""The commands of docs/results tell what is committed beside them: nothing is run anew, tables are of its trials."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gsl.commandline.composer import compose, opened
+from gsl.config import prepared, resolved
+from gsl.stages.headline import Unit
+from gsl.studies.compare import Compare
+from gsl.studies.comparison import summaries
+from gsl.studies.comparison_table import markdown
+from gsl.studies.ledger import recipes
+from gsl.studies.reproduce import Reproduce
+from gsl.studies.trial import Trial
+
+ROOT = Path(__file__).parents[1]
+PAGES = [*sorted((ROOT / "docs/results").glob("*.md")), ROOT / "docs/environments.md"]
+KNOWN = re.compile(r"known=(docs/results/\S+\.json)")
+
+
+def told() -> list[list[str]]:
+    """Every command of a page that takes known results, as a shell gives it to gsl."""
+    found = []
+    for page in PAGES:
+        for block in re.findall(r"```console\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
+            for line in block.replace("\\\n", " ").splitlines():
+                if line.startswith("$ gsl ") and KNOWN.search(line):
+                    typed = f"printf '%s\\n' {line.removeprefix('$ gsl ')}"
+                    said = subprocess.run(["bash", "-c", typed], capture_output=True, text=True, check=True)
+                    found.append(said.stdout.splitlines())
+    return found
+
+
+def composed(typed: list[str]) -> Any:
+    what, rest = (f"reproduce_{typed[1]}", typed[2:]) if typed[0] == "reproduce" else (typed[0], typed[1:])
+    with opened(None):
+        return prepared(resolved(compose(what.replace("-", "_"), rest)))[0]
+
+
+def test_pages_have_such_commands() -> None:
+    assert len(told()) >= 13
+
+
+@pytest.mark.parametrize("typed", told(), ids=lambda typed: KNOWN.findall(" ".join(typed))[0])
+def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
+    file = ROOT / KNOWN.findall(" ".join(typed))[0]
+    rows, stage = json.loads(file.read_text(encoding="utf-8")), composed(typed)
+    study = stage.study if isinstance(stage, Reproduce) else stage
+    if not isinstance(study, Compare):
+        assert set(recipes(study).values()) <= {row["recipe"] for row in rows}
+        return
+    keys = study.recipes
+    of = {row["recipe"]: [] for row in rows}
+    for row in rows:
+        of[row["recipe"]].append(Trial(**{name: row[name] for name in Trial._fields if name in row}))
+    assert set(keys.values()) <= set(of)
+    trials = sorted((trial for key in keys.values() for trial in of[key]), key=lambda trial: trial.number)
+    table = file.with_name("table.md")
+    if isinstance(stage, Reproduce):
+        text = stage.table.markdown(trials, study.iterate.task)
+    elif table.is_file():
+        text = markdown(summaries(trials), trials, Unit.of(study.iterate.task))
+    else:
+        return
+    assert text.strip() in table.read_text(encoding="utf-8")
