@@ -62,7 +62,8 @@ def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
         of[row["recipe"]].append(Trial(**{name: row[name] for name in Trial._fields if name in row}))
     assert set(keys.values()) <= set(of)
     trials = sorted((trial for key in keys.values() for trial in of[key]), key=lambda trial: trial.number)
-    table = file.with_name("table.md")
+    named = [ROOT / "docs/results" / one.removeprefix("name=") for one in typed if one.startswith("name=")]
+    table = next(filter(Path.is_dir, named), file.parent) / "table.md"
     if isinstance(stage, Reproduce):
         text = stage.table.markdown(trials, study.iterate.task)
     elif table.is_file():
