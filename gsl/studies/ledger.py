@@ -105,20 +105,23 @@ class Ledger:
         Raises:
             ArtifactError: A file of earlier trials was given and holds none of this study's.
         """
-        known, found = sum(key in self._known for key in wanted), {key for key in wanted if self._rows_of(key)}
-        if self._from is not None:
-            if not known:
-                problem = "holds no result of this study: its trials have other settings, seeds or files"
-                raise ArtifactError(self._from, f"{problem}; without it the study runs them all")
-            self._console.status(f"{known} of this study's {len(wanted)} results are in {self._from}")
-        if len(found) > known:
-            self._console.status(f"{len(found) - known} of this study's {len(wanted)} results are in {self._path}")
-        counts = Counter(name for key, name in wanted.items() if key not in found)
-        if counts and seconds is not None:
-            lasting = told(seconds() * counts.total() / len(wanted))
-            which = ", ".join(f"{name} ({count})" for name, count in counts.items())
-            whose = f"{counts.total()} of {len(wanted)} results, {which}" if found else "all of its results"
-            self._console.status(f"{lasting} for {whose}; a study that was stopped goes on where it was")
+        known = wanted.keys() & self._known.keys()
+        if self._from is not None and not known:
+            problem = "holds no result of this study: its trials have other settings, seeds or files"
+            raise ArtifactError(self._from, f"{problem}; without it the study runs them all")
+        here = {key for key in wanted if self._rows_of(key)} - known
+        for place, keys in ((self._from, known), (self._path, here)):
+            if keys:
+                self._console.status(f"{len(keys)} of this study's {len(wanted)} results are in {place}")
+        missing = Counter(name for key, name in wanted.items() if key not in known | here)
+        if missing and seconds is not None:
+            which = ", ".join(f"{name} ({count})" for name, count in missing.items())
+            some = f"{missing.total()} of {len(wanted)} results, {which}"
+            share = missing.total() / len(wanted)
+            whose = some if share < 1.0 else "all of its results"
+            self._console.status(
+                f"{told(seconds() * share)} for {whose}; a study that was stopped goes on where it was"
+            )
 
     def take(self, key: str, **of: Any) -> bool:
         """Make a trial that is known, or was made here by this very version, one of this study; say whether it is.
