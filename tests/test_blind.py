@@ -48,13 +48,17 @@ def programme(robot: str = "blind_arm.arm", seconds: float = 1.6) -> Programme:
     return drawn_programmes(like, 1, PERIOD, np.random.default_rng(0))[0]
 
 
+def keep_a_secret(labels: Path) -> None:
+    """Let a benchmark be the same in every run of the tests."""
+    labels.mkdir(parents=True)
+    (labels / "secret.txt").write_text("the same in every run\n")
+
+
 @pytest.fixture(scope="module")
 def toy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A benchmark of two cases, answered and revealed; nobody may change anything in it for good."""
     folder = tmp_path_factory.mktemp("blind")
-    kept = folder / "runs/toy/blind_make_labels"
-    kept.mkdir(parents=True)
-    (kept / "secret.txt").write_text("the same in every run\n")
+    keep_a_secret(folder / "runs/toy/blind_make_labels")
     done("blind", "make", "cases=2", "mix.foreign=120", *TOY, folder=folder)
     labels = folder / "runs/toy/blind_make_labels"
     shutil.move(labels, folder / "away")  # nothing of it may be needed for an answer

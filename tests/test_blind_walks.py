@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import done
-from test_blind import answer, cause, label
+from test_blind import answer, cause, keep_a_secret, label
 
 from gsl.blind.dials import drawn_on_foot, shown_by_walks
 from gsl.blind.figures import confusion, figures
@@ -35,9 +35,7 @@ KEPT = ("command_latency", "ground_friction", "servo_gain", "gravity_tilt")
 def toy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A benchmark of one walk; nobody may change anything in it for good."""
     folder = tmp_path_factory.mktemp("walks")
-    kept = folder / "runs/toy/blind_make_labels"
-    kept.mkdir(parents=True)
-    (kept / "secret.txt").write_text("the same in every run\n")
+    keep_a_secret(folder / "runs/toy/blind_make_labels")
     done("blind", "make", *TOY, WHOLE, folder=folder)
     return folder
 

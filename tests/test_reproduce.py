@@ -125,7 +125,7 @@ def test_a_trace_is_of_a_joint_that_the_models_know(tmp_path: Path) -> None:
         ("fig6 duration=0.001", "duration = 0.001: is less than a tick, 0.02 s"),
         ("fig7 begin=50 iterate.task.duration=1.2", "begin = 50: π0's real walk is over after "),
         ("budget budgets=[2]", "budgets.0 = 2: must be at least 3"),
-        ("budget iterate.iterations=2", "iterate.iterations = 2: a point of the curve has 1"),
+        ("budget iterate.iterations=2", "iterate.iterations = 2: this study is of the first"),
         ("budget grounding@methods.gat=effects_gat", "methods.gat: learns from real trajectories alone"),
         ("budget grounding@methods.gat=none", "methods.gat: learns from real trajectories alone"),
     ],
@@ -289,7 +289,7 @@ def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
     assert not (tmp_path / "runs/known/nao_worn").exists()
     for more, line in (
         (["+grounding@methods.ane=ane"], "methods.ane: is drawn anew each time; replays are of what is expected"),
-        (["iterate.pretrained=true"], "iterate.pretrained = True: replays are of False"),
+        (["iterate.pretrained=true"], "iterate.pretrained = true: this study begins with π0 as it is"),
         (["iterate.task.duration=0.3"], "none of 12 real trajectories off π0 has the 16 ticks of a replay"),
     ):
         said = gsl("reproduce", "replays", *few, *more, "name=n", folder=tmp_path)

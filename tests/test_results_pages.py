@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import subprocess
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ PAGES = [*sorted((ROOT / "docs/results").glob("*.md")), ROOT / "docs/environment
 KNOWN = re.compile(r"known=(docs/results/\S+\.json)")
 
 
+@cache
 def told() -> list[list[str]]:
     """Every command of a page that takes known results, as a shell gives it to gsl."""
     found = []

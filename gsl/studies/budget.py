@@ -27,7 +27,7 @@ from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import finely
 from gsl.studies.comparison_table import told as bounds
 from gsl.studies.effort import check_search, seconds
-from gsl.studies.held_out import MEASURED, held_out, starts
+from gsl.studies.held_out import MEASURED, check_first, held_out, starts
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipes
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import SIM
@@ -99,9 +99,7 @@ class Budget:
             if not isinstance(grounding, ActionTransformation):
                 raise ConfigError(f"methods.{name}", "learns from real trajectories alone; take gat or sgat")
             check_trainable(self.iterate, f"methods.{name}", grounding)
-        for name, usual in (("iterations", 1), ("pretrained", False)):
-            if (given := getattr(self.iterate, name)) != usual:
-                raise ConfigError(f"iterate.{name}", f"a point of the curve has {usual}", given=str(given))
+        check_first(self.iterate)
         check_search(self.iterate, "iterate")
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)

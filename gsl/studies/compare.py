@@ -87,8 +87,9 @@ class Compare:
         named = {f"simulators.{name}" if name else "iterate.sim": one for name, one in simulators.items()}
         try_out({**named, **{f"worlds.{name}": one for name, one in self.worlds.items()}})
         ledger = Ledger(home / DATA, self.parents(), Trial, console)
-        ledger.announce({key: cell.method for (_, cell), key in self.recipes.items()}, seconds)
-        for (number, cell), key in self.recipes.items():
+        keys = self.recipes
+        ledger.announce({key: cell.method for (_, cell), key in keys.items()}, seconds)
+        for (number, cell), key in keys.items():
             of = {"number": number, "simulator": cell.simulator, "world": cell.world, "method": cell.method}
             if ledger.take(key, **of, iteration=list(range(1, self.iterate.iterations + 1))):
                 continue

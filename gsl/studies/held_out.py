@@ -7,11 +7,12 @@ from typing import Any
 
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
-from gsl.errors import GslError
+from gsl.errors import ConfigError, GslError
 from gsl.stages.chain import Chain
 from gsl.stages.collect import FILE, Collect
 from gsl.stages.grounding_check import REPLAYS
 from gsl.stages.grounding_replay import PAST, TICKS, Place, places
+from gsl.stages.iterate import Iterate
 from gsl.stages.link import built
 from gsl.stages.training import of_policy
 from gsl.storage.trajectories import read
@@ -19,6 +20,18 @@ from gsl.tasks.task import REAL
 
 HELD_OUT = 12  # trajectories of neighbours, on which errors are measured
 MEASURED = f"Joints are measured on {HELD_OUT} real trajectories off π0 more at most, the same for all of a trial."
+
+
+def check_first(iterate: Iterate) -> None:
+    """Refuse what is not the first iteration from π0 as it is, which such a study is of.
+
+    Raises:
+        ConfigError: Under the study's names of settings.
+    """
+    if iterate.iterations != 1:
+        raise ConfigError("iterate.iterations", "this study is of the first", given=str(iterate.iterations))
+    if iterate.pretrained:
+        raise ConfigError("iterate.pretrained", "this study begins with π0 as it is", given="true")
 
 
 def held_out(chain: Chain, place: Path, seed: int, console: Any) -> Batch:

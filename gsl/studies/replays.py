@@ -31,7 +31,7 @@ from gsl.stages.training import degrees, of_policy
 from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import finely
 from gsl.studies.effort import seconds
-from gsl.studies.held_out import MEASURED, held_out, starts
+from gsl.studies.held_out import MEASURED, check_first, held_out, starts
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipe
 from gsl.studies.method_colour import method_colour
 from gsl.studies.sizes import PresetName, sizes_of
@@ -142,9 +142,7 @@ class Replays:
             check_alike(self.iterate.sim.layout, world.layout)
             if world.layout.states:
                 raise ConfigError(f"worlds.{name}", "is no robot; replays begin in a robot's real states")
-        for name, usual in (("iterations", 1), ("pretrained", False)):
-            if (given := getattr(self.iterate, name)) != usual:
-                raise ConfigError(f"iterate.{name}", f"replays are of {usual}", given=str(given))
+        check_first(self.iterate)
 
     def _recipe(self, number: int, world: str, method: str) -> str:
         return recipe(self.iterate, number, world, method, self.worlds[world], self.methods[method])
