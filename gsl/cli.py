@@ -114,7 +114,7 @@ stage("reproduce worlds", "The best groundings in worlds that took no part in th
 stage("reproduce table3", "Three iterations with either of two simulators, beside the paper's table 3.")
 stage("reproduce table4", "Uneven ground, two grounding steps, beside the paper's table 4.")
 stage("reproduce linear-walk", "A linear policy learns to walk, beside the paper's section 6.3.")
-stage("reproduce fig5", "The arms' final distance to their goal, as in the paper's figure 5.")
+stage("reproduce fig5", "The arms' mean distance to their goal, as in the paper's figure 5.")
 stage("reproduce fig6", "A constant command in real, in simulation and grounded, as in the paper's figure 6.")
 stage("reproduce fig7", "An ankle of the linear walk, as in the paper's figure 7.")
 stage("reproduce fig11", "Cliff Walking against the noise of the real world, as in the paper's figure 11.")

@@ -273,7 +273,7 @@ def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
     assert "about 1 minute for all of its results" in said.err
     folder = tmp_path / "runs/replays/reproduce"
     rows = {one["method"]: one for one in json.loads((folder / "replays.json").read_text())}
-    assert set(rows) == {"none", "gat", "identified"} and not list(tmp_path.rglob("optimize"))
+    assert set(rows) == {"none", "gat", "gat_x_auto", "identified"} and not list(tmp_path.rglob("optimize"))
     assert rows["identified"]["joints"] < rows["none"]["joints"] != rows["gat"]["joints"]
     assert rows["none"]["unreached"] is None and 0.0 <= rows["gat"]["unreached"] < 1.0
     table = (folder / "table.md").read_text()

@@ -15,13 +15,14 @@ from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.stages.chain import Chain, round_seed
 from gsl.stages.diagnosis_plan import flown
-from gsl.stages.headline import Unit
+from gsl.stages.headline import Unit, several
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
 from gsl.studies.comparison import summaries
 from gsl.studies.comparison_table import markdown
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipe
+from gsl.studies.sizes import PresetName, sizes_of
 from gsl.studies.trial import Cell, Trial
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import try_out
@@ -55,6 +56,7 @@ class Compare:
     ] = None
     rank: Annotated[bool, setting("set a fixed set of policies in simulation against real")] = False
     known: Known = None
+    preset_name: PresetName = ""
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -65,7 +67,8 @@ class Compare:
         found, made = self.carried_out(folder, console)
         summary = summaries(found)
         text = markdown(summary, found, Unit.of(self.iterate.task))
-        (folder / TABLE).write_text(f"{text}\n{made}\n", encoding="utf-8")
+        sizes = f"{sizes_of(self.preset_name)} {several(self.trials, 'trial')}."
+        (folder / TABLE).write_text(f"{text}\n{sizes} {made}\n", encoding="utf-8")
         return {"trials": self.trials, "summaries": [one._asdict() for one in summary]}
 
     def carried_out(

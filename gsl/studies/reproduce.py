@@ -16,7 +16,7 @@ from gsl.studies.effort import check_search, seconds
 from gsl.studies.ledger import GOES_ON, known_parent
 from gsl.studies.method_colour import method_colour
 from gsl.studies.paper_cells import Drawn, one_by_one
-from gsl.studies.sizes import PresetName, sizes_of
+from gsl.studies.sizes import sizes_of
 from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
 
@@ -43,7 +43,6 @@ class Reproduce:
 
     study: Annotated[Compare, setting("what is run")]
     table: Annotated[PaperTable, setting("how it is told")]
-    preset_name: PresetName = ""
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -58,7 +57,7 @@ class Reproduce:
         check_search(self.study.iterate, "study.iterate")
         trials, made = self.study.carried_out(folder, console, lambda: seconds(self.study))
         task = self.study.iterate.task
-        parts = [self.table.markdown(trials, task), f"{sizes_of(self.preset_name)} {_sizes(self.study)}\n", made]
+        parts = [self.table.markdown(trials, task), f"{sizes_of(self.study.preset_name)} {_sizes(self.study)}\n", made]
         (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
         (folder / TRIALS).write_text(one_by_one(trials, task), encoding="utf-8")
         _draw(folder / FIGURE, trials, self.study, self.table.drawn(trials, task))
