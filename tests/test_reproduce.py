@@ -11,18 +11,16 @@ from unittest.mock import Mock
 import pytest
 from commands import done, gsl
 
-from gsl.commandline.composer import compose, opened
-from gsl.config import prepared, resolved
 from gsl.errors import ArtifactError
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
 from gsl.studies.effort import told
-from gsl.studies.ledger import Ledger, recipe, recipes
+from gsl.studies.ledger import Ledger, recipe
 from gsl.studies.paper_cells import one_by_one
 from gsl.studies.paper_table_2 import Table2
 from gsl.studies.paper_tables import Figure5, LinearWalkTable, Table3, Table4
-from gsl.studies.trial import Cell, Trial
+from gsl.studies.trial import Trial
 from gsl.tasks.arm import Arm
 from gsl.tasks.distance import Distance
 from gsl.tasks.walk import Walk
@@ -53,19 +51,19 @@ OFFERED = {
     "fig5": ("none", "ane_02", "gat", "gat_005", "sgat"),
     "worlds": ("none", "ane_02", "gat_residual_01", "effects"),
 }
-FEW = ("preset=toy", "study.iterate.workers=1", "study.iterate.optimizer.candidates=4")
+FEW = ("preset=toy", "iterate.workers=1", "iterate.optimizer.candidates=4")
 
 
 @pytest.mark.parametrize("what", KEPT)
 def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
-    left_out = [f"~study.methods.{name}" for name in OFFERED[what] if name not in KEPT[what]]
-    left_out += ["~study.worlds.nao_weak"] if what == "table2" else []
-    left_out += ["~study.worlds.nao_harsh", "~study.worlds.nao_drawn_b"] if what == "worlds" else []
-    left_out += ["study.iterate.iterations=2"] if what == "table3" else []
-    short = ["study.iterate.budget.episodes=2", "study.iterate.optimizer.generations=1"]
+    left_out = [f"~methods.{name}" for name in OFFERED[what] if name not in KEPT[what]]
+    left_out += ["~worlds.nao_weak"] if what == "table2" else []
+    left_out += ["~worlds.nao_harsh", "~worlds.nao_drawn_b"] if what == "worlds" else []
+    left_out += ["iterate.iterations=2"] if what == "table3" else []
+    short = ["iterate.budget.episodes=2", "iterate.optimizer.generations=1"]
     left_out += short if what in ("table4", "linear-walk", "worlds") else []
-    left_out += ["study.iterate.aggregate=true"] if what == "table4" else []
-    said = done("reproduce", what, *FEW, "study.iterate.task.duration=1.2", *left_out, folder=tmp_path)
+    left_out += ["iterate.aggregate=true"] if what == "table4" else []
+    said = done("reproduce", what, *FEW, "iterate.task.duration=1.2", *left_out, folder=tmp_path)
     assert " for all of its results; a study that was stopped goes on where it was" in said.err
     folder = next((tmp_path / "runs").glob("*/reproduce"))
     trials = json.loads((folder / "trials.json").read_text())
@@ -88,8 +86,8 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
 
 
 def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) -> None:
-    left_out = ("~study.methods.ane_02", "~study.methods.gat_005", "~study.methods.sgat")
-    few = (*FEW, *left_out, "study.iterate.task.duration=1.2", "study.iterate.optimizer.generations=1")
+    left_out = ("~methods.ane_02", "~methods.gat_005", "~methods.sgat")
+    few = (*FEW, *left_out, "iterate.task.duration=1.2", "iterate.optimizer.generations=1")
     done("reproduce", "fig5", *few, folder=tmp_path)
     first = tmp_path / "runs/fig5/trials.json"
     rows = json.loads(first.read_text())
@@ -98,7 +96,7 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     del rows[0]["last_falls"]  # which files have not had from the beginning
     elsewhere = tmp_path / "elsewhere.json"
     elsewhere.write_text(json.dumps([*rows, {**rows[0], "recipe": "of another study"}]))
-    said = done("reproduce", "fig5", *few, "study.trials=2", "study.known=elsewhere.json", "name=on", folder=tmp_path)
+    said = done("reproduce", "fig5", *few, "trials=2", "known=elsewhere.json", "name=on", folder=tmp_path)
     assert "1 of 3 known trials are of other settings" in said.err
     again = json.loads((tmp_path / "runs/on/reproduce/trials.json").read_text())
     assert again[:2] == rows and [one["number"] for one in again] == [1, 1, 2, 2]
@@ -110,7 +108,7 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
 
 def test_a_file_that_holds_no_trials_is_refused(tmp_path: Path) -> None:
     (tmp_path / "figures.json").write_text('[{"value": 1}]')
-    said = gsl("reproduce", "fig5", *FEW, "study.known=figures.json", folder=tmp_path)
+    said = gsl("reproduce", "fig5", *FEW, "known=figures.json", folder=tmp_path)
     assert said.code == 2 and "figures.json: row 1 is no result of such a study: " in said.lines[-1]
 
 
@@ -237,24 +235,6 @@ def test_a_recipe_is_of_what_a_trial_comes_from(tmp_path: Path) -> None:
     assert recipe(world, gat, 1) != first
 
 
-def test_the_committed_trials_are_still_known() -> None:
-    """A setting that comes later, at what changes nothing, makes no trial another one."""
-    with opened(None):
-        stage, *_ = prepared(resolved(compose("reproduce_linear_walk", ["preset=study"])))
-    study, rows = stage.study, json.loads((RESULTS / "linear_walk/trials.json").read_text())
-    cell = Cell("", "nao_worn", "none", 1)
-    key = recipe(study.iterate, 1, cell, study.iterate.sim, study.worlds["nao_worn"], study.methods["none"], study.rank)
-    assert key in {row["recipe"] for row in rows if (row["number"], row["method"]) == (1, "none")}
-
-
-@pytest.mark.parametrize("what", ["fig12", "fig13"])
-def test_the_committed_points_are_still_known(what: str) -> None:
-    with opened(None):
-        study, *_ = prepared(resolved(compose(f"reproduce_{what}", ["preset=study"])))
-    rows = json.loads((RESULTS / what / "points.json").read_text())
-    assert {row["trial"]: row["recipe"] for row in rows} == recipes(study)
-
-
 @pytest.mark.parametrize(
     ("what", "figures"), [("fig6", ["figure_6.png"]), ("fig7", ["figure_7a.png", "figure_7b.png"])]
 )
@@ -315,13 +295,11 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     assert "grounded simulator against" not in said.out and "real trajectories collected" in said.out
 
 
-@pytest.mark.parametrize(
-    ("study", "of", "names"), [("budget", "", ("gat", "sgat")), ("fig5", "study.", OFFERED["fig5"])]
-)
-def test_a_study_of_nothing_is_refused(study: str, of: str, names: tuple[str, ...], tmp_path: Path) -> None:
-    refused = gsl("reproduce", study, "preset=toy", *(f"~{of}methods.{name}" for name in names), folder=tmp_path)
-    assert refused.lines == [f"gsl reproduce {study}: {of}methods = {{}}: needs 1 at least"]
-    misspelt = gsl("reproduce", study, "preset=toy", f"~{of}methods.gatt", folder=tmp_path)
+@pytest.mark.parametrize(("study", "names"), [("budget", ("gat", "sgat")), ("fig5", OFFERED["fig5"])])
+def test_a_study_of_nothing_is_refused(study: str, names: tuple[str, ...], tmp_path: Path) -> None:
+    refused = gsl("reproduce", study, "preset=toy", *(f"~methods.{name}" for name in names), folder=tmp_path)
+    assert refused.lines == [f"gsl reproduce {study}: methods = {{}}: needs 1 at least"]
+    misspelt = gsl("reproduce", study, "preset=toy", "~methods.gatt", folder=tmp_path)
     assert "did you mean" in misspelt.lines[0] and misspelt.code == 2
 
 

@@ -18,6 +18,7 @@ from gsl.studies.compare import Compare
 from gsl.studies.comparison import summaries
 from gsl.studies.comparison_table import markdown
 from gsl.studies.ledger import recipes
+from gsl.studies.paper_cells import one_by_one
 from gsl.studies.reproduce import Reproduce
 from gsl.studies.trial import Trial
 
@@ -53,8 +54,7 @@ def test_pages_have_such_commands() -> None:
 @pytest.mark.parametrize("typed", told(), ids=lambda typed: KNOWN.findall(" ".join(typed))[0])
 def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
     file = ROOT / KNOWN.findall(" ".join(typed))[0]
-    rows, stage = json.loads(file.read_text(encoding="utf-8")), composed(typed)
-    study = stage.study if isinstance(stage, Reproduce) else stage
+    rows, study = json.loads(file.read_text(encoding="utf-8")), composed(typed)
     if not isinstance(study, Compare):
         assert set(recipes(study).values()) <= {row["recipe"] for row in rows}
         return
@@ -65,11 +65,13 @@ def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
     assert set(keys.values()) <= set(of)
     trials = sorted((trial for key in keys.values() for trial in of[key]), key=lambda trial: trial.number)
     named = [ROOT / "docs/results" / one.removeprefix("name=") for one in typed if one.startswith("name=")]
-    table = next(filter(Path.is_dir, named), file.parent) / "table.md"
-    if isinstance(stage, Reproduce):
-        text = stage.table.markdown(trials, study.iterate.task)
+    folder, task = next(filter(Path.is_dir, named), file.parent), study.iterate.task
+    table = folder / "table.md"
+    if isinstance(study, Reproduce):
+        assert (folder / "trials.md").read_text(encoding="utf-8") == one_by_one(trials, task)
+        text = study.table.markdown(trials, task)
     elif table.is_file():
-        text = markdown(summaries(trials), trials, Unit.of(study.iterate.task))
+        text = markdown(summaries(trials), trials, Unit.of(task))
     else:
         return
     assert text.strip() in table.read_text(encoding="utf-8")

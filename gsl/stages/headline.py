@@ -58,7 +58,7 @@ class Unit(NamedTuple):
 def unit_of(artifact: Artifact) -> Unit:
     """Return the unit of the task that an artifact's settings name; the bare value if the task is not gsl's."""
     config = artifact.config
-    task = config.get("task") or (config.get("study") or config).get("iterate", {}).get("task") or {}
+    task = config.get("task") or config.get("iterate", {}).get("task") or {}
     name = task.get("_target_", "") if isinstance(task, Mapping) else ""
     if not str(name).startswith("gsl.tasks."):
         return Unit()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 
@@ -10,10 +11,9 @@ from gsl.core.setting import component, setting
 from gsl.optimizers.cma_es import CmaEs
 from gsl.report.trial_dots import Dots, trial_dots
 from gsl.stages.headline import several
-from gsl.studies.compare import DATA, TABLE, Compare
+from gsl.studies.compare import TABLE, Compare
 from gsl.studies.comparison import summaries
 from gsl.studies.effort import check_search, seconds
-from gsl.studies.ledger import GOES_ON, known_parent
 from gsl.studies.method_colour import method_colour
 from gsl.studies.paper_cells import Drawn, one_by_one
 from gsl.studies.sizes import sizes_of
@@ -35,33 +35,27 @@ class PaperTable(Protocol):
 
 
 @component
-class Reproduce:
-    """What is built is not built again: a stopped study goes on."""
+class Reproduce(Compare):
+    """A comparison whose trials are told as the paper's are."""
 
     kind: ClassVar[str] = "reproduce"
-    forced: ClassVar[str] = GOES_ON
 
-    study: Annotated[Compare, setting("what is run")]
-    table: Annotated[PaperTable, setting("how it is told")]
-
-    def parents(self) -> Mapping[str, Path]:
-        """Everything is made here, but for what is known."""
-        return known_parent("study.known", self.study.known, DATA)
+    table: Annotated[PaperTable, setting("how the trials are told")] = field(kw_only=True)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
-        """Run the study, say beforehand how long that takes, and write every trial's figures and the table.
+        """Say beforehand how long it takes, run all trials, write every trial's figures, the table and the picture.
 
         Raises:
             ConfigError: Its optimizer is no search.
         """
-        check_search(self.study.iterate, "study.iterate")
-        trials, made = self.study.carried_out(folder, console, lambda: seconds(self.study))
-        task = self.study.iterate.task
-        parts = [self.table.markdown(trials, task), f"{sizes_of(self.study.preset_name)} {_sizes(self.study)}\n", made]
+        check_search(self.iterate, "iterate")
+        trials, made = self.carried_out(folder, console, lambda: seconds(self))
+        task = self.iterate.task
+        parts = [self.table.markdown(trials, task), f"{sizes_of(self.preset_name)} {_sizes(self)}\n", made]
         (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
         (folder / TRIALS).write_text(one_by_one(trials, task), encoding="utf-8")
-        _draw(folder / FIGURE, trials, self.study, self.table.drawn(trials, task))
-        return {"trials": self.study.trials, "summaries": [one._asdict() for one in summaries(trials)]}
+        _draw(folder / FIGURE, trials, self, self.table.drawn(trials, task))
+        return {"trials": self.trials, "summaries": [one._asdict() for one in summaries(trials)]}
 
 
 def _sizes(study: Compare) -> str:
