@@ -15,7 +15,7 @@ from gsl.errors import ArtifactError
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
-from gsl.studies.effort import told
+from gsl.studies.duration import told
 from gsl.studies.ledger import Ledger, recipe
 from gsl.studies.paper_cells import one_by_one
 from gsl.studies.paper_table_2 import Table2

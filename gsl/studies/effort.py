@@ -9,7 +9,6 @@ from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
-from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate
 from gsl.stages.population import threads
 from gsl.stages.rollout import Scenario, rollout
@@ -78,12 +77,6 @@ def seconds_of_models(iterate: Iterate) -> float:
     real, sim = _rollout(iterate, iterate.real, REAL), _rollout(iterate, iterate.sim, SIM)
     rolled = sum(iterate.budget.real) * real + sum(iterate.budget.sim) * sim
     return rolled / threads(iterate.workers) + APART
-
-
-def told(duration: float) -> str:
-    """Return a duration for people."""
-    minutes = max(1, round(duration / 60.0))
-    return f"about {several(minutes, 'minute')}" if minutes < 90 else f"about {minutes / 60.0:.1f} hours"
 
 
 def _rollout(iterate: Iterate, world: World, role: str) -> float:

@@ -19,7 +19,7 @@ from gsl.storage.identity import WITHOUT_EFFECT
 from gsl.storage.read_files import read_files
 from gsl.storage.references import resolve
 from gsl.storage.versions import commit
-from gsl.studies.effort import told
+from gsl.studies.duration import told
 from gsl.studies.ledger_file import MADE_BY, RECIPE, Figures, read
 
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's

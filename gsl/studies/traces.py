@@ -27,7 +27,8 @@ from gsl.stages.needed_model import extra_ticks
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.training import degrees
 from gsl.storage.models import read_forward_model, read_inverse_model
-from gsl.studies.effort import seconds_of_models, told
+from gsl.studies.duration import told
+from gsl.studies.effort import seconds_of_models
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import REAL
 from gsl.worlds.grounded import GroundedEnv
