@@ -94,9 +94,10 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     assert [one["number"] for one in rows] == [1, 1]
     rows[0]["made_by"] = "a1b2c3d"
     del rows[0]["last_falls"]  # which files have not had from the beginning
-    elsewhere = tmp_path / "elsewhere.json"
-    elsewhere.write_text(json.dumps([*rows, {**rows[0], "recipe": "of another study"}]))
-    said = done("reproduce", "fig5", *few, "trials=2", "known=elsewhere.json", "name=on", folder=tmp_path)
+    (tmp_path / "more.json").write_text(json.dumps(rows[1:]))
+    (tmp_path / "elsewhere.json").write_text(json.dumps([rows[0], {**rows[0], "recipe": "of another study"}]))
+    given = "known=[elsewhere.json,more.json]"
+    said = done("reproduce", "fig5", *few, "trials=2", given, "name=on", folder=tmp_path)
     assert "1 of 3 known trials are of other settings" in said.err
     again = json.loads((tmp_path / "runs/on/reproduce/trials.json").read_text())
     assert again[:2] == rows and [one["number"] for one in again] == [1, 1, 2, 2]
@@ -216,6 +217,16 @@ def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
         ),
         f"1 of this study's 1 results are in {given}",
     ]
+    other = tmp_path / "other.json"
+    other.write_text(json.dumps([{"number": 9, "value": 9.0, "recipe": one, "made_by": "c"} for one in "ab"]))
+    both = Ledger(tmp_path / "both.json", {"known": given, "known_2": other}, Figure, console)
+    both.announce(wanted)
+    assert said[-2:] == [known, f"2 of this study's 4 results are in {other}"]
+    assert both.take("a", number=1) and both.take("b", number=9)
+    with pytest.raises(ArtifactError, match=r"other\.json: a trial whose settings .* say number 2 says 9; leave"):
+        both.take("b", number=2)
+    with pytest.raises(ArtifactError, match=r"given\.json: holds no result of this study: its trials have other set"):
+        Ledger(path, {"known": other, "known_2": given}, Figure, console).announce({"b": "gat"})
     with pytest.raises(ArtifactError, match="holds no result of this study: its trials have other settings, seeds"):
         Ledger(path, {"known": given}, Figure, console).announce({"b": "gat"})
 

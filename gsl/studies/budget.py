@@ -28,7 +28,7 @@ from gsl.studies.comparison_table import finely
 from gsl.studies.comparison_table import told as bounds
 from gsl.studies.effort import check_search, seconds
 from gsl.studies.held_out import MEASURED, check_first, held_out, starts
-from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipes
+from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipes
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import SIM
 
@@ -87,7 +87,7 @@ class Budget:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parent("known", self.known, DATA)
+        return known_parents(self.known, DATA)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials, write the points, the table and the figure.

@@ -21,7 +21,7 @@ from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
 from gsl.studies.comparison import summaries
 from gsl.studies.comparison_table import markdown
-from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipe
+from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.studies.trial import Cell, Trial
 from gsl.tasks.task import REAL, SIM
@@ -60,7 +60,7 @@ class Compare:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parent("known", self.known, DATA)
+        return known_parents(self.known, DATA)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials; write every trial's figures and the tables."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -32,7 +32,10 @@ LATER = {"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "s
 GOES_ON = "goes on from the results that are there"  # what force=true does to a study
 LABELS = ("preset_name",)  # that tables tell, and no result depends on
 
-Known = Annotated[str | None, setting("figures of trials that the same study has made before, not to be run again")]
+Known = Annotated[
+    str | tuple[str, ...] | None,
+    setting("trials that the same study has made before, not to be run again: a file or run, or a [list] of them"),
+]
 
 
 def recipe(*parts: Any) -> str:
@@ -51,30 +54,33 @@ def recipes(study: Any) -> dict[int, str]:
     return {number: recipe(one, number) for number in range(1, study.trials + 1)}
 
 
-def known_parent(role: str, known: str | None, name: str) -> dict[str, Path]:
-    """Return the file of earlier trials, or that of a run, as a parent of the study.
+def known_parents(known: str | tuple[str, ...] | None, name: str) -> dict[str, Path]:
+    """Return the files of earlier trials, or those of runs, as parents of the study.
 
     Args:
-        role: Of the parent.
         known: As the user gave it.
         name: Of such a file in a study's artifact.
 
     Raises:
         ArtifactError: There is none.
     """
-    if known is None:
-        return {}
+    given = (known,) if isinstance(known, str) else known or ()
+    return {f"known_{number}" if number > 1 else "known": _file(one, name) for number, one in enumerate(given, start=1)}
+
+
+def _file(known: str, name: str) -> Path:
     place = resolve(known) if Path(known).suffix else resolve(known, kind=("reproduce", "compare"))
-    return {role: place if place.is_file() else place / name}
+    return place if place.is_file() else place / name
 
 
 class Ledger:
     """The trials so far: figures by name, one or several rows a trial, each with the trial's recipe and who made it.
 
-    The file only grows: trials of an earlier start stay until they are made anew.
+    The file only grows: trials of an earlier start stay until they are made anew. A trial that several files of earlier
+    ones have is taken from the first.
 
     Raises:
-        ArtifactError: The file of earlier trials holds something else, a trial twice, figures that cannot be, or is the
+        ArtifactError: A file of earlier trials holds something else, a trial twice, figures that cannot be, or is the
             one to be written.
     """
 
@@ -83,11 +89,13 @@ class Ledger:
         self._done: dict[str, list[dict[str, Any]]] = {}
         self._kept = read(path, kind) if path.is_file() else {}
         self._known: dict[str, list[dict[str, Any]]] = {}
+        self._from: dict[Path, Set[str]] = {}
         for file in known.values():
             if path.exists() and file.samefile(path):
                 raise ArtifactError(file, "is what this study writes; copy it, or give the study another name=")
-            self._known = read(file, kind)
-        self._from = next(iter(known.values()), None)
+            found = read(file, kind)
+            self._from[file] = found.keys()
+            self._known = {**found, **self._known}
         self._me = _made_by()
 
     @property
@@ -103,14 +111,15 @@ class Ledger:
             seconds: Returns about how long all of them would take [s]; none if nobody knows.
 
         Raises:
-            ArtifactError: A file of earlier trials was given and holds none of this study's.
+            ArtifactError: A file of earlier trials that was given holds none of this study's.
         """
         known = wanted.keys() & self._known.keys()
-        if self._from is not None and not known:
-            problem = "holds no result of this study: its trials have other settings, seeds or files"
-            raise ArtifactError(self._from, f"{problem}; without it the study runs them all")
         here = {key for key in wanted if self._rows_of(key)} - known
-        for place, keys in ((self._from, known), (self._path, here)):
+        places = {file: wanted.keys() & keys for file, keys in self._from.items()}
+        if none := [file for file, keys in places.items() if not keys]:
+            problem = "holds no result of this study: its trials have other settings, seeds or files"
+            raise ArtifactError(none[0], f"{problem}; without it the study runs them all")
+        for place, keys in {**places, self._path: here}.items():
             if keys:
                 self._console.status(f"{len(keys)} of this study's {len(wanted)} results are in {place}")
         missing = Counter(name for key, name in wanted.items() if key not in known | here)
@@ -140,7 +149,8 @@ class Ledger:
             right = value if isinstance(value, list) else [value] * len(rows)
             if (told := [row[name] for row in rows]) != right:
                 problem = f"a trial whose settings (recipe {key}) say {name} {_told(right)} says {_told(told)}"
-                raise ArtifactError(self._from or self._path, f"{problem}; leave it out")
+                place = next((file for file, keys in self._from.items() if key in keys), self._path)
+                raise ArtifactError(place, f"{problem}; leave it out")
         self._write(key, rows)
         return True
 

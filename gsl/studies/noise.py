@@ -30,7 +30,7 @@ from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
-from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipes
+from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipes
 from gsl.studies.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import REAL, SIM
@@ -79,7 +79,7 @@ class NoiseStudy:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parent("known", self.known, DATA)
+        return known_parents(self.known, DATA)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Run all trials; write the points, the table and the figure."""

@@ -32,7 +32,7 @@ from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import finely
 from gsl.studies.effort import seconds
 from gsl.studies.held_out import MEASURED, check_first, held_out, starts
-from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parent, recipe
+from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.method_colour import method_colour
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import REAL, SIM
@@ -110,7 +110,7 @@ class Replays:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parent("known", self.known, DATA)
+        return known_parents(self.known, DATA)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Build every grounding as a search would have it, replay, and write the figures, the table and the picture.
