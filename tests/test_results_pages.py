@@ -24,7 +24,7 @@ from gsl.studies.trial import Trial
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted((ROOT / "docs/results").glob("*.md")), ROOT / "docs/environments.md"]
-KNOWN = re.compile(r"known=(docs/results/\S+\.json)")
+KNOWN = re.compile(r"known=\[?(docs/results/[^\s,\]]+\.json)")
 
 
 @cache
@@ -56,13 +56,15 @@ def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
     file = ROOT / KNOWN.findall(" ".join(typed))[0]
     rows, study = json.loads(file.read_text(encoding="utf-8")), composed(typed)
     if not isinstance(study, Compare):
-        assert set(recipes(study).values()) <= {row["recipe"] for row in rows}
+        assert recipes(study).items() <= {row["trial"]: row["recipe"] for row in rows}.items()
         return
     keys = study.recipes
     of = {row["recipe"]: [] for row in rows}
     for row in rows:
         of[row["recipe"]].append(Trial(**{name: row[name] for name in Trial._fields if name in row}))
-    assert set(keys.values()) <= set(of)
+    for (number, cell), key in keys.items():
+        told_of = {(one.number, one.simulator, one.world, one.method) for one in of[key]}
+        assert told_of == {(number, cell.simulator, cell.world, cell.method)}
     trials = sorted((trial for key in keys.values() for trial in of[key]), key=lambda trial: trial.number)
     named = [ROOT / "docs/results" / one.removeprefix("name=") for one in typed if one.startswith("name=")]
     folder, task = next(filter(Path.is_dir, named), file.parent), study.iterate.task

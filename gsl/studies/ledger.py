@@ -64,8 +64,9 @@ def known_parents(known: str | tuple[str, ...] | None, name: str) -> dict[str, P
     Raises:
         ArtifactError: There is none.
     """
-    given = (known,) if isinstance(known, str) else known or ()
-    return {f"known_{number}" if number > 1 else "known": _file(one, name) for number, one in enumerate(given, start=1)}
+    if isinstance(known, str):
+        return {"known": _file(known, name)}
+    return {f"known.{index}": _file(one, name) for index, one in enumerate(known or ())}
 
 
 def _file(known: str, name: str) -> Path:
@@ -76,12 +77,11 @@ def _file(known: str, name: str) -> Path:
 class Ledger:
     """The trials so far: figures by name, one or several rows a trial, each with the trial's recipe and who made it.
 
-    The file only grows: trials of an earlier start stay until they are made anew. A trial that several files of earlier
-    ones have is taken from the first.
+    The file only grows: trials of an earlier start stay until they are made anew.
 
     Raises:
-        ArtifactError: A file of earlier trials holds something else, a trial twice, figures that cannot be, or is the
-            one to be written.
+        ArtifactError: A file of earlier trials holds something else, a trial twice, figures that cannot be or that
+            another one tells otherwise, or is the one to be written.
     """
 
     def __init__(self, path: Path, known: Mapping[str, Path], kind: type[Figures], console: Any) -> None:
@@ -94,14 +94,19 @@ class Ledger:
             if path.exists() and file.samefile(path):
                 raise ArtifactError(file, "is what this study writes; copy it, or give the study another name=")
             found = read(file, kind)
-            self._from[file] = found.keys()
+            for key in found.keys() & self._known.keys():
+                if _figures(found[key]) != _figures(self._known[key]):
+                    raise ArtifactError(
+                        file, f"tells a trial (recipe {key}) otherwise than {self._whose(key)}; leave one out"
+                    )
+            self._from[file] = found.keys() - self._known.keys()
             self._known = {**found, **self._known}
         self._me = _made_by()
 
     @property
     def figures(self) -> list[dict[str, Any]]:
         """The rows of all trials so far, by trial, without recipe and maker."""
-        return [{name: value for name, value in row.items() if name not in (RECIPE, MADE_BY)} for row in self._rows()]
+        return _figures(self._rows())
 
     def announce(self, wanted: Mapping[str, str], seconds: Callable[[], float] | None = None) -> None:
         """Say how many of a study's results are there, and how long the others will take.
@@ -115,12 +120,11 @@ class Ledger:
         """
         known = wanted.keys() & self._known.keys()
         here = {key for key in wanted if self._rows_of(key)} - known
-        places = {file: wanted.keys() & keys for file, keys in self._from.items()}
-        if none := [file for file, keys in places.items() if not keys]:
+        if self._from and not known:
             problem = "holds no result of this study: its trials have other settings, seeds or files"
-            raise ArtifactError(none[0], f"{problem}; without it the study runs them all")
-        for place, keys in {**places, self._path: here}.items():
-            if keys:
+            raise ArtifactError(next(iter(self._from)), f"{problem}; without it the study runs them all")
+        for place, keys in {**self._from, self._path: here}.items():
+            if keys := wanted.keys() & keys:
                 self._console.status(f"{len(keys)} of this study's {len(wanted)} results are in {place}")
         missing = Counter(name for key, name in wanted.items() if key not in known | here)
         if missing and seconds is not None:
@@ -149,8 +153,7 @@ class Ledger:
             right = value if isinstance(value, list) else [value] * len(rows)
             if (told := [row[name] for row in rows]) != right:
                 problem = f"a trial whose settings (recipe {key}) say {name} {_told(right)} says {_told(told)}"
-                place = next((file for file, keys in self._from.items() if key in keys), self._path)
-                raise ArtifactError(place, f"{problem}; leave it out")
+                raise ArtifactError(self._whose(key), f"{problem}; leave it out")
         self._write(key, rows)
         return True
 
@@ -168,6 +171,10 @@ class Ledger:
             self._console.status(f"these trials were made by {len(made)} versions of gsl; the table says which")
         return f"Made: {'; '.join(f'{trials} by {name}' for name, trials in made.items())}."
 
+    def _whose(self, key: str) -> Path:
+        """Return the file that a trial stands in."""
+        return next((file for file, keys in self._from.items() if key in keys), self._path)
+
     def _rows_of(self, key: str) -> list[dict[str, Any]]:
         """Return the rows of a trial that is known, or that this version of gsl has made here."""
         return self._known.get(key) or [row for row in self._kept.get(key, []) if row[MADE_BY] == self._me]
@@ -179,6 +186,10 @@ class Ledger:
         self._done[key] = list(rows)
         others = {other: made for other, made in {**self._known, **self._kept}.items() if other not in self._done}
         write_json(self._path, [*self._rows(), *(row for made in others.values() for row in made)])
+
+
+def _figures(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    return [{name: value for name, value in row.items() if name not in (RECIPE, MADE_BY)} for row in rows]
 
 
 def _effective(told: Any) -> Any:
