@@ -19,6 +19,7 @@ from gsl.studies.comparison import summaries
 from gsl.studies.comparison_table import markdown
 from gsl.studies.ledger import recipes
 from gsl.studies.paper_cells import one_by_one
+from gsl.studies.replays import Replays
 from gsl.studies.reproduce import Reproduce
 from gsl.studies.trial import Trial
 
@@ -55,6 +56,9 @@ def test_pages_have_such_commands() -> None:
 def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
     file = ROOT / KNOWN.findall(" ".join(typed))[0]
     rows, study = json.loads(file.read_text(encoding="utf-8")), composed(typed)
+    if isinstance(study, Replays):
+        assert study.recipes == {(row["trial"], row["world"], row["method"]): row["recipe"] for row in rows}
+        return
     if not isinstance(study, Compare):
         assert recipes(study).items() <= {row["trial"]: row["recipe"] for row in rows}.items()
         return

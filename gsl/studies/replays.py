@@ -122,8 +122,7 @@ class Replays:
         study = Compare(self.iterate, self.worlds, self.methods, self.trials)
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Replay, console)
-        cells = list(product(range(1, self.trials + 1), self.worlds, self.methods))
-        keys = {cell: self._recipe(*cell) for cell in cells}
+        keys = self.recipes
         ledger.announce({key: cell[2] for cell, key in keys.items()}, lambda: seconds(study, search=False))
         for (number, world, method), key in keys.items():
             if not ledger.take(key, trial=number, world=world, method=method):
@@ -144,8 +143,13 @@ class Replays:
                 raise ConfigError(f"worlds.{name}", "is no robot; replays begin in a robot's real states")
         check_first(self.iterate)
 
-    def _recipe(self, number: int, world: str, method: str) -> str:
-        return recipe(self.iterate, number, world, method, self.worlds[world], self.methods[method])
+    @property
+    def recipes(self) -> dict[tuple[int, str, str], str]:
+        """By trial, world and method, in the order in which they are run."""
+        return {
+            (k, world, method): recipe(self.iterate, k, world, method, self.worlds[world], self.methods[method])
+            for k, world, method in product(range(1, self.trials + 1), self.worlds, self.methods)
+        }
 
     def _replay(self, home: Path, number: int, world: str, method: str, console: Any) -> Replay:
         seed, name, below = self.iterate.seed + number - 1, f"trial_{number:02d}", home / world
