@@ -223,7 +223,7 @@ def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
         {"number": 9, "value": 9.0, "recipe": "b", "made_by": "c"},
     ]
     other.write_text(json.dumps(rows))
-    both = Ledger(tmp_path / "both.json", {"known.0": given, "known.1": other}, Figure, console)
+    both = Ledger(tmp_path / "both.json", {"known.0": given, "known.1": other, "known.2": given}, Figure, console)
     both.announce(wanted)
     assert said[-2:] == [known, known.replace("given", "other")]
     assert both.take("a", number=1) and both.take("b", number=9)

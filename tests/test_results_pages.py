@@ -70,11 +70,9 @@ def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
         told_of = {(one.number, one.simulator, one.world, one.method) for one in of[key]}
         assert told_of == {(number, cell.simulator, cell.world, cell.method)}
     trials = sorted((trial for key in keys.values() for trial in of[key]), key=lambda trial: trial.number)
-    named = [ROOT / "docs/results" / one.removeprefix("name=") for one in typed if one.startswith("name=")]
-    folder, task = next(filter(Path.is_dir, named), file.parent), study.iterate.task
-    table = folder / "table.md"
+    table, task = file.with_name("table.md"), study.iterate.task
     if isinstance(study, Reproduce):
-        assert (folder / "trials.md").read_text(encoding="utf-8") == one_by_one(trials, task)
+        assert file.with_name("trials.md").read_text(encoding="utf-8") == one_by_one(trials, task)
         text = study.table.markdown(trials, task)
     elif table.is_file():
         text = markdown(summaries(trials), trials, Unit.of(task))

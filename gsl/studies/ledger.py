@@ -90,15 +90,14 @@ class Ledger:
         self._kept = read(path, kind) if path.is_file() else {}
         self._known: dict[str, list[dict[str, Any]]] = {}
         self._from: dict[Path, Set[str]] = {}
-        for file in known.values():
+        for file in dict.fromkeys(known.values()):
             if path.exists() and file.samefile(path):
                 raise ArtifactError(file, "is what this study writes; copy it, or give the study another name=")
             found = read(file, kind)
             for key in found.keys() & self._known.keys():
                 if _figures(found[key]) != _figures(self._known[key]):
-                    raise ArtifactError(
-                        file, f"tells a trial (recipe {key}) otherwise than {self._whose(key)}; leave one out"
-                    )
+                    problem = f"tells a trial (recipe {key}) otherwise than {self._whose(key)}"
+                    raise ArtifactError(file, f"{problem}; leave one out")
             self._from[file] = found.keys() - self._known.keys()
             self._known = {**found, **self._known}
         self._me = _made_by()
