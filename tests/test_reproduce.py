@@ -310,6 +310,9 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     assert " otherwise. Made: trial 1 by " in (folder / "table.md").read_text()
     assert "for all of its results" in said.err
     assert "gat, 4 trajectories, trial 1: grounded simulator against" in said.err
+    (tmp_path / "half.json").write_text((folder / "points.json").read_text())
+    part = "budgets=[6]", "~methods.sgat", "name=part", "known=half.json"  # a budget is asked for by itself
+    assert "2 of this study's 2 results are in" in done("reproduce", "budget", *few, *part, folder=tmp_path).err
     assert "grounded simulator against" not in said.out and "real trajectories collected" in said.out
 
 

@@ -14,6 +14,7 @@ import pytest
 from gsl.commandline.composer import compose, opened
 from gsl.config import prepared, resolved
 from gsl.stages.headline import Unit
+from gsl.studies.budget import Budget
 from gsl.studies.compare import Compare
 from gsl.studies.comparison import summaries
 from gsl.studies.comparison_table import markdown
@@ -56,9 +57,10 @@ def test_pages_have_such_commands() -> None:
 def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
     file = ROOT / KNOWN.findall(" ".join(typed))[0]
     rows, study = json.loads(file.read_text(encoding="utf-8")), composed(typed)
-    if isinstance(study, Replays):
-        assert study.recipes == {(row["trial"], row["world"], row["method"]): row["recipe"] for row in rows}
-        return
+    for kind, names in {Replays: ("trial", "world", "method"), Budget: ("trial", "method", "trajectories")}.items():
+        if isinstance(study, kind):
+            assert study.recipes == {tuple(row[name] for name in names): row["recipe"] for row in rows}
+            return
     if not isinstance(study, Compare):
         assert recipes(study).items() <= {row["trial"]: row["recipe"] for row in rows}.items()
         return

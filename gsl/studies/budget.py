@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -28,9 +28,9 @@ from gsl.studies.comparison_table import finely
 from gsl.studies.comparison_table import told as bounds
 from gsl.studies.effort import check_search, seconds
 from gsl.studies.held_out import MEASURED, check_first, held_out, starts
-from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipes
+from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.sizes import PresetName, sizes_of
-from gsl.tasks.task import SIM
+from gsl.tasks.task import REAL, SIM
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
 NONE = "none"
@@ -103,14 +103,24 @@ class Budget:
         check_search(self.iterate, "iterate")
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
-        keys = recipes(self)
-        ledger.announce({key: f"trial {number}" for number, key in keys.items()}, self._seconds)
-        for number, key in keys.items():
-            if not ledger.take(key, trial=number):
-                ledger.add(key, [one._asdict() for one in self._trial(home, number, console)])
+        keys = self.recipes
+        ledger.announce({key: method for (_, method, _), key in keys.items()}, self._seconds)
+        for (number, method, count), key in keys.items():
+            if not ledger.take(key, trial=number, method=method, trajectories=count):
+                with console.part(f"{method}, {count} trajectories, trial {number}" if count else NONE):
+                    ledger.add(key, [self._point(home, method, count, number, console)._asdict()])
         points = [Point(**row) for row in ledger.figures]
         self._told(folder, points, ledger.close(folder / DATA))
         return {"points": len(points)}
+
+    @property
+    def recipes(self) -> dict[tuple[int, str, int], str]:
+        """By trial, method and budget, in the order in which they are run."""
+        cells = [(NONE, 0), *((method, count) for count, method in product(self.budgets, self.methods))]
+        return {
+            (k, method, count): recipe(self.iterate, k, method, count, self.methods.get(method))
+            for k, (method, count) in product(range(1, self.trials + 1), cells)
+        }
 
     def _seconds(self) -> float:
         """Return an estimate of the study's duration [s]."""
@@ -124,18 +134,14 @@ class Budget:
         own = max(1, count // OWN)
         return replace(self.iterate.budget, real_episodes=own, real_neighbours=count - own)
 
-    def _trial(self, home: Path, number: int, console: Any) -> Iterator[Point]:
-        name = f"trial_{number:02d}"
-        yield self._ungrounded(home / NONE / name, number, console)
-        for count, method in product(self.budgets, self.methods):
-            with console.part(f"{method}, {count} trajectories, trial {number}"):
-                point = self._point(home / method / f"real_{count:03d}" / name, method, count, number, console)
-            yield point
-
-    def _point(self, place: Path, method: str, count: int, number: int, console: Any) -> Point:
-        chain = replace(self.iterate.chain, budget=self._budget(count), accept=True)
-        seed = self.iterate.seed + number - 1
-        begins = starts(held_out(chain, place.parents[2] / "held_out" / place.name, seed, console), chain)
+    def _point(self, home: Path, method: str, count: int, number: int, console: Any) -> Point:
+        name, seed = f"trial_{number:02d}", self.iterate.seed + number - 1
+        if method == NONE:
+            return self._ungrounded(home / NONE / name, number, console)
+        place, real = home / method / f"real_{count:03d}" / name, home / "data" / f"real_{count:03d}" / name
+        shared = {REAL: real, SIM: home / "data" / "sim" / name}
+        chain = replace(self.iterate.chain, budget=self._budget(count), accept=True, shared=shared)
+        begins = starts(held_out(chain, home / "held_out" / name, seed, console), chain)
         ready = chain.ready(place, self.methods[method], None, seed, console)
         found = chain.search(place / "optimize", ready, None, seed, console)
         measured = chain.measure(place / "evaluate", found, seed, console)
