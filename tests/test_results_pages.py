@@ -26,7 +26,7 @@ from gsl.studies.trial import Trial
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted((ROOT / "docs/results").glob("*.md")), ROOT / "docs/environments.md"]
-KNOWN = re.compile(r"known=\[?(docs/results/[^\s,\]]+\.json)")
+KNOWN = re.compile(r"(?:known=\[?|,)(docs/results/[^\s,\]]+\.json)")
 
 
 @cache
@@ -55,8 +55,9 @@ def test_pages_have_such_commands() -> None:
 
 @pytest.mark.parametrize("typed", told(), ids=lambda typed: KNOWN.findall(" ".join(typed))[0])
 def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
-    file = ROOT / KNOWN.findall(" ".join(typed))[0]
-    rows, study = json.loads(file.read_text(encoding="utf-8")), composed(typed)
+    files = [ROOT / name for name in KNOWN.findall(" ".join(typed))]
+    rows = [row for file in files for row in json.loads(file.read_text(encoding="utf-8"))]
+    study = composed(typed)
     for kind, names in {Replays: ("trial", "world", "method"), Budget: ("trial", "method", "trajectories")}.items():
         if isinstance(study, kind):
             assert study.recipes == {tuple(row[name] for name in names): row["recipe"] for row in rows}
@@ -72,9 +73,11 @@ def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
         told_of = {(one.number, one.simulator, one.world, one.method) for one in of[key]}
         assert told_of == {(number, cell.simulator, cell.world, cell.method)}
     trials = sorted((trial for key in keys.values() for trial in of[key]), key=lambda trial: trial.number)
-    table, task = file.with_name("table.md"), study.iterate.task
+    name = next((one.removeprefix("name=") for one in typed if one.startswith("name=")), "")
+    folder = files[0].parent if len(files) == 1 else ROOT / "docs/results" / name
+    table, task = folder / "table.md", study.iterate.task
     if isinstance(study, Reproduce):
-        assert file.with_name("trials.md").read_text(encoding="utf-8") == one_by_one(trials, task)
+        assert (folder / "trials.md").read_text(encoding="utf-8") == one_by_one(trials, task)
         text = study.table.markdown(trials, task)
     elif table.is_file():
         text = markdown(summaries(trials), trials, Unit.of(task))

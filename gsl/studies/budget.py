@@ -29,7 +29,7 @@ from gsl.studies.comparison_table import told as bounds
 from gsl.studies.effort import check_search, seconds
 from gsl.studies.held_out import MEASURED, check_first, held_out, starts
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
-from gsl.studies.sizes import PresetName, sizes_of
+from gsl.studies.sizes import First, PresetName, sizes_of, trials_of
 from gsl.tasks.task import REAL, SIM
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
@@ -78,6 +78,7 @@ class Budget:
     trials: Annotated[int, setting("trials of each", ge=1)]
     known: Known = None
     preset_name: PresetName = ""
+    first: First = 1
 
     def __post_init__(self) -> None:
         """Refuse a curve that goes back, or counts a budget twice."""
@@ -119,7 +120,7 @@ class Budget:
         cells = [(NONE, 0), *((method, count) for count, method in product(self.budgets, self.methods))]
         return {
             (k, method, count): recipe(self.iterate, k, method, count, self.methods.get(method))
-            for k, (method, count) in product(range(1, self.trials + 1), cells)
+            for k, (method, count) in product(range(self.first, self.first + self.trials), cells)
         }
 
     def _seconds(self) -> float:
@@ -176,7 +177,7 @@ class Budget:
         rows.append((NONE, "0", f"{none.mean:.1f}", bounds(none), "", ""))
         titles = ("grounding", "real trajectories collected", f"in real [{unit}]", "95 % interval")
         titles_of_errors = ("joints after 0.2 s, off π0 [°]", "95 % interval")
-        below = f"{MEASURED}\n\n{sizes_of(self.preset_name)} {made}\n"
+        below = f"{MEASURED}\n\n{sizes_of(self.preset_name)} {trials_of(self.first, self.trials)}. {made}\n"
         (folder / TABLE).write_text(f"{table((*titles, *titles_of_errors), rows)}\n{below}", encoding="utf-8")
         plain = mean_interval([one.bare for one in points if one.bare is not None]).mean
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}

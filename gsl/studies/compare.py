@@ -15,14 +15,14 @@ from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.stages.chain import Chain, round_seed
 from gsl.stages.diagnosis_plan import flown
-from gsl.stages.headline import Unit, several
+from gsl.stages.headline import Unit
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
 from gsl.studies.comparison import summaries
 from gsl.studies.comparison_table import markdown
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
-from gsl.studies.sizes import PresetName, sizes_of
+from gsl.studies.sizes import First, PresetName, sizes_of, trials_of
 from gsl.studies.trial import Cell, Trial
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import try_out
@@ -57,6 +57,7 @@ class Compare:
     rank: Annotated[bool, setting("set a fixed set of policies in simulation against real")] = False
     known: Known = None
     preset_name: PresetName = ""
+    first: First = 1
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -67,7 +68,7 @@ class Compare:
         found, made = self.carried_out(folder, console)
         summary = summaries(found)
         text = markdown(summary, found, Unit.of(self.iterate.task))
-        sizes = f"{sizes_of(self.preset_name)} {several(self.trials, 'trial')}."
+        sizes = f"{sizes_of(self.preset_name)} {trials_of(self.first, self.trials)}."
         (folder / TABLE).write_text(f"{text}\n{sizes} {made}\n", encoding="utf-8")
         return {"trials": self.trials, "summaries": [one._asdict() for one in summary]}
 
@@ -106,6 +107,11 @@ class Compare:
         return [Trial(**row) for row in ledger.figures], ledger.close(folder / DATA)
 
     @property
+    def numbers(self) -> range:
+        """Of the trials."""
+        return range(self.first, self.first + self.trials)
+
+    @property
     def recipes(self) -> dict[tuple[int, Cell], str]:
         """By trial and cell, in the order in which they are run."""
         sims = self._simulators
@@ -114,7 +120,7 @@ class Compare:
             (k, cell): recipe(
                 self.iterate, k, cell, sims[cell[0]], self.worlds[cell[1]], self.methods[cell[2]], self.rank
             )
-            for k, cell in product(range(1, self.trials + 1), cells)
+            for k, cell in product(self.numbers, cells)
         }
 
     @property

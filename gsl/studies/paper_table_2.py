@@ -16,6 +16,7 @@ from gsl.studies.trial import Cell, Trial
 from gsl.tasks.task import Task
 
 TABLE_2 = {"none": ("11.1", "7 of 10", "1.3"), "ane": ("18.9", "5 of 10", "6.6"), "gat": ("22.5", "1 of 10", "2.7")}
+LEAST = 0.001  # probability that is told
 
 
 @component
@@ -61,7 +62,7 @@ class Table2:
             rows = [(*one.cells(where), one.method, *cells) for one, cells in zip(found, apart, strict=True)]
             parts.append(table(beside, rows))
         tested = [
-            (*one.cells(there), f"{order.method} - {order.other}", f"{order.difference:+.1f}", f"{order.p:.3f}")
+            (*one.cells(there), f"{order.method} - {order.other}", f"{order.difference:+.1f}", _probability(order.p))
             for one in {(one.simulator, one.world): one for one in found}.values()
             for order in orders(trials, one.simulator, one.world, self.tested, self.against)
         ]
@@ -106,6 +107,10 @@ def _last(trials: Sequence[Trial], one: Summary, task: Task) -> str:
         return ""
     better = (trial.last_falls == 0 and trial.last[SPEED] > task.shown * trial.start for trial in own)
     return f"{sum(better)} of {len(own)}"
+
+
+def _probability(p: float) -> str:
+    return f"{p:.3f}" if p >= LEAST else f"<{LEAST:g}"
 
 
 def _speeds(trials: Sequence[Trial], one: Summary, task: Task) -> str:

@@ -24,7 +24,6 @@ from gsl.report.trial_dots import Dots, trial_dots
 from gsl.stages.grounding_check import asked
 from gsl.stages.grounding_gate import Gate
 from gsl.stages.grounding_replay import TICKS, replayed
-from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate, check_trainable
 from gsl.stages.rollout import Scenario
 from gsl.stages.training import degrees, of_policy
@@ -34,7 +33,7 @@ from gsl.studies.effort import seconds
 from gsl.studies.held_out import MEASURED, check_first, held_out, starts
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.method_colour import method_colour
-from gsl.studies.sizes import PresetName, sizes_of
+from gsl.studies.sizes import First, PresetName, sizes_of, trials_of
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.world import World
 
@@ -107,6 +106,7 @@ class Replays:
     trials: Annotated[int, setting("trials of each method", ge=1)]
     known: Known = None
     preset_name: PresetName = ""
+    first: First = 1
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
@@ -148,7 +148,7 @@ class Replays:
         """By trial, world and method, in the order in which they are run."""
         return {
             (k, world, method): recipe(self.iterate, k, world, method, self.worlds[world], self.methods[method])
-            for k, world, method in product(range(1, self.trials + 1), self.worlds, self.methods)
+            for k, world, method in product(range(self.first, self.first + self.trials), self.worlds, self.methods)
         }
 
     def _replay(self, home: Path, number: int, world: str, method: str, console: Any) -> Replay:
@@ -200,7 +200,8 @@ class Replays:
             dots = Dots([one.joints for one in own], [False] * len(own), method_colour(self.methods[method]))
             panels.setdefault(world, {})[method] = dots
         titles = (*TITLES[:4], f"minus {first} (95 %, paired)", *TITLES[4:])
-        sizes = f"{sizes_of(self.preset_name)} {several(self.trials, 'trial')}; {self.iterate.budget.learned}{MOTIONS}."
+        trials = trials_of(self.first, self.trials)
+        sizes = f"{sizes_of(self.preset_name)} {trials}; {self.iterate.budget.learned}{MOTIONS}."
         below = "\n\n".join([MEASURED, sizes, made])
         (folder / TABLE).write_text(f"{table(titles, shown)}\n{below}\n", encoding="utf-8")
         trial_dots(folder / FIGURE, panels, axis=TITLES[2], title="How far simulators are from real joints, each trial")

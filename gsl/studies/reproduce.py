@@ -10,13 +10,12 @@ from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 from gsl.core.setting import component, setting
 from gsl.optimizers.cma_es import CmaEs
 from gsl.report.trial_dots import Dots, trial_dots
-from gsl.stages.headline import several
 from gsl.studies.compare import TABLE, Compare
 from gsl.studies.comparison import summaries
 from gsl.studies.effort import check_search, seconds
 from gsl.studies.method_colour import method_colour
 from gsl.studies.paper_cells import Drawn, one_by_one
-from gsl.studies.sizes import sizes_of
+from gsl.studies.sizes import sizes_of, trials_of
 from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
 
@@ -66,7 +65,7 @@ def _sizes(study: Compare) -> str:
         f"{optimizer.generations} generations of {optimizer.candidates} candidates, {budget.rollouts} rollouts each"
     )
     measured = f"{budget.episodes} for the choice, {budget.check} for the check, {budget.confirmation} for the report"
-    return f"{several(study.trials, 'trial')}; {searched}; {budget.learned}; {measured}."
+    return f"{trials_of(study.first, study.trials)}; {searched}; {budget.learned}; {measured}."
 
 
 def _draw(path: Path, trials: Sequence[Trial], study: Compare, drawn: Drawn) -> None:

@@ -1,12 +1,15 @@
-"""The preset that a study's sizes come from, as its table tells it."""
+"""What a study's table tells of its sizes: the preset that they come from, and which trials there are."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
 from gsl.core.setting import setting
+from gsl.stages.headline import several
 
 PresetName = Annotated[str, setting("preset that the sizes come from, as the table tells it; empty of none")]
+
+First = Annotated[int, setting("number of the first trial; trials of one number have the same seeds", ge=1)]
 
 
 def sizes_of(preset_name: str) -> str:
@@ -16,3 +19,9 @@ def sizes_of(preset_name: str) -> str:
         if preset_name
         else "Sizes: of no preset."
     )
+
+
+def trials_of(first: int, count: int) -> str:
+    """Return how many trials there are, and which, if they are not the first."""
+    which = str(first) if count == 1 else f"{first} to {first + count - 1}"
+    return several(count, "trial") + (f" ({which})" if first > 1 else "")
