@@ -84,3 +84,18 @@ def test_a_page_tells_what_is_committed(typed: list[str]) -> None:
     else:
         return
     assert text.strip() in table.read_text(encoding="utf-8")
+
+
+def by_number(study: Any) -> dict[int, set[str]]:
+    """The recipes of each trial."""
+    found: dict[int, set[str]] = {}
+    for cell, key in (study.recipes if hasattr(study, "recipes") else recipes(study)).items():
+        found.setdefault(cell if isinstance(cell, int) else cell[0], set()).add(key)
+    return found
+
+
+@pytest.mark.parametrize("name", ["fig12", "budget", "replays", "table2"])
+def test_trials_are_the_same_wherever_a_study_begins(name: str) -> None:
+    """Otherwise several machines could not share them."""
+    whole, last = (by_number(composed(["reproduce", name, "trials=3", first])) for first in ("first=1", "first=3"))
+    assert list(last) == [3, 4, 5] and last[3] == whole[3] and last[3].isdisjoint(last[4])

@@ -27,7 +27,7 @@ MADE = ("forward_model", "inverse_model", "diagnosis")  # of a grounding: names 
 NUMBER = ("number", "trial")  # what rows call their trial
 # Settings that came after trials were written down, at what changes nothing.
 LATER = {"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim", "rested": False,
-         "multi_step": 1}  # fmt: skip
+         "multi_step": 1, "first": 1}  # fmt: skip
 
 GOES_ON = "goes on from the results that are there"  # what force=true does to a study
 LABELS = ("preset_name",)  # that tables tell, and no result depends on
@@ -49,9 +49,9 @@ def recipe(*parts: Any) -> str:
 
 
 def recipes(study: Any) -> dict[int, str]:
-    """Return by number the recipes of a study whose trials need all of its settings but how many they are."""
-    one = replace(study, trials=1, known=None)
-    return {number: recipe(one, number) for number in range(1, study.trials + 1)}
+    """Return by number the recipes of a study whose trials need all of its settings but which they are."""
+    one = replace(study, trials=1, first=1, known=None)
+    return {number: recipe(one, number) for number in range(study.first, study.first + study.trials)}
 
 
 def known_parents(known: str | tuple[str, ...] | None, name: str) -> dict[str, Path]:

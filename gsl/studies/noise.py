@@ -32,7 +32,7 @@ from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipes
 from gsl.studies.noise_table import REFERENCE, NoiseTable, Place, Point
-from gsl.studies.sizes import PresetName, sizes_of
+from gsl.studies.sizes import First, PresetName, sizes_of
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import GymnasiumWorld, try_out
 from gsl.worlds.world import World
@@ -69,6 +69,7 @@ class NoiseStudy:
     workers: Workers = -1
     known: Known = None
     preset_name: PresetName = ""
+    first: First = 1
 
     def __post_init__(self) -> None:
         """Refuse what only several rounds know, and rounds that go on from what nothing real has chosen."""
