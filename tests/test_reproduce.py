@@ -128,6 +128,7 @@ def test_a_trace_is_of_a_joint_that_the_models_know(tmp_path: Path) -> None:
         ("fig6 grounding@iterate.grounding=none", "iterate.grounding: only a transformation of actions can be drawn"),
         ("fig6 duration=0.001", "duration = 0.001: is less than a tick, 0.02 s"),
         ("fig7 begin=50 iterate.task.duration=1.2", "begin = 50: π0's real walk is over after "),
+        ("budget +grounding@methods.none=gat", "methods.none: is what all others are set against; take another name"),
         ("budget budgets=[2]", "budgets.0 = 2: must be at least 3"),
         ("budget iterate.iterations=2", "iterate.iterations = 2: this study is of the first"),
         ("budget grounding@methods.gat=effects_gat", "methods.gat: learns from real trajectories alone"),
@@ -301,15 +302,17 @@ def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
 
 def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     few = ("preset=toy", "iterate.workers=1", "iterate.optimizer.candidates=4", "iterate.task.duration=1.2")
-    said = done("reproduce", "budget", *few, "budgets=[4,6]", "~methods.sgat", folder=tmp_path)
+    said = done("reproduce", "budget", *few, "budgets=[4,6]", folder=tmp_path)
     folder = tmp_path / "runs/budget/reproduce"
     points = json.loads((folder / "points.json").read_text())
-    assert [(one["method"], one["trajectories"]) for one in points] == [("none", 0), ("gat", 4), ("gat", 6)]
+    made = [(one["method"], one["trajectories"]) for one in points]
+    assert made == [("none", 0), ("gat", 4), ("sgat", 4), ("gat", 6), ("sgat", 6)]
     assert all(one["error"] > 0.0 < one["bare"] for one in points[1:])
-    assert points[1]["error"] != points[2]["error"]
+    assert points[1]["error"] != points[3]["error"]
+    assert len(list((tmp_path / "runs/budget").rglob("collect_real"))) == 2  # what the methods share
     refused = gsl("reproduce", "budget", *few, "budgets=[6,6]", "name=n", folder=tmp_path)
     assert refused.lines == ["gsl reproduce budget: budgets = [6,6]: are to rise, the fewest first"]
-    assert points[1]["bare"] == points[2]["bare"]  # measured on the same trajectories
+    assert points[1]["bare"] == points[4]["bare"]  # measured on the same trajectories
     assert (folder / "budget.png").stat().st_size > 10_000
     assert " otherwise. 1 trial. Made: trial 1 by " in (folder / "table.md").read_text()
     assert "for all of its results" in said.err

@@ -17,7 +17,6 @@ from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.report.budget_curve import Line, budget_curve
 from gsl.report.markdown import table
-from gsl.stages.chain import Budget as ChainBudget
 from gsl.stages.grounding_gate import settled
 from gsl.stages.grounding_replay import TICKS, replayed
 from gsl.stages.iterate import Iterate, check_trainable
@@ -96,6 +95,8 @@ class Budget:
         Raises:
             ConfigError: A grounding does not learn from trajectories alone, or the optimizer is no search.
         """
+        if NONE in self.methods:
+            raise ConfigError(f"methods.{NONE}", "is what all others are set against; take another name")
         for name, grounding in self.methods.items():
             if not isinstance(grounding, ActionTransformation):
                 raise ConfigError(f"methods.{name}", "learns from real trajectories alone; take gat or sgat")
@@ -108,7 +109,7 @@ class Budget:
         ledger.announce({key: method for (_, method, _), key in keys.items()}, self._seconds)
         for (number, method, count), key in keys.items():
             if not ledger.take(key, trial=number, method=method, trajectories=count):
-                with console.part(f"{method}, {count} trajectories, trial {number}" if count else NONE):
+                with console.part(f"{method}, {count} trajectories, trial {number}"):
                     ledger.add(key, [self._point(home, method, count, number, console)._asdict()])
         points = [Point(**row) for row in ledger.figures]
         self._told(folder, points, ledger.close(folder / DATA))
@@ -119,21 +120,25 @@ class Budget:
         """By trial, method and budget, in the order in which they are run."""
         cells = [(NONE, 0), *((method, count) for count, method in product(self.budgets, self.methods))]
         return {
-            (k, method, count): recipe(self.iterate, k, method, count, self.methods.get(method))
+            (k, method, count): recipe(self._with(count), k, method, count, self.methods.get(method))
             for k, (method, count) in product(range(self.first, self.first + self.trials), cells)
         }
 
     def _seconds(self) -> float:
         """Return an estimate of the study's duration [s]."""
         study = Compare(self.iterate, {"real": self.iterate.real}, {NONE: NoGrounding()}, self.trials)
-        usual = replace(self.iterate, budget=self._budget(sum(self.budgets) // len(self.budgets)))
+        usual = self._with(sum(self.budgets) // len(self.budgets))
         learning = replace(study, methods=self.methods, iterate=usual)
         return seconds(study) + len(self.budgets) * seconds(learning)
 
-    def _budget(self, count: int) -> ChainBudget:
-        """Return the effort with so many real trajectories to learn from."""
+    def _with(self, count: int) -> Iterate:
+        """Return the iteration with so many real trajectories to learn from; with none it is as it was."""
+        if not count:
+            return self.iterate
         own = max(1, count // OWN)
-        return replace(self.iterate.budget, real_episodes=own, real_neighbours=count - own)
+        return replace(
+            self.iterate, budget=replace(self.iterate.budget, real_episodes=own, real_neighbours=count - own)
+        )
 
     def _point(self, home: Path, method: str, count: int, number: int, console: Any) -> Point:
         name, seed = f"trial_{number:02d}", self.iterate.seed + number - 1
@@ -141,7 +146,7 @@ class Budget:
             return self._ungrounded(home / NONE / name, number, console)
         place, real = home / method / f"real_{count:03d}" / name, home / "data" / f"real_{count:03d}" / name
         shared = {REAL: real, SIM: home / "data" / "sim" / name}
-        chain = replace(self.iterate.chain, budget=self._budget(count), accept=True, shared=shared)
+        chain = replace(self._with(count).chain, accept=True, shared=shared)
         begins = starts(held_out(chain, home / "held_out" / name, seed, console), chain)
         ready = chain.ready(place, self.methods[method], None, seed, console)
         found = chain.search(place / "optimize", ready, None, seed, console)

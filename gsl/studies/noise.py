@@ -32,7 +32,7 @@ from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipes
 from gsl.studies.noise_table import REFERENCE, NoiseTable, Place, Point
-from gsl.studies.sizes import First, PresetName, sizes_of
+from gsl.studies.sizes import First, PresetName, sizes_of, trials_of
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import GymnasiumWorld, try_out
 from gsl.worlds.world import World
@@ -132,7 +132,7 @@ class NoiseStudy:
             where = [Place(*one) for one in product([world], self.noises, self._rounds if by_round else [last])]
             panels[f"{of}{world.replace('_', ' ')}"] = Bars(ticks, table.means(where))
         hatched = "without real data" if self.choice == SIM else "no model of real"
-        title = f"Return in real, mean ± standard error ({several(self.trials, 'trial')}); hatched: {hatched}"
+        title = f"Return in real, mean ± standard error ({trials_of(self.first, self.trials)}); hatched: {hatched}"
         noise_bars(path, panels, REFERENCE, title=title, along=along, alike=alike)
 
     @property
@@ -209,7 +209,7 @@ class NoiseStudy:
         """What the table says below."""
         each = " in each round" if len(self._rounds) > 1 else ""
         below = [
-            f"Mean ± standard error over {several(self.trials, 'trial')}; real steps are the median and range of",
+            f"Mean ± standard error over {trials_of(self.first, self.trials)}; real steps are the median and range of",
             f"what learned groundings saw; the reference learned from {self._reference}{each}.",
         ]
         if self.choice == SIM:
