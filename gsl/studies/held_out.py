@@ -19,7 +19,7 @@ from gsl.storage.trajectories import read
 from gsl.tasks.task import REAL
 
 HELD_OUT = 12  # trajectories of neighbours, on which errors are measured
-MEASURED = f"Joints are measured on {HELD_OUT} real trajectories off π0 more at most, the same for all of a trial."
+MEASURED = f"Joints are measured on at most {HELD_OUT} further real trajectories off π0, the same for all of a trial."
 
 
 def check_first(iterate: Iterate) -> None:
