@@ -105,7 +105,7 @@ class Table4:
             f"π0 in real, a fall worth 0: {task.shown * start.mean:.1f} {task.unit} (paper: 14.7, always falls).",
             "Speed is distance over the planned time, falls and all; intervals are over trials.\n",
         ]
-        return "\n".join([table(titles, rows), *below, _differences(trials, task, self.against, falls=True)])
+        return "\n".join([table(titles, rows), *below, *_differences(trials, task, self.against, falls=True)])
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return what a trial is worth: of a π0 that falls half of the time shares would be of little."""
@@ -131,7 +131,7 @@ class LinearWalkTable:
             + (f"{one.real_episodes:.0f}", *(LINEAR_WALK.get(one.method, NOTHING) if one.iteration == 1 else NOTHING))
             for one in found
         ]
-        return "\n".join([table(titles, rows), _differences(trials, task, ("none", "gat"))])
+        return "\n".join([table(titles, rows), *_differences(trials, task, ("none", "gat"))])
 
     def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return the distances."""
@@ -176,8 +176,8 @@ class Figure5:
         )
 
 
-def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *, falls: bool = False) -> str:
-    """Return the table of values, and of falls, against those of other methods, paired by trial."""
+def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *, falls: bool = False) -> list[str]:
+    """Return the table of values, and of falls, against those of other methods, paired by trial, if there are any."""
     methods, rows = list(dict.fromkeys(trial.method for trial in trials)), []
     where = places(summaries(trials), told=["iteration"])
     for other, cell in product(against, dict.fromkeys(trial.cell for trial in trials)):
@@ -190,7 +190,7 @@ def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *,
         rows.append((*places_of, f"{cell.method} - {other}", str(cell.iteration), *apart, *counted))
     counted = ("falls of a trial", "95 % interval") if falls else ()
     titles = ("difference", "iteration", f"in real [{task.unit}]", "95 % interval, paired by trial")
-    return table((*where, *titles, *counted), rows)
+    return [table((*where, *titles, *counted), rows)] if rows else []
 
 
 def _on_average(trial: Trial) -> float:
