@@ -32,10 +32,10 @@ KEPT = {
     "table2": ("none", "ane_02", "gat", "gat_multi_step", "gat_gated", "identified", "effects_sgat", "randomised"),
     "table2-paper": ("none", "gat", "gat_alpha_1"),
     "table3": ("gat",),
-    "table4": ("gat", "sgat"),
-    "linear-walk": ("none", "gat"),
-    "fig5": ("none", "gat"),
-    "worlds": ("none",),
+    "table4": ("gat", "sgat", "sgat_005"),
+    "linear-walk": ("none", "gat", "gat_residual"),
+    "fig5": ("none", "gat", "gat_005"),
+    "worlds": ("none", "gat_residual_01", "effects"),
 }
 ALL = (
     *("none", "ane_005", "ane_01", "ane_02", "ane_04", "randomised", "gat", "gat_005", "gat_residual"),
@@ -82,7 +82,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     }
     if what == "table4":
         assert learned["iteration_02"] > learned["trial_01"]  # it knows what the first iteration has collected
-        assert len([*folder.parent.rglob("collect_real")]) == 3  # methods begin with the same, and go on with their own
+        assert len([*folder.parent.rglob("collect_real")]) == 4  # methods begin with the same, and go on with their own
 
 
 def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) -> None:
@@ -425,6 +425,12 @@ def test_table_2_counts_how_often_the_last_generation_improves() -> None:
     assert "| 16 of 20 | 12 of 20 | 2 of 4 |" in row  # π0 walks 20 cm/s
     before = Table2().markdown([trials[0]._replace(last_falls=None)], Walk())
     assert "| 4 of 5 | 3 of 5 |  |" in before  # a trial of a file that does not tell
+
+
+def test_table_2_counts_failures_as_the_paper_does_and_more_strictly() -> None:
+    trials = [a_trial("gat", 1), a_trial("gat", 2, falls=1), a_trial("gat", 3, improving=0, surely=0.0)]
+    row = next(line for line in Table2().markdown(trials, Walk()).splitlines() if line.startswith("| w | gat"))
+    assert "| 2 of 3 | 1 of 3 | 2.0 |" in row
 
 
 def test_table_3_counts_where_chains_stop() -> None:

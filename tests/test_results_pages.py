@@ -99,3 +99,38 @@ def test_trials_are_the_same_wherever_a_study_begins(name: str) -> None:
     """Otherwise several machines could not share them."""
     whole, last = (by_number(composed(["reproduce", name, "trials=3", first])) for first in ("first=1", "first=3"))
     assert list(last) == [3, 4, 5] and last[3] == whole[3] and last[3].isdisjoint(last[4])
+
+
+def tables(text: str) -> list[tuple[list[str], list[list[str]]]]:
+    """Return the tables of a page, titles and rows."""
+    found = []
+    for block in re.findall(r"(?:^\|.*\|$\n?)+", text, re.MULTILINE):
+        titles, _, *rows = ([cell.strip() for cell in line[1:-1].split("|")] for line in block.splitlines())
+        found.append((titles, rows))
+    return found
+
+
+def places_of(titles: list[str], among: list[str]) -> list[int]:
+    """Return where titles stand among others, in their order; nothing if they do not all."""
+    places = list[int]()
+    for title in titles:
+        rest = among[places[-1] + 1 :] if places else among
+        if title not in rest:
+            return []
+        places.append(len(among) - len(rest) + rest.index(title))
+    return places
+
+
+def test_a_page_repeats_its_tables_to_the_letter() -> None:
+    repeated = set()
+    for page in PAGES[:-1]:
+        text = page.read_text(encoding="utf-8")
+        folders = {ROOT / name for name in re.findall(r"docs/results/\w+(?=/)", text)}
+        whole = [one for folder in folders for one in tables((folder / "table.md").read_text(encoding="utf-8"))]
+        for titles, rows in tables(text):
+            kept = [(places_of(titles, every), below) for every, below in whole]
+            there = [[row[place] for place in places] for places, below in kept if places for row in below]
+            if there:
+                repeated.add(page.stem)
+                assert [row for row in rows if row not in there] == [], page
+    assert repeated >= {"table2", "table2-paper", "table4", "linear-walk", "worlds", "fig12", "fig13", "garat"}
