@@ -20,6 +20,7 @@ from gsl.studies.ledger import Ledger, recipe
 from gsl.studies.paper_cells import one_by_one
 from gsl.studies.paper_table_2 import Table2
 from gsl.studies.paper_tables import Figure5, LinearWalkTable, Table3, Table4
+from gsl.studies.sizes import numbers, trials_of
 from gsl.studies.trial import Trial
 from gsl.tasks.arm import Arm
 from gsl.tasks.distance import Distance
@@ -108,6 +109,9 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     second = "first=2", "trials=1", "name=second", "known=runs/on/reproduce/trials.json"
     assert "2 of this study's 2 results are in" in done("reproduce", "fig5", *few, *second, folder=tmp_path).err
     assert json.loads((tmp_path / "runs/second/reproduce/trials.json").read_text()) == again[2:]
+    done("reproduce", "fig5", *few, "first=2", "trials=1", "name=alone", folder=tmp_path)  # run, and not known
+    alone = json.loads((tmp_path / "runs/alone/reproduce/trials.json").read_text())
+    assert [{**one, "made_by": ""} for one in alone] == [{**one, "made_by": ""} for one in again[2:]]
     assert " 1 trial (2); " in (tmp_path / "runs/second/reproduce/table.md").read_text()
 
 
@@ -130,6 +134,12 @@ def test_a_trace_is_of_a_joint_that_the_models_know(tmp_path: Path) -> None:
         ("fig7 begin=50 iterate.task.duration=1.2", "begin = 50: π0's real walk is over after "),
         ("budget +grounding@methods.none=gat", "methods.none: is what all others are set against; take another name"),
         ("budget budgets=[2]", "budgets.0 = 2: must be at least 3"),
+        (
+            "budget world@iterate.sim=inverted_pendulum world@iterate.real=inverted_pendulum_noisy"
+            " trial@iterate=gymnasium optimizer@iterate.optimizer=cma_es",
+            "iterate.real: is no robot; replays begin in a robot's real states",
+        ),
+        ("budget first=0", "first = 0: must be at least 1"),
         ("budget iterate.iterations=2", "iterate.iterations = 2: this study is of the first"),
         ("budget grounding@methods.gat=effects_gat", "methods.gat: learns from real trajectories alone"),
         ("budget grounding@methods.gat=none", "methods.gat: learns from real trajectories alone"),
@@ -403,6 +413,18 @@ def test_differences_say_in_which_simulator(table: Any) -> None:
     for simulator, more in (("a", "+0.0 | 1.000"), ("b", "+4.0 | 0.500")):
         row = next(line for line in text.splitlines() if line.startswith(f"| {simulator} | w | gat - none |"))
         assert not isinstance(table, Table2) or more in row
+
+
+def test_one_method_is_set_against_no_other() -> None:
+    told = LinearWalkTable().markdown([a_trial("gat", 1), a_trial("gat", 2)], Distance())
+    assert "| w | gat | 1 |" in told and "difference" not in told
+
+
+@pytest.mark.parametrize(
+    ("first", "count", "words"), [(1, 10, "10 trials"), (11, 10, "10 trials (11 to 20)"), (3, 1, "1 trial (3)")]
+)
+def test_a_table_says_which_trials_it_has(first: int, count: int, words: str) -> None:
+    assert trials_of(first, count) == words and len(numbers(first, count)) == count
 
 
 def test_everything_of_a_single_trial_is_told() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
-from gsl.core.statistics import mean_interval
+from gsl.core.statistics import Interval, mean_interval
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.grounding import Grounding
@@ -26,14 +26,15 @@ from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import finely
 from gsl.studies.comparison_table import told as bounds
 from gsl.studies.effort import check_search, seconds
-from gsl.studies.held_out import MEASURED, check_first, held_out, starts
+from gsl.studies.held_out import MEASURED, check_first_iteration, check_robot, held_out, starts
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
-from gsl.studies.sizes import First, PresetName, sizes_of, trials_of
+from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl.tasks.task import REAL, SIM
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
 NONE = "none"
 OWN = 3  # one of so many trajectories is of π0, the others of its neighbours
+PAIRED = "Differences are paired by trial, their 95 % intervals each for itself."
 
 
 class Point(NamedTuple):
@@ -101,7 +102,8 @@ class Budget:
             if not isinstance(grounding, ActionTransformation):
                 raise ConfigError(f"methods.{name}", "learns from real trajectories alone; take gat or sgat")
             check_trainable(self.iterate, f"methods.{name}", grounding)
-        check_first(self.iterate)
+        check_first_iteration(self.iterate)
+        check_robot(self.iterate.real, "iterate.real")
         check_search(self.iterate, "iterate")
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
@@ -112,7 +114,7 @@ class Budget:
                 with console.part(f"{method}, {count} trajectories, trial {number}"):
                     ledger.add(key, [self._point(home, method, count, number, console)._asdict()])
         points = [Point(**row) for row in ledger.figures]
-        self._told(folder, points, ledger.close(folder / DATA))
+        self.tell(folder, points, ledger.close(folder / DATA))
         return {"points": len(points)}
 
     @property
@@ -121,7 +123,7 @@ class Budget:
         cells = [(NONE, 0), *((method, count) for count, method in product(self.budgets, self.methods))]
         return {
             (k, method, count): recipe(self._with(count), k, method, count, self.methods.get(method))
-            for k, (method, count) in product(range(self.first, self.first + self.trials), cells)
+            for k, (method, count) in product(numbers(self.first, self.trials), cells)
         }
 
     def _seconds(self) -> float:
@@ -166,25 +168,49 @@ class Budget:
         measured = chain.measure(place / "evaluate", found, seed, console)
         return Point(NONE, 0, number, measured.metrics["returned"]["value"], None, None)
 
-    def _told(self, folder: Path, points: Sequence[Point], made: str) -> None:
+    def tell(self, folder: Path, points: Sequence[Point], made: str) -> None:
+        """Write the table and the figure of all points; `made` says who made them."""
         shown, unit = self.iterate.task.shown, self.iterate.task.unit
-        rows, values, errors = [], {}, {}
+        rows, values, errors, fewest = [], {}, {}, self.budgets[0]
+        none = {one.trial: shown * one.value for one in points if one.method == NONE}
         for method in self.methods:
             cells = [[one for one in points if one.method == method and one.trajectories == n] for n in self.budgets]
-            means = [mean_interval([shown * one.value for one in cell]) for cell in cells]
-            wrong = [mean_interval([one.error for one in cell if one.error is not None]) for cell in cells]
-            values[method], errors[method] = Line(self.budgets, means), Line(self.budgets, wrong)
-            rows += [
-                (method, str(n), f"{value.mean:.1f}", bounds(value), f"{error.mean:.2f}", finely(error))
-                for n, value, error in zip(self.budgets, means, wrong, strict=True)
-            ]
-        none = mean_interval([shown * one.value for one in points if one.method == NONE])
-        rows.append((NONE, "0", f"{none.mean:.1f}", bounds(none), "", ""))
-        titles = ("grounding", "real trajectories collected", f"in real [{unit}]", "95 % interval")
-        titles_of_errors = ("joints after 0.2 s, off π0 [°]", "95 % interval")
+            means = [{one.trial: shown * one.value for one in cell} for cell in cells]
+            wrong = [{one.trial: one.error for one in cell if one.error is not None} for cell in cells]
+            values[method] = Line(self.budgets, [_over(cell) for cell in means])
+            errors[method] = Line(self.budgets, [_over(cell) for cell in wrong])
+            for n, value, error in zip(self.budgets, means, wrong, strict=True):
+                more = "" if n == fewest else _apart(error, wrong[0])
+                returns = *_cells(value, ".1f", bounds), _apart(value, none, ".1f", bounds)
+                rows.append((method, str(n), *returns, *_cells(error, ".2f", finely), more))
+        plain = {one.trial: one.bare for one in points if one.bare is not None}
+        rows.append((NONE, "0", *_cells(none, ".1f", bounds), "", *_cells(plain, ".2f", finely), ""))
+        titles = (
+            *("grounding", "real trajectories collected", f"in real [{unit}]", "95 % interval", f"minus {NONE}"),
+            *("joints after 0.2 s, off π0 [°]", "95 % interval", f"minus those of {fewest}"),
+        )
         below = f"{MEASURED}\n\n{sizes_of(self.preset_name)} {trials_of(self.first, self.trials)}. {made}\n"
-        (folder / TABLE).write_text(f"{table((*titles, *titles_of_errors), rows)}\n{below}", encoding="utf-8")
-        plain = mean_interval([one.bare for one in points if one.bare is not None]).mean
+        (folder / TABLE).write_text(f"{table(titles, rows)}\n{PAIRED}\n\n{below}", encoding="utf-8")
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
-        bases = dict(zip(panels, (none.mean, plain), strict=True))
+        bases = dict(zip(panels, (_over(none).mean, _over(plain).mean), strict=True))
         budget_curve(folder / FIGURE, panels, bases, "What a grounding makes of more real data")
+
+
+def _over(by_trial: Mapping[int, float]) -> Interval:
+    return mean_interval(list(by_trial.values()))
+
+
+def _cells(by_trial: Mapping[int, float], form: str, told: Callable[[Interval], str]) -> tuple[str, str]:
+    """Return a mean and its interval."""
+    return f"{_over(by_trial).mean:{form}}", told(_over(by_trial))
+
+
+def _apart(
+    by_trial: Mapping[int, float],
+    others: Mapping[int, float],
+    form: str = ".2f",
+    told: Callable[[Interval], str] = finely,
+) -> str:
+    """Return by how much figures are above others of the same trials."""
+    found = mean_interval([figure - others[trial] for trial, figure in by_trial.items()])
+    return f"{found.mean:+{form}} ({told(found)})"

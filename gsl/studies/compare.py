@@ -22,7 +22,7 @@ from gsl.storage.artifact import Artifact
 from gsl.studies.comparison import summaries
 from gsl.studies.comparison_table import markdown
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
-from gsl.studies.sizes import First, PresetName, sizes_of, trials_of
+from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl.studies.trial import Cell, Trial
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import try_out
@@ -107,11 +107,6 @@ class Compare:
         return [Trial(**row) for row in ledger.figures], ledger.close(folder / DATA)
 
     @property
-    def numbers(self) -> range:
-        """Of the trials."""
-        return range(self.first, self.first + self.trials)
-
-    @property
     def recipes(self) -> dict[tuple[int, Cell], str]:
         """By trial and cell, in the order in which they are run."""
         sims = self._simulators
@@ -120,7 +115,7 @@ class Compare:
             (k, cell): recipe(
                 self.iterate, k, cell, sims[cell[0]], self.worlds[cell[1]], self.methods[cell[2]], self.rank
             )
-            for k, cell in product(self.numbers, cells)
+            for k, cell in product(numbers(self.first, self.trials), cells)
         }
 
     @property

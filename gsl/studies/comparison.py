@@ -21,6 +21,8 @@ class Summary(NamedTuple):
     """All trials of a cell; improvement and rank are means over trials [%, -], None where a trial has none.
 
     The generation is that which found what was returned, on average over trials that returned something new, if any.
+    `without` counts trials in which what was returned fell or was not surely better; `unimproved` those in which no
+    winner improved, which the paper counts as failures ("failed to produce a stable improvement", section 6.4).
     """
 
     simulator: str
@@ -31,6 +33,7 @@ class Summary(NamedTuple):
     value: Interval
     improvement: Interval | None
     without: int
+    unimproved: int
     stable: int
     improving: int
     winners: int
@@ -132,6 +135,7 @@ def _summary(cell: Cell, trials: list[Trial]) -> Summary:
         value=mean_interval([trial.value for trial in trials]),
         improvement=mean_interval(improvements) if len(improvements) == len(trials) else None,
         without=sum(trial.without for trial in trials),
+        unimproved=sum(trial.improving == 0 for trial in trials),
         stable=sum(trial.stable for trial in trials),
         improving=sum(trial.improving for trial in trials),
         winners=sum(trial.winners for trial in trials),

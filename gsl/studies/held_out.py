@@ -17,12 +17,13 @@ from gsl.stages.link import built
 from gsl.stages.training import of_policy
 from gsl.storage.trajectories import read
 from gsl.tasks.task import REAL
+from gsl.worlds.world import World
 
 HELD_OUT = 12  # trajectories of neighbours, on which errors are measured
 MEASURED = f"Joints are measured on at most {HELD_OUT} further real trajectories off π0, the same for all of a trial."
 
 
-def check_first(iterate: Iterate) -> None:
+def check_first_iteration(iterate: Iterate) -> None:
     """Refuse what is not the first iteration from π0 as it is, which such a study is of.
 
     Raises:
@@ -32,6 +33,12 @@ def check_first(iterate: Iterate) -> None:
         raise ConfigError("iterate.iterations", "this study is of the first", given=str(iterate.iterations))
     if iterate.pretrained:
         raise ConfigError("iterate.pretrained", "this study begins with π0 as it is", given="true")
+
+
+def check_robot(world: World, where: str) -> None:
+    """Refuse a real world that has no joints; `where` is the setting that it is."""
+    if world.layout.states:
+        raise ConfigError(where, "is no robot; replays begin in a robot's real states")
 
 
 def held_out(chain: Chain, place: Path, seed: int, console: Any) -> Batch:

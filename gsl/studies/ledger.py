@@ -21,6 +21,7 @@ from gsl.storage.references import resolve
 from gsl.storage.versions import commit
 from gsl.studies.duration import told
 from gsl.studies.ledger_file import MADE_BY, RECIPE, Figures, read
+from gsl.studies.sizes import numbers
 
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
 MADE = ("forward_model", "inverse_model", "diagnosis")  # of a grounding: names of what a trial makes itself
@@ -51,7 +52,7 @@ def recipe(*parts: Any) -> str:
 def recipes(study: Any) -> dict[int, str]:
     """Return by number the recipes of a study whose trials need all of its settings but which they are."""
     one = replace(study, trials=1, first=1, known=None)
-    return {number: recipe(one, number) for number in range(study.first, study.first + study.trials)}
+    return {number: recipe(one, number) for number in numbers(study.first, study.trials)}
 
 
 def known_parents(known: str | tuple[str, ...] | None, name: str) -> dict[str, Path]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import partial
 from itertools import product
@@ -99,8 +99,12 @@ class NoiseStudy:
         with console.progress(len(jobs), "trials") as progress:
             for index, found in arriving(_trial, self, jobs, self.workers, progress):
                 ledger.add(keys[jobs[index][0]], [one._asdict() for one in found])
-        made = ledger.close(folder / DATA)
         points = [Point(**row) for row in ledger.figures]
+        self.tell(folder, points, ledger.close(folder / DATA))
+        return {"points": len(points)}
+
+    def tell(self, folder: Path, points: Sequence[Point], made: str) -> None:
+        """Write the table and the figure of all points; `made` says who made them."""
         table = NoiseTable(
             points,
             places=[Place(*one) for one in product(self.worlds, self.noises, self._rounds)],
@@ -114,7 +118,6 @@ class NoiseStudy:
             f"{table.told(*self._below)}\n{sizes_of(self.preset_name)} {made}\n", encoding="utf-8"
         )
         self._draw(folder / FIGURE, table)
-        return {"points": len(points)}
 
     def _draw(self, path: Path, table: NoiseTable) -> None:
         """Draw the returns against the noise, or against the rounds if there are several of these and one noise."""

@@ -25,7 +25,7 @@ class Table2:
 
     Winners of generations are measured in the episodes of the choice, up to their first fall: a winner is stable if it
     fell in none, and improving if it was faster than π0 besides. A trial without an improving winner is what the paper
-    counts as a failure; one without a gain is that, or its returned policy is not surely better in fresh episodes.
+    counts as a failure; in one without a gain the returned policy falls in fresh episodes, or is not surely better.
 
     Action noise is told for every width; the best of them by real figures is an oracle, which knows what no user knows
     beforehand.
@@ -45,11 +45,13 @@ class Table2:
             *("without an improving winner", "best generation", "stable winners", "improving winners"),
             "last generation's improves",
             *(f"π0 and returned [{task.unit}]", "falls", "refused", "rank"),
-            *("real episodes", "paper: improvement [%]", "paper: without", "paper: best generation"),
+            *("real episodes", "paper: improvement [%]", "paper: without an improving winner"),
+            "paper: best generation",
         )
         rows = [
             (*one.cells(where), self._named(one, found))
-            + (*improvement_cells(one), f"{one.without} of {one.trials}", _failures(trials, one), one.best_generation)
+            + (*improvement_cells(one), f"{one.without} of {one.trials}")
+            + (f"{one.unimproved} of {one.trials}", one.best_generation)
             + (f"{one.stable} of {one.winners}", f"{one.improving} of {one.winners}", _last(trials, one, task))
             + (_speeds(trials, one, task), str(one.falls), f"{one.refused} of {one.trials}")
             + ("" if one.rank is None else f"{one.rank.mean:.2f}", f"{one.real_episodes:.0f}")
@@ -100,11 +102,6 @@ def _apart(trials: Sequence[Trial], one: Summary, other: str) -> str:
         return ""
     found = differences(trials, cell, other)
     return f"{found.mean:+.1f} ({told(found)})"
-
-
-def _failures(trials: Sequence[Trial], one: Summary) -> str:
-    """Return in how many trials no generation found a policy that improved in the episodes of the choice."""
-    return f"{sum(trial.improving == 0 for trial in one.own(trials))} of {one.trials}"
 
 
 def _last(trials: Sequence[Trial], one: Summary, task: Task) -> str:

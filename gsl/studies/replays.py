@@ -30,10 +30,10 @@ from gsl.stages.training import degrees, of_policy
 from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import finely
 from gsl.studies.effort import seconds
-from gsl.studies.held_out import MEASURED, check_first, held_out, starts
+from gsl.studies.held_out import MEASURED, check_first_iteration, check_robot, held_out, starts
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.method_colour import method_colour
-from gsl.studies.sizes import First, PresetName, sizes_of, trials_of
+from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.world import World
 
@@ -129,7 +129,7 @@ class Replays:
                 with console.part(f"{world}, {method}, trial {number}"):
                     ledger.add(key, [self._replay(home, number, world, method, console)._asdict()])
         rows = [Replay(**row) for row in ledger.figures]
-        self._told(folder, rows, ledger.close(folder / DATA))
+        self.tell(folder, rows, ledger.close(folder / DATA))
         return {"replays": len(rows)}
 
     def _check(self) -> None:
@@ -139,16 +139,15 @@ class Replays:
             check_trainable(self.iterate, f"methods.{name}", grounding)
         for name, world in self.worlds.items():
             check_alike(self.iterate.sim.layout, world.layout)
-            if world.layout.states:
-                raise ConfigError(f"worlds.{name}", "is no robot; replays begin in a robot's real states")
-        check_first(self.iterate)
+            check_robot(world, f"worlds.{name}")
+        check_first_iteration(self.iterate)
 
     @property
     def recipes(self) -> dict[tuple[int, str, str], str]:
         """By trial, world and method, in the order in which they are run."""
         return {
             (k, world, method): recipe(self.iterate, k, world, method, self.worlds[world], self.methods[method])
-            for k, world, method in product(range(self.first, self.first + self.trials), self.worlds, self.methods)
+            for k, world, method in product(numbers(self.first, self.trials), self.worlds, self.methods)
         }
 
     def _replay(self, home: Path, number: int, world: str, method: str, console: Any) -> Replay:
@@ -185,7 +184,8 @@ class Replays:
             replays=len(after[TICKS]),
         )
 
-    def _told(self, folder: Path, rows: Sequence[Replay], made: str) -> None:
+    def tell(self, folder: Path, rows: Sequence[Replay], made: str) -> None:
+        """Write the table and the figure of all replays; `made` says who made them."""
         first, shown, panels = next(iter(self.methods)), [], dict[str, dict[str, Dots]]()
         for world, method in product(self.worlds, self.methods):
             own, bare = ([one for one in rows if (one.world, one.method) == (world, name)] for name in (method, first))

@@ -12,6 +12,11 @@ PresetName = Annotated[str, setting("preset that the sizes come from, as the tab
 First = Annotated[int, setting("number of the first trial; trials of one number have the same seeds", ge=1)]
 
 
+def numbers(first: int, count: int) -> range:
+    """Return those of the trials."""
+    return range(first, first + count)
+
+
 def sizes_of(preset_name: str) -> str:
     """Return the words for it."""
     return (
