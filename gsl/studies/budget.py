@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
@@ -23,7 +25,7 @@ from gsl.stages.iterate import Iterate, check_trainable
 from gsl.stages.rollout import Scenario
 from gsl.stages.training import FEWEST, degrees
 from gsl.studies.compare import Compare
-from gsl.studies.comparison_table import finely
+from gsl.studies.comparison_table import finely, told_difference
 from gsl.studies.comparison_table import told as bounds
 from gsl.studies.effort import check_search, seconds
 from gsl.studies.held_out import MEASURED, check_first_iteration, check_robot, held_out, starts
@@ -172,19 +174,21 @@ class Budget:
         """Write the table and the figure of all points; `made` says who made them."""
         shown, unit = self.iterate.task.shown, self.iterate.task.unit
         rows, values, errors, fewest = [], {}, {}, self.budgets[0]
-        none = {one.trial: shown * one.value for one in points if one.method == NONE}
+        none = [shown * one.value for one in points if one.method == NONE]
+        plain = mean_interval(list({one.trial: one.bare for one in points if one.bare is not None}.values()))
         for method in self.methods:
             cells = [[one for one in points if one.method == method and one.trajectories == n] for n in self.budgets]
-            means = [{one.trial: shown * one.value for one in cell} for cell in cells]
-            wrong = [{one.trial: one.error for one in cell if one.error is not None} for cell in cells]
-            values[method] = Line(self.budgets, [_over(cell) for cell in means])
-            errors[method] = Line(self.budgets, [_over(cell) for cell in wrong])
-            for n, value, error in zip(self.budgets, means, wrong, strict=True):
-                more = "" if n == fewest else _apart(error, wrong[0])
-                returns = *_cells(value, ".1f", bounds), _apart(value, none, ".1f", bounds)
-                rows.append((method, str(n), *returns, *_cells(error, ".2f", finely), more))
-        plain = {one.trial: one.bare for one in points if one.bare is not None}
-        rows.append((NONE, "0", *_cells(none, ".1f", bounds), "", *_cells(plain, ".2f", finely), ""))
+            returns = [[shown * one.value for one in cell] for cell in cells]
+            wrong = [[one.error for one in cell if one.error is not None] for cell in cells]
+            values[method] = Line(self.budgets, list(map(mean_interval, returns)))
+            errors[method] = Line(self.budgets, list(map(mean_interval, wrong)))
+            for n, value, error in zip(self.budgets, returns, wrong, strict=True):
+                more, farther = (mean_interval(np.subtract(*pair)) for pair in ((value, none), (error, wrong[0])))
+                than = "" if n == fewest else told_difference(farther, fine=True)
+                cells_of_error = (*_cells(mean_interval(error), fine=True), than)
+                rows.append((method, str(n), *_cells(mean_interval(value)), told_difference(more), *cells_of_error))
+        without = mean_interval(none)
+        rows.append((NONE, "0", *_cells(without), "", *_cells(plain, fine=True), ""))
         titles = (
             *("grounding", "real trajectories collected", f"in real [{unit}]", "95 % interval", f"minus {NONE}"),
             *("joints after 0.2 s, off π0 [°]", "95 % interval", f"minus those of {fewest}"),
@@ -192,25 +196,10 @@ class Budget:
         below = f"{MEASURED}\n\n{sizes_of(self.preset_name)} {trials_of(self.first, self.trials)}. {made}\n"
         (folder / TABLE).write_text(f"{table(titles, rows)}\n{PAIRED}\n\n{below}", encoding="utf-8")
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
-        bases = dict(zip(panels, (_over(none).mean, _over(plain).mean), strict=True))
+        bases = dict(zip(panels, (without.mean, plain.mean), strict=True))
         budget_curve(folder / FIGURE, panels, bases, "What a grounding makes of more real data")
 
 
-def _over(by_trial: Mapping[int, float]) -> Interval:
-    return mean_interval(list(by_trial.values()))
-
-
-def _cells(by_trial: Mapping[int, float], form: str, told: Callable[[Interval], str]) -> tuple[str, str]:
-    """Return a mean and its interval."""
-    return f"{_over(by_trial).mean:{form}}", told(_over(by_trial))
-
-
-def _apart(
-    by_trial: Mapping[int, float],
-    others: Mapping[int, float],
-    form: str = ".2f",
-    told: Callable[[Interval], str] = finely,
-) -> str:
-    """Return by how much figures are above others of the same trials."""
-    found = mean_interval([figure - others[trial] for trial, figure in by_trial.items()])
-    return f"{found.mean:+{form}} ({told(found)})"
+def _cells(found: Interval, *, fine: bool = False) -> tuple[str, str]:
+    """Return a mean and its interval; `fine` of degrees."""
+    return (f"{found.mean:.2f}", finely(found)) if fine else (f"{found.mean:.1f}", bounds(found))

@@ -56,6 +56,11 @@ def finely(interval: Interval) -> str:
     return "-" if math.isinf(interval.lower) else f"{interval.lower:.2f} to {interval.upper:.2f}"
 
 
+def told_difference(difference: Interval, *, fine: bool = False) -> str:
+    """Return a difference and its bounds for people; `fine` of degrees."""
+    return f"{difference.mean:+.2f} ({finely(difference)})" if fine else f"{difference.mean:+.1f} ({told(difference)})"
+
+
 def starred(trials: Sequence[Trial]) -> str:
     """Return what a star behind a trial's figure says: of several iterations it is of that one alone."""
     then = " by that iteration" if any(trial.iteration > 1 for trial in trials) else ""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence, Set
-from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,7 +20,6 @@ from gsl.storage.references import resolve
 from gsl.storage.versions import commit
 from gsl.studies.duration import told
 from gsl.studies.ledger_file import MADE_BY, RECIPE, Figures, read
-from gsl.studies.sizes import numbers
 
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
 MADE = ("forward_model", "inverse_model", "diagnosis")  # of a grounding: names of what a trial makes itself
@@ -47,12 +45,6 @@ def recipe(*parts: Any) -> str:
     files = {name: file_hash(path) for name, path in read_files(list(parts)).items()}
     told = text([_effective(described(list(parts))), files])
     return hashlib.sha256(told.encode()).hexdigest()[:DIGITS]
-
-
-def recipes(study: Any) -> dict[int, str]:
-    """Return by number the recipes of a study whose trials need all of its settings but which they are."""
-    one = replace(study, trials=1, first=1, known=None)
-    return {number: recipe(one, number) for number in numbers(study.first, study.trials)}
 
 
 def known_parents(known: str | tuple[str, ...] | None, name: str) -> dict[str, Path]:

@@ -30,9 +30,9 @@ from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
-from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipes
+from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.noise_table import REFERENCE, NoiseTable, Place, Point
-from gsl.studies.sizes import First, PresetName, sizes_of, trials_of
+from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import GymnasiumWorld, try_out
 from gsl.worlds.world import World
@@ -92,7 +92,7 @@ class NoiseStudy:
         try_out({"iterate.sim": self.iterate.sim, **named})
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
-        keys = recipes(self)
+        keys = self.recipes
         ledger.announce({key: f"trial {number}" for number, key in keys.items()})
         known = {number for number, key in keys.items() if ledger.take(key, trial=number)}
         jobs = [(number, home) for number in keys if number not in known]
@@ -102,6 +102,12 @@ class NoiseStudy:
         points = [Point(**row) for row in ledger.figures]
         self.tell(folder, points, ledger.close(folder / DATA))
         return {"points": len(points)}
+
+    @property
+    def recipes(self) -> dict[int, str]:
+        """By number: a trial needs all settings but which trials there are."""
+        one = replace(self, trials=1, first=1, known=None)
+        return {number: recipe(one, number) for number in numbers(self.first, self.trials)}
 
     def tell(self, folder: Path, points: Sequence[Point], made: str) -> None:
         """Write the table and the figure of all points; `made` says who made them."""

@@ -10,7 +10,7 @@ import numpy as np
 from gsl.core.setting import component, setting
 from gsl.report.markdown import table
 from gsl.studies.comparison import Summary, differences, orders, summaries
-from gsl.studies.comparison_table import places, told
+from gsl.studies.comparison_table import places, told_difference
 from gsl.studies.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, worth
 from gsl.studies.trial import Cell, Trial
 from gsl.tasks.task import Task
@@ -100,8 +100,7 @@ def _apart(trials: Sequence[Trial], one: Summary, other: str) -> str:
     tried = {trial.method for trial in pair}
     if one.method == other or other not in tried or any(trial.improvement is None for trial in pair):
         return ""
-    found = differences(trials, cell, other)
-    return f"{found.mean:+.1f} ({told(found)})"
+    return told_difference(differences(trials, cell, other))
 
 
 def _last(trials: Sequence[Trial], one: Summary, task: Task) -> str:

@@ -16,7 +16,7 @@ from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval, wilson
 from gsl.report.markdown import table
 from gsl.studies.comparison import differences, summaries
-from gsl.studies.comparison_table import places, told
+from gsl.studies.comparison_table import places, told, told_difference
 from gsl.studies.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, value_cells, worth
 from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
@@ -152,10 +152,10 @@ class Figure5:
         where = places(found)
         for one in found:
             own = one.own(trials)
-            apart = differences(trials, own[0].cell, first, _on_average)
+            farther = differences(trials, own[0].cell, first, _on_average)
             cells = (
                 *_degrees(map(_on_average, own)),
-                "" if one.method == first else f"{apart.mean:+.1f} ({told(apart)})",
+                "" if one.method == first else told_difference(farther),
                 *_degrees(trial.last[AT_THE_END] for trial in own),
                 f"{sum(trial.last[ABOVE] > 0.0 for trial in own)} of {len(own)}",
                 *_degrees(trial.outcome[ON_AVERAGE] for trial in own),

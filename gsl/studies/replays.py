@@ -28,7 +28,7 @@ from gsl.stages.iterate import Iterate, check_trainable
 from gsl.stages.rollout import Scenario
 from gsl.stages.training import degrees, of_policy
 from gsl.studies.compare import Compare
-from gsl.studies.comparison_table import finely
+from gsl.studies.comparison_table import finely, told_difference
 from gsl.studies.effort import seconds
 from gsl.studies.held_out import MEASURED, check_first_iteration, check_robot, held_out, starts
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
@@ -190,12 +190,12 @@ class Replays:
         for world, method in product(self.worlds, self.methods):
             own, bare = ([one for one in rows if (one.world, one.method) == (world, name)] for name in (method, first))
             joints = mean_interval([one.joints for one in own])
-            apart = mean_interval([one.joints - other.joints for one, other in zip(own, bare, strict=True)])
+            nearer = mean_interval([one.joints - other.joints for one, other in zip(own, bare, strict=True)])
             reach = [100.0 * one.unreached for one in own if one.unreached is not None]
             means = [f"{np.mean([getattr(one, name) for one in own]):{form}}" for name, form in MEANS.items()]
             few = f" ({len(reach)} of {len(own)} trials)" if 0 < len(reach) < len(own) else ""
             last = f"{np.mean(reach):.0f}{few}" if reach else ""
-            than = "" if method == first else f"{apart.mean:+.2f} ({finely(apart)})"
+            than = "" if method == first else told_difference(nearer, fine=True)
             shown.append((world, method, f"{joints.mean:.2f}", finely(joints), than, *means, last))
             dots = Dots([one.joints for one in own], [False] * len(own), method_colour(self.methods[method]))
             panels.setdefault(world, {})[method] = dots
