@@ -98,6 +98,15 @@ def test_the_same_work_is_not_done_twice_but_looks_fresh(out: Path) -> None:
     assert time.time() - (out / "manifest.json").stat().st_mtime < 60
 
 
+def test_only_a_component_has_workers_that_change_nothing(out: Path) -> None:
+    robot = {"_target_": "Robot", "requests": 1}
+    built(Doubling(), out, workers=1, world=robot, kwargs={"workers": 1})
+    again = built(Doubling(), out, workers=2, world={**robot, "requests": 2}, kwargs={"workers": 1})
+    assert again.unchanged
+    with pytest.raises(ArtifactError, match=r"changed: kwargs\.workers 1 -> 2"):
+        built(Doubling(), out, workers=1, world=robot, kwargs={"workers": 2})
+
+
 def test_a_changed_setting_is_refused_by_name(out: Path) -> None:
     built(Doubling(), out, world={"period": 0.02})
     stage = Doubling(2)

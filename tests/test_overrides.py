@@ -58,6 +58,8 @@ def test_rewriting_twice_changes_nothing_more() -> None:
         ("effects.backlash", "effects.backlash"),
         ("world.effects", ""),
         ("side_effects.backlash", ""),
+        ("methods.effects.inner", ""),
+        ("methods.effects.effects.backlash.width", "methods.effects.effects.backlash"),
     ],
 )
 def test_the_path_of_an_effect_is_found_in_a_key(key: str, path: str) -> None:

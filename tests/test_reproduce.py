@@ -15,7 +15,7 @@ from gsl.errors import ArtifactError
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
-from gsl.studies.duration import told
+from gsl.studies.duration import duration_told
 from gsl.studies.ledger import Ledger, recipe
 from gsl.studies.paper_cells import one_by_one
 from gsl.studies.paper_table_2 import Table2
@@ -133,6 +133,12 @@ def test_a_trace_is_of_a_joint_that_the_models_know(tmp_path: Path) -> None:
         ("fig6 duration=0.001", "duration = 0.001: is less than a tick, 0.02 s"),
         ("fig7 begin=50 iterate.task.duration=1.2", "begin = 50: π0's real walk is over after "),
         ("budget +grounding@methods.none=gat", "methods.none: is what all others are set against; take another name"),
+        ("fig13 noises=[0.6,0.6]", "noises = [0.6,0.6]: are to rise, the least of them first"),
+        ("fig11 noises=[0.5,0.5]", "noises = [0.5,0.5]: are to rise, the least of them first"),
+        (
+            "table2 methods.effects.diagnosis=mine",
+            "methods.effects.diagnosis: is made here; gsl optimize takes one that is there",
+        ),
         ("budget budgets=[2]", "budgets.0 = 2: must be at least 3"),
         (
             "budget world@iterate.sim=inverted_pendulum world@iterate.real=inverted_pendulum_noisy"
@@ -173,6 +179,10 @@ def test_a_ledger_only_grows(tmp_path: Path) -> None:
     after.add("b", [{"number": 2, "value": 3.0}])
     assert {row["recipe"]: row["value"] for row in json.loads(path.read_text())} == {"b": 3.0, "a": 1.0, "c": 2.0}
     assert after.take("a") and after.figures == [{"number": 1, "value": 1.0}, {"number": 2, "value": 3.0}]
+    meanwhile = Ledger(path, {}, Figure, Silent())
+    after.add("e", [{"number": 5, "value": 5.0}])
+    meanwhile.add("f", [{"number": 6, "value": 6.0}])
+    assert {row["recipe"] for row in json.loads(path.read_text())} == {*"abcef"}
     with pytest.raises(ArtifactError, match="is what this study writes"):
         Ledger(path, {"known": path}, Figure, Silent())
     with pytest.raises(ArtifactError, match=r"say number 2 says 1; leave it out"):
@@ -262,7 +272,10 @@ def test_a_recipe_is_of_what_a_trial_comes_from(tmp_path: Path) -> None:
     assert first == recipe(world, ActionTransformation("two/train_forward", "two/train_inverse"), 1)
     assert first != recipe(world, gat, 2) and first != recipe(replace(world, step=0.001), gat, 1)
     search = CmaEs(candidates=4, generations=2)
-    assert recipe(search, {"workers": 1}) == recipe(search, {"workers": 2}) != recipe(replace(search, sigma=0.1), {})
+    assert recipe(search, world) != recipe(replace(search, sigma=0.1), world)
+    idle = {"workers": 2, "preset_name": "quick", "first": 1, "diagnosis": "one"}
+    assert recipe({"_target_": "Stage", **idle}) == recipe({"_target_": "Stage"})
+    assert all(recipe({"kwargs": {name: value}}) != recipe({"kwargs": {}}) for name, value in idle.items())
     assert recipe(ModelConfig()) != recipe(ModelConfig(covariance="full"))
     (tmp_path / "arm.urdf").write_text(text.replace('<mass value="', '<mass value="1'))
     assert recipe(world, gat, 1) != first
@@ -321,7 +334,7 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     assert points[1]["error"] != points[3]["error"]
     assert len(list((tmp_path / "runs/budget").rglob("collect_real"))) == 2  # what the methods share
     refused = gsl("reproduce", "budget", *few, "budgets=[6,6]", "name=n", folder=tmp_path)
-    assert refused.lines == ["gsl reproduce budget: budgets = [6,6]: are to rise, the fewest first"]
+    assert refused.lines == ["gsl reproduce budget: budgets = [6,6]: are to rise, the least of them first"]
     assert points[1]["bare"] == points[4]["bare"]  # measured on the same trajectories
     assert (folder / "budget.png").stat().st_size > 10_000
     assert " otherwise. 1 trial. Made: trial 1 by " in (folder / "table.md").read_text()
@@ -515,4 +528,4 @@ def test_figure_5_is_told_in_degrees() -> None:
     ("seconds", "text"), [(20.0, "about 1 minute"), (600.0, "about 10 minutes"), (36000.0, "about 10.0 hours")]
 )
 def test_durations_are_told_as_people_do(seconds: float, text: str) -> None:
-    assert told(seconds) == text
+    assert duration_told(seconds) == text

@@ -18,8 +18,8 @@ from gsl.stages.headline import Unit
 from gsl.studies import budget, noise_table
 from gsl.studies.budget import Budget
 from gsl.studies.compare import Compare
-from gsl.studies.comparison import summaries
-from gsl.studies.comparison_table import markdown
+from gsl.studies.comparison import differences, summaries
+from gsl.studies.comparison_table import bounds, markdown, told_difference
 from gsl.studies.noise import NoiseStudy
 from gsl.studies.paper_cells import one_by_one
 from gsl.studies.replays import Replay, Replays
@@ -99,6 +99,34 @@ def test_a_page_tells_what_is_committed(typed: list[str], tmp_path: Path) -> Non
     assert text.strip() in table.read_text(encoding="utf-8")
 
 
+def trials_of(*names: str) -> list[Trial]:
+    """The trials of committed studies of one iteration."""
+    rows = [
+        row for name in names for row in json.loads((ROOT / "docs/results" / name / "trials.json").read_text("utf-8"))
+    ]
+    return [Trial(**{name: row[name] for name in Trial._fields if name in row}) for row in rows]
+
+
+def test_the_aims_of_table_2_stand_beside_its_trials() -> None:
+    """Of the first ten trials, of all twenty, and of ten in which the real world is the simulator."""
+    ten, twenty = trials_of("table2"), trials_of("table2", "table2_again")
+    whole = (ROOT / "docs/results/README.md").read_text(encoding="utf-8")
+    rows = next(rows for _, titles, rows in tables(whole) if titles[:3] == ["real world", "trials", "grounding"])
+    assert len(rows) == 20
+    for place, count, named, gain, more, without, unimproved in rows:
+        world, method = place.strip("`"), named.strip("`")
+        among = ten if count == "10" else twenty
+        if method.startswith("no gap"):
+            without_gap = [one._replace(method=method) for one in trials_of(world.replace("nao", "table2_in"))]
+            among = [*among, *(one for one in without_gap if one.world == world)]
+        own = [one for one in among if (one.world, one.method) == (world, method)]
+        (found,) = summaries(own)
+        assert found.improvement is not None and found.trials == int(count)
+        assert gain == f"{found.improvement.mean:.1f} ({bounds(found.improvement)})"
+        assert more == ("" if method == "none" else told_difference(differences(among, own[0].cell, "none")))
+        assert (without, unimproved) == (f"{found.without} of {count}", f"{found.unimproved} of {count}")
+
+
 def by_number(study: Any) -> dict[int, set[str]]:
     """The recipes of each trial."""
     found: dict[int, set[str]] = {}
@@ -157,5 +185,5 @@ def test_a_page_repeats_its_tables_to_the_letter() -> None:
                 repeated[page.stem] += 1
                 same = [(len(part), worlds) for part in of for worlds, below in part.items() if below == rows]
                 assert any(count == 1 or all(name in before for name in worlds) for count, worlds in same), page
-    once = ("budget", "fig13", "garat", "linear-walk", "replays", "table2-paper", "table3", "table4", "worlds")
+    once = ("budget", "fig5", "fig13", "garat", "linear-walk", "replays", "table2-paper", "table3", "table4", "worlds")
     assert repeated == {**dict.fromkeys(once, 1), "table2": 2, "fig12": 2}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -29,6 +30,8 @@ from gsl.effects import __path__ as effects_path
 from gsl.errors import ConfigError, InputError
 
 REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
+WHOLE = ("iterate", "compare", "reproduce")  # commands that make what a grounding refers to
+MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis)")
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,7 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
         raise unfit(command, arguments, unknown_key(error)) or translated(error, words) from error
     _check_effects(composition)
     _check_referred(command, composition)
+    _check_made(command, composition)
     config = plain(composition.config)
     strangers = config.keys() - declared(config).keys() - plain(base).keys() - {*COMMAND_KEYS}
     if misfit := unfit(command, arguments, min(strangers, default=None)):
@@ -168,6 +172,13 @@ def _check_referred(command: str, composition: Composition) -> None:
             others = [one for one in keys if one.rpartition(".")[2] == last]
             hint = f"; did you mean {' or '.join(others[:3])}?" if others else ""
             raise ConfigError(key, f"nothing in gsl {command} refers to it here{hint}")
+
+
+def _check_made(command: str, composition: Composition) -> None:
+    """Refuse models and diagnoses that a command would make anew."""
+    if command.startswith(WHOLE):
+        for key in filter(MADE.fullmatch, map(key_of, composition.overrides)):
+            raise ConfigError(key, "is made here; gsl optimize takes one that is there")
 
 
 def _added_where_declared(command: str, overrides: list[str], multirun: bool) -> Composition:

@@ -25,7 +25,7 @@ FILE_GROUPS = ("mapping",)
 """Groups of which a path to a yaml file of one's own is an option, too."""
 _ROOT = "../" * 64  # from whatever folder of configuration, up to the root of the file system
 
-_EFFECT = re.compile(r"(?:.*\.)?effects\.[A-Za-z_]\w*")
+_EFFECT = re.compile(r"(?:.*\.)?(?<!methods\.)effects\.[A-Za-z_]\w*")  # `methods.effects` is a method of that name
 
 
 def rewrite(arguments: Iterable[str], chosen: Collection[str]) -> list[str]:

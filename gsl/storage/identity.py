@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ class Identity:
         return {name: value for name, value in named.items() if isinstance(value, int)}
 
 
-WITHOUT_EFFECT = ("workers", "requests")  # settings on which no result depends
+WITHOUT_EFFECT = ("workers", "requests")  # settings of components on which no result depends
 
 
 def identify(kind: str, config: Mapping[str, Any], parents: Mapping[str, Path]) -> Identity:
@@ -58,12 +58,24 @@ def identify(kind: str, config: Mapping[str, Any], parents: Mapping[str, Path]) 
     places = {os.path.abspath(path) for path in parents.values()}
     settings = {
         name: value
-        for name, value in flat(documents.plain(config)).items()
-        if name.rpartition(".")[2] not in WITHOUT_EFFECT
-        and not (isinstance(value, str) and (name in parents or os.path.abspath(value) in places))
+        for name, value in flat(without(documents.plain(config), lambda name, _: name in WITHOUT_EFFECT)).items()
+        if not (isinstance(value, str) and (name in parents or os.path.abspath(value) in places))
     }
     hashes = {role: content_hash(path) for role, path in parents.items()}
     return Identity(kind, settings, hashes, sources_hash())
+
+
+def without(told: Any, idle: Callable[[str, Any], bool]) -> Any:
+    """Return components as plain data without their idle settings; plain mappings, as an environment's, keep theirs.
+
+    Args:
+        told: Components, nested, each a mapping with a `_target_`.
+        idle: Says of a component's setting, by name and value, whether it is left out.
+    """
+    if isinstance(told, dict):
+        component = "_target_" in told
+        return {key: without(one, idle) for key, one in told.items() if not (component and idle(key, one))}
+    return [without(one, idle) for one in told] if isinstance(told, list) else told
 
 
 def content_hash(path: Path) -> str:

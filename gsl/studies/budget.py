@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -25,12 +25,11 @@ from gsl.stages.iterate import Iterate, check_trainable
 from gsl.stages.rollout import Scenario
 from gsl.stages.training import FEWEST, degrees
 from gsl.studies.compare import Compare
-from gsl.studies.comparison_table import finely, told_difference
-from gsl.studies.comparison_table import told as bounds
+from gsl.studies.comparison_table import bounds, finely, told_difference
 from gsl.studies.effort import check_search, seconds
 from gsl.studies.held_out import MEASURED, check_first_iteration, check_robot, held_out, starts
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
-from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
+from gsl.studies.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
 from gsl.tasks.task import REAL, SIM
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
@@ -84,9 +83,7 @@ class Budget:
 
     def __post_init__(self) -> None:
         """Refuse a curve that goes back, or counts a budget twice."""
-        if any(after <= before for before, after in pairwise(self.budgets)):
-            given = ",".join(map(str, self.budgets))
-            raise ConfigError("budgets", "are to rise, the fewest first", given=f"[{given}]")
+        check_rising("budgets", self.budgets)
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""

@@ -20,7 +20,7 @@ from gsl.report.markdown import table as markdown
 from gsl.report.noise_curve import Curve, noise_curve
 from gsl.stages.headline import several
 from gsl.storage.documents import write_json
-from gsl.studies.sizes import PresetName, sizes_of
+from gsl.studies.sizes import PresetName, check_rising, sizes_of
 from gsl.worlds.gymnasium import GymnasiumWorld
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "figure_11.png"
@@ -67,6 +67,10 @@ class Figure11:
     evaluations: Annotated[int, setting("real episodes that estimate the return", ge=1)] = 10_000
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
     preset_name: PresetName = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a curve that goes back, or counts a noise twice."""
+        check_rising("noises", self.noises)
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here."""
@@ -118,27 +122,31 @@ def _of(points: Sequence[Point], method: str, noise: float) -> list[Point]:
 
 
 def _table(points: Sequence[Point], bounds: Mapping[float, tuple[float, float]]) -> str:
-    titles = ("noise", "edge path, exact", "real optimum, exact", "gat", "sgat", "sgat - gat", "sgat of optimum")
+    titles = (
+        *("noise", "edge path, exact", "real optimum, exact", "gat", "sgat", "sgat - gat", "sgat of optimum"),
+        *(f"real episodes of {method}" for method in METHODS),
+    )
     rows = []
     for noise, (edge, best) in bounds.items():
         each = {method: [one.value for one in _of(points, method, noise)] for method in METHODS}
         apart = mean_interval(np.subtract(each["sgat"], each["gat"]))
         told = [_told(mean_interval(values)) for values in each.values()]
         share = f"{100 * np.mean(each['sgat']) / best:.1f} %" if best > 0.0 else "-"
-        rows.append((f"{noise:g}", f"{edge:.2f}", f"{best:.2f}", *told, _told(apart), share))
+        spent = (_episodes(_of(points, method, noise)) for method in METHODS)
+        rows.append((f"{noise:g}", f"{edge:.2f}", f"{best:.2f}", *told, _told(apart), share, *spent))
     effort = []
     for method in METHODS:
         own = [one for one in points if one.method == method]
         open_ends = sum(not one.converged for one in own)
         rounds = f"{np.mean([one.rounds for one in own]):.1f}"
-        effort.append((method, rounds, f"{open_ends} of {len(own)}", _episodes(points, method)))
+        effort.append((method, rounds, f"{open_ends} of {len(own)}", _episodes(own)))
     off = max(abs(one.estimate - one.value) for one in points)
     below = f"\nEstimates from real episodes are off the exact values by {off:.2f} at most.\n\n"
     return markdown(titles, rows) + below + markdown(("grounding", "rounds", "not converged", "real episodes"), effort)
 
 
-def _episodes(points: Sequence[Point], method: str) -> str:
-    spent = [one.real_episodes for one in points if one.method == method]
+def _episodes(points: Sequence[Point]) -> str:
+    spent = [one.real_episodes for one in points]
     return f"{np.mean(spent):.0f} ({min(spent)} to {max(spent)})"
 
 

@@ -36,8 +36,8 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
         single.append((*where, one.method, ", ".join(values)))
         if one.method != first:
             apart = differences(trials, Cell(*one[:4]), first, attrgetter(figure))
-            bounds = own.interval([apart.lower, apart.upper])
-            paired.append((*where, f"{one.method} - {first}", own.bare(apart.mean, sign=True), bounds))
+            cells = (own.bare(apart.mean, sign=True), own.interval([apart.lower, apart.upper]))
+            paired.append((*where, f"{one.method} - {first}", *cells))
     parts = [table(tuple(columns), list(zip(*columns.values(), strict=True)))]
     if paired:
         parts.append(f"Differences of the {shown}, paired by trial{' (percentage points)' * as_shares}:\n")
@@ -46,7 +46,7 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
     return "\n".join([*parts, table((*titles, "grounding", "trials"), single)])
 
 
-def told(interval: Interval, *, sign: bool = False) -> str:
+def bounds(interval: Interval, *, sign: bool = False) -> str:
     """Return the bounds of an interval for people."""
     return SHARE.interval([interval.lower, interval.upper], sign=sign)
 
@@ -58,7 +58,8 @@ def finely(interval: Interval) -> str:
 
 def told_difference(difference: Interval, *, fine: bool = False) -> str:
     """Return a difference and its bounds for people; `fine` of degrees."""
-    return f"{difference.mean:+.2f} ({finely(difference)})" if fine else f"{difference.mean:+.1f} ({told(difference)})"
+    mean = difference.mean
+    return f"{mean:+.2f} ({finely(difference)})" if fine else f"{mean:+.1f} ({bounds(difference)})"
 
 
 def starred(trials: Sequence[Trial]) -> str:
@@ -86,7 +87,7 @@ def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]
             f"{unit.bare(one.value.mean)} ({unit.interval([one.value.lower, one.value.upper])})"
         ),
         "improvement in real [%] (95 %)": lambda one: (
-            "" if one.improvement is None else f"{one.improvement.mean:.1f} ({told(one.improvement)})"
+            "" if one.improvement is None else f"{one.improvement.mean:.1f} ({bounds(one.improvement)})"
         ),
         "trials without a gain": lambda one: f"{one.without} of {one.trials}",
         "stable winners": lambda one: f"{one.stable} of {one.winners}",

@@ -14,11 +14,11 @@ from gsl.core.setting import setting
 from gsl.errors import ArtifactError
 from gsl.storage.documents import text, write_json
 from gsl.storage.hashing import file_hash, sources_hash
-from gsl.storage.identity import WITHOUT_EFFECT
+from gsl.storage.identity import WITHOUT_EFFECT, without
 from gsl.storage.read_files import read_files
 from gsl.storage.references import resolve
 from gsl.storage.versions import commit
-from gsl.studies.duration import told
+from gsl.studies.duration import duration_told
 from gsl.studies.ledger_file import MADE_BY, RECIPE, Figures, read
 
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
@@ -43,8 +43,8 @@ def recipe(*parts: Any) -> str:
     Neither settings on which no result depends nor gsl's sources are part of it: rows say who made them.
     """
     files = {name: file_hash(path) for name, path in read_files(list(parts)).items()}
-    told = text([_effective(described(list(parts))), files])
-    return hashlib.sha256(told.encode()).hexdigest()[:DIGITS]
+    settings = text([without(described(list(parts)), _idle), files])
+    return hashlib.sha256(settings.encode()).hexdigest()[:DIGITS]
 
 
 def known_parents(known: str | tuple[str, ...] | None, name: str) -> dict[str, Path]:
@@ -80,7 +80,8 @@ class Ledger:
     def __init__(self, path: Path, known: Mapping[str, Path], kind: type[Figures], console: Any) -> None:
         self._path, self._console = path, console
         self._done: dict[str, list[dict[str, Any]]] = {}
-        self._kept = read(path, kind) if path.is_file() else {}
+        self._kind = kind
+        self._kept = self._here()
         self._known: dict[str, list[dict[str, Any]]] = {}
         self._from: dict[Path, Set[str]] = {}
         for file in dict.fromkeys(known.values()):
@@ -125,7 +126,7 @@ class Ledger:
             share = missing.total() / len(wanted)
             whose = some if share < 1.0 else "all of its results"
             self._console.status(
-                f"{told(seconds() * share)} for {whose}; a study that was stopped goes on where it was"
+                f"{duration_told(seconds() * share)} for {whose}; a study that was stopped goes on where it was"
             )
 
     def take(self, key: str, **of: Any) -> bool:
@@ -143,14 +144,15 @@ class Ledger:
             return False
         for name, value in of.items():
             right = value if isinstance(value, list) else [value] * len(rows)
-            if (told := [row[name] for row in rows]) != right:
-                problem = f"a trial whose settings (recipe {key}) say {name} {_told(right)} says {_told(told)}"
+            if (said := [row[name] for row in rows]) != right:
+                problem = f"a trial whose settings (recipe {key}) say {name} {_told(right)} says {_told(said)}"
                 raise ArtifactError(self._whose(key), f"{problem}; leave it out")
         self._write(key, rows)
         return True
 
     def add(self, key: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Write down a trial that has ended."""
+        """Write down a trial that has ended, beside those that another study of this name wrote meanwhile."""
+        self._kept = self._here()
         self._write(key, [{**row, RECIPE: key, MADE_BY: self._me} for row in rows])
 
     def close(self, path: Path) -> str:
@@ -166,6 +168,9 @@ class Ledger:
     def _whose(self, key: str) -> Path:
         """Return the file that a trial stands in."""
         return next((file for file, keys in self._from.items() if key in keys), self._path)
+
+    def _here(self) -> dict[str, list[dict[str, Any]]]:
+        return read(self._path, self._kind) if self._path.is_file() else {}
 
     def _rows_of(self, key: str) -> list[dict[str, Any]]:
         """Return the rows of a trial that is known, or that this version of gsl has made here."""
@@ -184,12 +189,10 @@ def _figures(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return [{name: value for name, value in row.items() if name not in (RECIPE, MADE_BY)} for row in rows]
 
 
-def _effective(told: Any) -> Any:
-    if isinstance(told, dict):
-        later = [key for key, value in LATER.items() if told.get(key) == value]
-        counts = {key: value for key, value in told.items() if key not in {*WITHOUT_EFFECT, *LABELS, *later}}
-        return {key: _effective(value) for key, value in counts.items() if not (key in MADE and isinstance(value, str))}
-    return [_effective(value) for value in told] if isinstance(told, list) else told
+def _idle(name: str, value: Any) -> bool:
+    """Return whether a trial does not depend on a component's setting."""
+    made_here = name in MADE and isinstance(value, str)
+    return made_here or name in (*WITHOUT_EFFECT, *LABELS) or (name in LATER and value == LATER[name])
 
 
 def _told(values: Sequence[Any]) -> str:

@@ -32,7 +32,7 @@ from gsl.stages.optimize import BEST
 from gsl.stages.population import Workers, arriving
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.noise_table import REFERENCE, NoiseTable, Place, Point
-from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
+from gsl.studies.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import GymnasiumWorld, try_out
 from gsl.worlds.world import World
@@ -73,6 +73,7 @@ class NoiseStudy:
 
     def __post_init__(self) -> None:
         """Refuse what only several rounds know, and rounds that go on from what nothing real has chosen."""
+        check_rising("noises", self.noises)
         check_aggregate(self.iterate, self.methods.values(), "iterate.aggregate")
         if self.iterate.iterations > 1 and self.choice == SIM:
             given = str(self.iterate.iterations)

@@ -10,7 +10,7 @@ from gsl.core.statistics import Interval
 from gsl.report.markdown import table
 from gsl.stages.headline import Unit
 from gsl.studies.comparison import Summary, summaries
-from gsl.studies.comparison_table import places, starred, told
+from gsl.studies.comparison_table import bounds, places, starred
 from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
 
@@ -38,7 +38,7 @@ def worth(trials: Sequence[Trial], task: Task) -> Drawn:
 
 def improvement_cells(one: Summary) -> tuple[str, str]:
     """Return a mean improvement and its interval [%], nothing where π0 is worth nothing."""
-    return ("", "") if one.improvement is None else (f"{one.improvement.mean:.1f}", told(one.improvement))
+    return ("", "") if one.improvement is None else (f"{one.improvement.mean:.1f}", bounds(one.improvement))
 
 
 def value_cells(interval: Interval, task: Task) -> tuple[str, str]:

@@ -16,7 +16,7 @@ from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval, wilson
 from gsl.report.markdown import table
 from gsl.studies.comparison import differences, summaries
-from gsl.studies.comparison_table import places, told, told_difference
+from gsl.studies.comparison_table import bounds, places, told_difference
 from gsl.studies.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, value_cells, worth
 from gsl.studies.trial import Trial
 from gsl.tasks.task import Task
@@ -186,7 +186,7 @@ def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *,
             continue
         apart = value_cells(differences(trials, cell, other, attrgetter("value")), task)
         fewer = differences(trials, cell, other, attrgetter("falls"))
-        counted = (f"{fewer.mean:+.1f}", told(fewer, sign=True)) if falls else ()
+        counted = (f"{fewer.mean:+.1f}", bounds(fewer, sign=True)) if falls else ()
         places_of = (getattr(cell, name) for name in where.values())
         rows.append((*places_of, f"{cell.method} - {other}", str(cell.iteration), *apart, *counted))
     counted = ("falls of a trial", "95 % interval") if falls else ()
@@ -201,7 +201,7 @@ def _on_average(trial: Trial) -> float:
 def _degrees(distances: Iterable[float]) -> tuple[str, str]:
     """Return the cells of a mean and its interval."""
     found = mean_interval(list(distances))
-    return f"{found.mean:.1f}", told(found)
+    return f"{found.mean:.1f}", bounds(found)
 
 
 def _share_of_falls(trials: Sequence[Trial]) -> Interval:

@@ -1,10 +1,13 @@
-"""What a study's table tells of its sizes: the preset that they come from, and which trials there are."""
+"""The sizes of a study: the preset that they come from, which trials there are, along what its curves go."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated
 
 from gsl.core.setting import setting
+from gsl.errors import ConfigError
 from gsl.stages.headline import several
 
 PresetName = Annotated[str, setting("preset that the sizes come from, as the table tells it; empty of none")]
@@ -15,6 +18,17 @@ First = Annotated[int, setting("number of the first trial; trials of one number 
 def numbers(first: int, count: int) -> range:
     """Return those of the trials."""
     return range(first, first + count)
+
+
+def check_rising(name: str, values: Sequence[float]) -> None:
+    """Refuse the values of a curve that goes back, or has one of them twice.
+
+    Raises:
+        ConfigError: Under the name of the setting.
+    """
+    if any(after <= before for before, after in pairwise(values)):
+        given = ",".join(f"{value:g}" for value in values)
+        raise ConfigError(name, "are to rise, the least of them first", given=f"[{given}]")
 
 
 def sizes_of(preset_name: str) -> str:

@@ -27,7 +27,7 @@ from gsl.stages.needed_model import extra_ticks
 from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.training import degrees
 from gsl.storage.models import read_forward_model, read_inverse_model
-from gsl.studies.duration import told
+from gsl.studies.duration import duration_told
 from gsl.studies.effort import seconds_of_models
 from gsl.studies.sizes import PresetName, sizes_of
 from gsl.tasks.task import REAL
@@ -136,7 +136,7 @@ class Figure7:
 def trained(iterate: Iterate, home: Path, console: Any) -> LoadedTransformation:
     """Return the grounding of an iteration's settings, alpha 1 for `auto`, trained below `home`."""
     assert isinstance(iterate.grounding, ActionTransformation), "_check has refused others"
-    console.status(f"{told(seconds_of_models(iterate))} from nothing; what is built is not built again")
+    console.status(f"{duration_told(seconds_of_models(iterate))} from nothing; what is built is not built again")
     chain = replace(iterate.chain, accept=True)
     ready = chain.trained(home, iterate.grounding, None, iterate.seed, console)
     loaded = ready.load(read_forward_model, read_inverse_model)
