@@ -194,7 +194,7 @@ class Budget:
         (folder / TABLE).write_text(f"{table(titles, rows)}\n{PAIRED}\n\n{below}", encoding="utf-8")
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
         bases = dict(zip(panels, (without.mean, plain.mean), strict=True))
-        budget_curve(folder / FIGURE, panels, bases, "What a grounding makes of more real data")
+        budget_curve(folder / FIGURE, panels, bases, "What a grounding makes of more real data, with 95 % intervals")
 
 
 def _cells(found: Interval, *, fine: bool = False) -> tuple[str, str]:

@@ -56,7 +56,10 @@ class Figure11:
     kind: ClassVar[str] = "reproduce"
 
     world: Annotated[GymnasiumWorld, setting("the cliff; its noise is replaced")]
-    noises: Annotated[tuple[float, ...], setting("chances that the real world replaces an action", min_length=1)]
+    noises: Annotated[
+        tuple[Annotated[float, setting("", ge=0, le=1)], ...],
+        setting("chances that the real world replaces an action", min_length=1),
+    ]
     trials: Annotated[int, setting("trials of each method and noise", ge=1)]
     episodes: Annotated[int, setting("real episodes of each grounding step", ge=1)] = 200
     explore: Annotated[float, setting("chance of a random action in them", ge=0, le=1)] = 0.2

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from gsl.core.described import described
 from gsl.core.setting import setting
-from gsl.errors import ArtifactError
+from gsl.errors import ArtifactError, ConfigError
 from gsl.storage.documents import text, write_json
 from gsl.storage.hashing import file_hash, sources_hash
 from gsl.storage.identity import WITHOUT_EFFECT, without
@@ -56,9 +56,12 @@ def known_parents(known: str | tuple[str, ...] | None, name: str) -> dict[str, P
 
     Raises:
         ArtifactError: There is none.
+        ConfigError: It is an empty list.
     """
     if isinstance(known, str):
         return {"known": _file(known, name)}
+    if known == ():
+        raise ConfigError("known", "is an empty list; leave it out")
     return {f"known.{index}": _file(one, name) for index, one in enumerate(known or ())}
 
 
@@ -119,6 +122,9 @@ class Ledger:
         for place, keys in {**self._from, self._path: here}.items():
             if keys := wanted.keys() & keys:
                 self._console.status(f"{len(keys)} of this study's {len(wanted)} results are in {place}")
+        if others := sum(key in self._kept for key in wanted.keys() - known - here):
+            problem = "are of another version of gsl and not taken; a copy of that file, given as known=, is"
+            self._console.status(f"{others} of this study's {len(wanted)} results in {self._path} {problem}")
         missing = Counter(name for key, name in wanted.items() if key not in known | here)
         if missing and seconds is not None:
             which = ", ".join(f"{name} ({count})" for name, count in missing.items())
@@ -158,7 +164,8 @@ class Ledger:
     def close(self, path: Path) -> str:
         """Write this study's trials to `path`; say what of the known ones is not among them, return who made which."""
         if unused := len(self._known.keys() - self._done.keys()):
-            self._console.status(f"{unused} of {len(self._known)} known trials are of other settings and were not used")
+            why = "are of other settings, methods or trials and were not used"
+            self._console.status(f"{unused} of {len(self._known)} known trials {why}")
         write_json(path, self._rows())
         made = _made(self._rows())
         if len(made) > 1:

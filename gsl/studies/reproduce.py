@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, fields
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 
@@ -48,6 +48,8 @@ class Reproduce(Compare):
             ConfigError: Its optimizer is no search.
         """
         check_search(self.iterate, "iterate")
+        if absent := sorted(_named(self.table) - self.methods.keys()):
+            console.status(f"no methods here, so that the table sets nothing against them: {', '.join(absent)}")
         trials, made = self.carried_out(folder, console, lambda: seconds(self))
         task = self.iterate.task
         parts = [self.table.markdown(trials, task), f"{sizes_of(self.preset_name)} {_sizes(self)}\n", made]
@@ -55,6 +57,12 @@ class Reproduce(Compare):
         (folder / TRIALS).write_text(one_by_one(trials, task), encoding="utf-8")
         _draw(folder / FIGURE, trials, self, self.table.drawn(trials, task))
         return {"trials": self.trials, "summaries": [one._asdict() for one in summaries(trials)]}
+
+
+def _named(table: PaperTable) -> set[str]:
+    """Return the methods that the settings of a table name."""
+    values = (getattr(table, one.name) for one in fields(table))  # type: ignore[arg-type]
+    return {name for value in values for name in (value if isinstance(value, tuple) else [value])}
 
 
 def _sizes(study: Compare) -> str:
