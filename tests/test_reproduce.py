@@ -184,7 +184,7 @@ def test_a_ledger_only_grows(tmp_path: Path) -> None:
     with pytest.raises(ArtifactError, match="is what this study writes"):
         Ledger(path, {"known": path}, Figure, Silent())
     with pytest.raises(ArtifactError, match=r"say number 2 says 1; leave it out"):
-        Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent()).take("a", number=2)
+        Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent()).judge({"a": {"number": 2}})
     given.write_text(path.read_text().replace("3.0", '"fast"'))
     with pytest.raises(ArtifactError, match="row 2 has value 'fast': input should be a valid number"):
         Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent())
@@ -218,7 +218,9 @@ def test_figures_that_contradict_each_other_are_no_trial(more: dict[str, Any], p
     path, given = tmp_path / "trials.json", tmp_path / "given.json"
     row = {**a_trial("gat", 1)._asdict(), "recipe": "a", "made_by": "b"}
     given.write_text(json.dumps([row]))
-    assert Ledger(path, {"known": given}, Trial, Silent()).take("a", iteration=[1], method="gat")
+    ledger = Ledger(path, {"known": given}, Trial, Silent())
+    ledger.judge({"a": {"iteration": [1], "method": "gat"}})
+    assert ledger.take("a")
     given.write_text(json.dumps([{**row, **more}]))
     with pytest.raises(ArtifactError, match=f"row 1 contradicts itself: {problem}"):
         Ledger(tmp_path / "new.json", {"known": given}, Trial, Silent())
@@ -261,9 +263,10 @@ def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
     both = Ledger(tmp_path / "both.json", {"known.0": given, "known.1": other, "known.2": given}, Figure, console)
     both.announce(wanted)
     assert said[-2:] == [known, known.replace("given", "other")]
-    assert both.take("a", number=1) and both.take("b", number=9)
+    both.judge({"a": {"number": 1}, "b": {"number": 9}})
+    assert both.take("a") and both.take("b")
     with pytest.raises(ArtifactError, match=r"other\.json: a trial whose settings .* say number 2 says 9; leave"):
-        both.take("b", number=2)
+        both.judge({"b": {"number": 2}})
     Ledger(path, {"known.0": given, "known.1": other}, Figure, console).announce({"b": "gat"})  # one of them is enough
     assert said[-1] == f"1 of this study's 1 results are in {other}"
     other.write_text(json.dumps([{**rows[0], "value": 2.0}]))

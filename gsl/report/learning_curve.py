@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+WITHOUT = "without grounding"  # label of a search that is there to compare with
+
+
 class Point(NamedTuple):
     """One policy.
 
@@ -213,9 +216,20 @@ def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -
 
 
 def _finding(searches: Sequence[Search]) -> str:
+    bare = [one for one in searches if one.label == WITHOUT]
+    grounded = [one for one in searches if one.label != WITHOUT]
+    count, stable, better = _counted(grounded or bare)
+    said = f"Of {count} generation winners {stable} stay on their feet in real, {better} are above their start"
+    if stable == count:
+        said = f"{better} of {count} generation winners are above their start in real"
+    if not (grounded and bare):
+        return said
+    count, _, better = _counted(bare)
+    return f"{said}; {WITHOUT} {better} of {count}"
+
+
+def _counted(searches: Sequence[Search]) -> tuple[int, int, int]:
+    """Return how many generation winners there are, how many never fall in real, and how many are above their start."""
     winners = [(point, one.points[0]) for one in searches for point in one.points[1:]]
-    stable = sum(point.stable for point, _ in winners)
-    better = sum(point.stable and point.real > start.real for point, start in winners)
-    if stable == len(winners):
-        return f"{better} of {len(winners)} generation winners are above their start in real"
-    return f"Of {len(winners)} generation winners {stable} stay on their feet in real, {better} are above their start"
+    stable = [(point, start) for point, start in winners if point.stable]
+    return len(winners), len(stable), sum(point.real > start.real for point, start in stable)

@@ -108,8 +108,9 @@ class Budget:
         ledger = Ledger(home / DATA, self.parents(), Point, console)
         keys = self.recipes
         ledger.announce({key: method for (_, method, _), key in keys.items()}, self._seconds)
+        ledger.judge({key: {"trial": k, "method": name, "trajectories": n} for (k, name, n), key in keys.items()})
         for (number, method, count), key in keys.items():
-            if not ledger.take(key, trial=number, method=method, trajectories=count):
+            if not ledger.take(key):
                 with console.part(f"{method}, {count} trajectories, trial {number}"):
                     ledger.add(key, [self._point(home, method, count, number, console)._asdict()])
         points = [Point(**row) for row in ledger.figures]

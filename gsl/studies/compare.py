@@ -93,9 +93,15 @@ class Compare:
         ledger = Ledger(home / DATA, self.parents(), Trial, console)
         keys = self.recipes
         ledger.announce({key: cell.method for (_, cell), key in keys.items()}, seconds)
+        each = {"iteration": list(range(1, self.iterate.iterations + 1))}
+        ledger.judge(
+            {
+                key: {**each, "number": k, "simulator": cell.simulator, "world": cell.world, "method": cell.method}
+                for (k, cell), key in keys.items()
+            }
+        )
         for (number, cell), key in keys.items():
-            of = {"number": number, "simulator": cell.simulator, "world": cell.world, "method": cell.method}
-            if ledger.take(key, **of, iteration=list(range(1, self.iterate.iterations + 1))):
+            if ledger.take(key):
                 continue
             where = " ".join(filter(None, (cell.simulator, cell.world)))
             trials, part = [], f"{where}, {cell.method}, trial {number}"

@@ -135,26 +135,28 @@ class Ledger:
                 f"{duration_told(seconds() * share)} for {whose}; a study that was stopped goes on where it was"
             )
 
-    def take(self, key: str, **of: Any) -> bool:
-        """Make a trial that is known, or was made here by this very version, one of this study; say whether it is.
+    def judge(self, wanted: Mapping[str, Mapping[str, Any]]) -> None:
+        """Refuse trials that are there and say something else than their settings, before anything is written.
 
         Args:
-            key: Its recipe.
-            of: What its rows have to say by field: the same in each, or in a list one for each row.
+            wanted: By recipe, what the rows have to say by field: the same in each, or in a list one for each row.
 
         Raises:
             ArtifactError: They say something else.
         """
-        rows = self._rows_of(key)
-        if not rows:
-            return False
-        for name, value in of.items():
-            right = value if isinstance(value, list) else [value] * len(rows)
-            if (said := [row[name] for row in rows]) != right:
-                problem = f"a trial whose settings (recipe {key}) say {name} {_told(right)} says {_told(said)}"
-                raise ArtifactError(self._whose(key), f"{problem}; leave it out")
-        self._write(key, rows)
-        return True
+        for key, of in wanted.items():
+            rows = self._rows_of(key)
+            for name, value in of.items() if rows else ():
+                right = value if isinstance(value, list) else [value] * len(rows)
+                if (said := [row[name] for row in rows]) != right:
+                    problem = f"a trial whose settings (recipe {key}) say {name} {_told(right)} says {_told(said)}"
+                    raise ArtifactError(self._whose(key), f"{problem}; leave it out")
+
+    def take(self, key: str) -> bool:
+        """Make a trial that is known, or was made here by this very version, one of this study; say whether it is."""
+        if rows := self._rows_of(key):
+            self._write(key, rows)
+        return bool(rows)
 
     def add(self, key: str, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write down a trial that has ended, beside those that another study of this name wrote meanwhile."""

@@ -95,7 +95,8 @@ class NoiseStudy:
         ledger = Ledger(home / DATA, self.parents(), Point, console)
         keys = self.recipes
         ledger.announce({key: f"trial {number}" for number, key in keys.items()})
-        known = {number for number, key in keys.items() if ledger.take(key, trial=number)}
+        ledger.judge({key: {"trial": number} for number, key in keys.items()})
+        known = {number for number, key in keys.items() if ledger.take(key)}
         jobs = [(number, home) for number in keys if number not in known]
         with console.progress(len(jobs), "trials") as progress:
             for index, found in arriving(_trial, self, jobs, self.workers, progress):

@@ -124,8 +124,9 @@ class Replays:
         ledger = Ledger(home / DATA, self.parents(), Replay, console)
         keys = self.recipes
         ledger.announce({key: cell[2] for cell, key in keys.items()}, lambda: seconds(study, search=False))
+        ledger.judge({key: {"trial": k, "world": world, "method": name} for (k, world, name), key in keys.items()})
         for (number, world, method), key in keys.items():
-            if not ledger.take(key, trial=number, world=world, method=method):
+            if not ledger.take(key):
                 with console.part(f"{world}, {method}, trial {number}"):
                     ledger.add(key, [self._replay(home, number, world, method, console)._asdict()])
         rows = [Replay(**row) for row in ledger.figures]
