@@ -93,13 +93,8 @@ class Compare:
         ledger = Ledger(home / DATA, self.parents(), Trial, console)
         keys = self.recipes
         ledger.announce({key: cell.method for (_, cell), key in keys.items()}, seconds)
-        each = {"iteration": list(range(1, self.iterate.iterations + 1))}
-        ledger.judge(
-            {
-                key: {**each, "number": k, "simulator": cell.simulator, "world": cell.world, "method": cell.method}
-                for (k, cell), key in keys.items()
-            }
-        )
+        iterations = list(range(1, self.iterate.iterations + 1))
+        ledger.judge({key: {"number": k, **cell._asdict(), "iteration": iterations} for (k, cell), key in keys.items()})
         for (number, cell), key in keys.items():
             if ledger.take(key):
                 continue

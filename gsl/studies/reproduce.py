@@ -60,9 +60,9 @@ class Reproduce(Compare):
 
 
 def _named(table: PaperTable) -> set[str]:
-    """Return the methods that the settings of a table name."""
+    """Return the methods that a table's settings list."""
     values = (getattr(table, one.name) for one in fields(table))  # type: ignore[arg-type]
-    return {name for value in values for name in (value if isinstance(value, tuple) else [value])}
+    return {name for value in values if isinstance(value, tuple) for name in value if isinstance(name, str)}
 
 
 def _sizes(study: Compare) -> str:
