@@ -99,7 +99,7 @@ def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str |
         searches: Panels from left to right.
         unit: Of all values.
         title: By default how many of the generations' best stay on their feet in real, if some fall, and are above
-            their start.
+            their start; beside those of a search without grounding, if there is one.
     """
     with look():
         whole = figure(4.6)
@@ -219,13 +219,12 @@ def _finding(searches: Sequence[Search]) -> str:
     bare = [one for one in searches if one.label == WITHOUT]
     grounded = [one for one in searches if one.label != WITHOUT]
     count, stable, better = _counted(grounded or bare)
-    said = f"Of {count} generation winners {stable} stay on their feet in real, {better} are above their start"
+    if grounded and bare:
+        others, _, gain = _counted(bare)
+        return f"{better} of {count} generation winners stay up and gain in real, {gain} of {others} {WITHOUT}"
     if stable == count:
-        said = f"{better} of {count} generation winners are above their start in real"
-    if not (grounded and bare):
-        return said
-    count, _, better = _counted(bare)
-    return f"{said}; {WITHOUT} {better} of {count}"
+        return f"{better} of {count} generation winners are above their start in real"
+    return f"Of {count} generation winners {stable} stay on their feet in real, {better} are above their start"
 
 
 def _counted(searches: Sequence[Search]) -> tuple[int, int, int]:
