@@ -123,9 +123,13 @@ class Trial(NamedTuple):
 
     def told(self, unit: Unit) -> str:
         """Return the trial in a few words."""
-        more = gained(None if self.improvement is None else self.improvement / 100.0)
         winners = f", {self.stable} of {self.winners} winners stable" if unit.falls else ""
-        return f"{self.returned}, {unit.shown(self.value)}{f' ({more})' if more else ''}{winners}"
+        return f"{self.returned}, {unit.shown(self.value)}{f' ({self.more})' if self.more else ''}{winners}"
+
+    @property
+    def more(self) -> str:
+        """The improvement in words; nothing where π0 is worth nothing, or next to it."""
+        return gained(None if self.improvement is None else self.improvement / 100.0)
 
     @property
     def contradiction(self) -> str:
