@@ -66,19 +66,19 @@ def test_a_page_tells_what_is_committed(typed: list[str], tmp_path: Path) -> Non
     files = [ROOT / name for name in KNOWN.findall(" ".join(typed))]
     rows = [row for file in files for row in json.loads(file.read_text(encoding="utf-8"))]
     study = composed(typed)
+    keys = study.recipes
     if not isinstance(study, Compare):
         kind, *names = CELLS[type(study)]
         cells = {
             row[names[0]] if len(names) == 1 else tuple(row[name] for name in names): row["recipe"] for row in rows
         }
-        assert study.recipes.items() <= cells.items()
-        assert isinstance(study, NoiseStudy) or len(study.recipes) == len(rows)  # whose files hold no more than is told
-        rows = [row for row in rows if row["recipe"] in study.recipes.values()]
+        assert keys.items() <= cells.items()
+        assert isinstance(study, NoiseStudy) or len(keys) == len(rows)  # whose files hold no more than is told
+        rows = [row for row in rows if row["recipe"] in keys.values()]
         study.tell(tmp_path, [kind(**{name: row.get(name) for name in kind._fields}) for row in rows], "")
         found = (files[0].parent / "table.md").read_text(encoding="utf-8")
         assert found.startswith((tmp_path / "table.md").read_text(encoding="utf-8").strip())
         return
-    keys = study.recipes
     of = {row["recipe"]: [] for row in rows}
     for row in rows:
         of[row["recipe"]].append(Trial(**{name: row[name] for name in Trial._fields if name in row}))
