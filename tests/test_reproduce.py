@@ -146,6 +146,7 @@ def test_a_trace_is_of_a_joint_that_the_models_know(tmp_path: Path) -> None:
             "iterate.real: is no robot; replays begin in a robot's real states",
         ),
         ("fig11 noises=[0.5,2]", "noises.1 = 2: must be at most 1"),
+        ("fig5 task@iterate.task=walk", "table = Figure5 of Walk: tells of Arm alone; choose another table="),
         ("budget known=[]", "known: is an empty list; leave it out"),
         ("budget first=0", "first = 0: must be at least 1"),
         ("budget iterate.iterations=2", "iterate.iterations = 2: this study is of the first"),
@@ -454,14 +455,16 @@ def test_a_table_says_which_trials_it_has(first: int, count: int, words: str) ->
 
 
 def test_everything_of_a_single_trial_is_told() -> None:
+    nothing = a_trial("gat", 3, start=-1e-5, improvement=321020.4)
     trials = [a_trial("gat", 1, alpha=0.9, falls=2), a_trial("none", 2, improvement=None, rank=None, generation=0)]
-    titles, _, first, second = one_by_one(trials, Walk()).splitlines()
+    titles, _, first, second, third = one_by_one([*trials, nothing], Walk()).splitlines()
     row = dict(zip(titles.split(" | "), first.split(" | "), strict=True))
     assert (row["trial"], row["improvement [%]"], row["stable winners"], row["improving winners"]) == (
         *("1", "25.0", "4 of 5", "3"),
     )
     assert (row["falls"], row["rank"], row["alpha"], row["best generation"]) == ("2 of 10", "0.50", "0.9", "2")
     assert "| 20.0 | 25.0 |  | 1.0 |  | 4 of 5 |" in second
+    assert "| gat | 3 | 0.0 | 25.0 |  | 1.0 | 2 |" in third  # a share of next to nothing tells nothing
 
 
 def test_table_2_counts_how_often_the_last_generation_improves() -> None:

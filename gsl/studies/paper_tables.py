@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import product
 from operator import attrgetter
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from gsl.studies.comparison import differences, summaries
 from gsl.studies.comparison_table import bounds, places, told_difference
 from gsl.studies.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, value_cells, worth
 from gsl.studies.trial import Trial
+from gsl.tasks.arm import Arm
 from gsl.tasks.task import Task
 
 TABLE_3 = {1: ("26.3 and 26.9", "34.6 and 37.8"), 2: ("28.0", "43.3")}  # cm/s, %; SimSpark and Gazebo as simulators
@@ -145,6 +146,8 @@ class Figure5:
 
     Beside it that of the policy which the real world chose among the best of all generations.
     """
+
+    of: ClassVar[type] = Arm
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the figure's values as a table."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 
 from gsl.core.setting import component, setting
+from gsl.errors import ConfigError
 from gsl.optimizers.cma_es import CmaEs
 from gsl.report.trial_dots import Dots, trial_dots
 from gsl.studies.compare import TABLE, Compare
@@ -24,7 +25,10 @@ FIGURE, TRIALS = "trials.png", "trials.md"
 
 @runtime_checkable
 class PaperTable(Protocol):
-    """How the trials of a study are told."""
+    """How the trials of a study are told.
+
+    Where it tells one kind of task alone, `of: ClassVar[type]` says which.
+    """
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table with the paper's figures beside ours."""
@@ -40,6 +44,14 @@ class Reproduce(Compare):
     kind: ClassVar[str] = "reproduce"
 
     table: Annotated[PaperTable, setting("how the trials are told")] = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Refuse a table that has nothing to tell of the task, before hours are spent on it."""
+        kind = getattr(self.table, "of", Task)
+        if not isinstance(self.iterate.task, kind):
+            given = type(self.iterate.task).__name__
+            problem = f"tells of {kind.__name__} alone; choose another table="
+            raise ConfigError("table", problem, given=f"{type(self.table).__name__} of {given}")
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Say beforehand how long it takes, run all trials, write every trial's figures, the table and the picture.
@@ -84,7 +96,7 @@ def _draw(path: Path, trials: Sequence[Trial], study: Compare, drawn: Drawn) -> 
     for cell in dict.fromkeys(trial.cell for trial in trials):
         every = zip(trials, drawn.values, failures, strict=True)
         shown, failed = zip(*((value, one) for trial, value, one in every if trial.cell == cell), strict=True)
-        panel = " ".join(filter(None, (cell.simulator, cell.world)))
+        panel = f"{cell.simulator} as simulator, {cell.world} in real" if cell.simulator else cell.world
         name = f"{cell.method}, iteration {cell.iteration}" if further else cell.method
         panels.setdefault(panel, {})[name] = Dots(shown, failed, method_colour(study.methods[cell.method]))
     missed = drawn.missed or f"no {'sure' if tolerant else 'stable'} improvement{' by the iteration' * further}"
