@@ -83,15 +83,12 @@ class Evaluate:
         if getattr(self.world, "action_noise", 0.0):
             warn_uncharged(self.world, console, REAL, "the world's noise")
         found = records(self.policy, self.policies)
-        checks = 1 + CHALLENGERS if self.tolerated else 1
-        total = self.episodes * len(found) + self.check * checks + 2 * self.confirmation
-        with console.progress(total, "measuring in the real world") as progress:
-            measure = partial(self._measured, progress=progress, console=console)
-            tried = measure(found, _CHOICE, self.episodes)
-            checked = dict(self._checked(found, tried, measure))
-            best = self._passed(checked)
-            reported = sorted({0, best})
-            fresh = dict(zip(reported, measure([found[i] for i in reported], _REPORT, self.confirmation), strict=True))
+        measure = partial(self._measured, console=console)
+        tried = measure(found, _CHOICE, self.episodes)
+        checked = dict(self._checked(found, tried, measure))
+        best = self._passed(checked)
+        reported = sorted({0, best})
+        fresh = dict(zip(reported, measure([found[i] for i in reported], _REPORT, self.confirmation), strict=True))
         rows = [row(theta, done) for theta, done in zip(found, tried, strict=True)]
         again = [[row(found[index], done) for index, done in phase.items()] for phase in (checked, fresh)]
         write_json(folder / TABLE, {"policies": rows, "check": again[0], "confirmation": again[1]})
@@ -143,7 +140,7 @@ class Evaluate:
         return falls(done) <= self.tolerated * len(done)
 
     def _measured(
-        self, thetas: Sequence[PolicyRecord], purpose: str, count: int, *, progress: Any, console: Any
+        self, thetas: Sequence[PolicyRecord], purpose: str, count: int, *, console: Any
     ) -> list[list[Episode]]:
         """Return the episodes of some policies; but for a report, none after a fall that is not tolerated."""
         scenario = Scenario(self.world, self.task, self.policy, REAL, NoGrounding())
@@ -162,7 +159,8 @@ class Evaluate:
             found = asked(scenario, orders, errand, workers=self.workers, console=console)
             done = [None if one is None else one.episode for one in found]
         else:
-            done = episodes(scenario, jobs, workers=self.workers, progress=progress)
+            with console.progress(len(jobs), f"{purpose} in the real world") as progress:
+                done = episodes(scenario, jobs, workers=self.workers, progress=progress)
         groups = [list(done[first : first + count]) for first in range(0, len(done), count)]
         return [_until_fall(group, to_the_end=to_the_end) for group in groups]
 
