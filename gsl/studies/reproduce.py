@@ -45,25 +45,20 @@ class Reproduce(Compare):
 
     table: Annotated[PaperTable, setting("how the trials are told")] = field(kw_only=True)
 
-    def __post_init__(self) -> None:
-        """Refuse a table that has nothing to tell of the task, before hours are spent on it."""
-        kind = getattr(self.table, "of", Task)
-        if not isinstance(self.iterate.task, kind):
-            given = type(self.iterate.task).__name__
-            problem = f"tells of {kind.__name__} alone; choose another table="
-            raise ConfigError("table", problem, given=f"{type(self.table).__name__} of {given}")
-
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Say beforehand how long it takes, run all trials, write every trial's figures, the table and the picture.
 
         Raises:
-            ConfigError: Its optimizer is no search.
+            ConfigError: Its optimizer is no search, or its table tells another task.
         """
+        kind, task = getattr(self.table, "of", Task), self.iterate.task
+        if not isinstance(task, kind):
+            given = f"{type(self.table).__name__} of {type(task).__name__}"
+            raise ConfigError("table", f"tells of {kind.__name__} alone; choose another table=", given=given)
         check_search(self.iterate, "iterate")
         if absent := sorted(_named(self.table) - self.methods.keys()):
             console.status(f"no methods here, so that the table sets nothing against them: {', '.join(absent)}")
         trials, made = self.carried_out(folder, console, lambda: seconds(self))
-        task = self.iterate.task
         parts = [self.table.markdown(trials, task), f"{sizes_of(self.preset_name)} {_sizes(self)}\n", made]
         (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
         (folder / TRIALS).write_text(one_by_one(trials, task), encoding="utf-8")
