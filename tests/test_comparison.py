@@ -7,6 +7,8 @@ import pytest
 from gsl.stages.headline import Unit
 from gsl.studies.comparison import differences, orders, summaries
 from gsl.studies.comparison_table import markdown
+from gsl.studies.paper_cells import every_trial, one_by_one, worth
+from gsl.studies.paper_table_2 import Table2
 from gsl.studies.trial import Cell, Trial
 from gsl.tasks.own_reward import OwnReward
 from gsl.tasks.walk import Walk
@@ -134,6 +136,16 @@ def test_a_start_that_may_be_worth_nothing_has_no_percentage() -> None:
     assert trial.improvement is None and not trial.without
     (summary,) = summaries([trial])
     assert (summary.improvement, summary.value.mean) == (None, 0.031)
+
+
+def test_a_share_of_next_to_nothing_is_told_nowhere() -> None:
+    trials = [_trial("gat", 1, 0.2, 4), _trial("gat", 2, 0.2, 4)._replace(start=0.001, improvement=29900.0)]
+    (summary,) = summaries(trials)
+    assert summary.improvement is None and summary.value.mean == pytest.approx(0.3)
+    speed = Unit.of(Walk())
+    tables = markdown([summary], trials, speed), Table2().markdown(trials, Walk()), every_trial(trials)
+    assert "29900" not in "".join([*tables, one_by_one(trials, Walk()), trials[1].told(speed)])
+    assert worth(trials, Walk()).values == pytest.approx([30.0, 30.0])
 
 
 def test_later_iterations_are_set_against_the_first_ones_start() -> None:

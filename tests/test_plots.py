@@ -11,7 +11,7 @@ from gsl.core.statistics import mean_interval
 from gsl.report.budget_curve import Line, budget_curve_figure
 from gsl.report.grounding_errors import grounding_errors, grounding_errors_figure
 from gsl.report.joint_trace import Traces, joint_trace, joint_trace_figure
-from gsl.report.learning_curve import WITHOUT, Point, Search, learning_curve, learning_curve_figure, points, search
+from gsl.report.learning_curve import Point, Search, learning_curve, learning_curve_figure, points, search
 from gsl.report.noise_bars import Bars, noise_bars_figure
 from gsl.report.noise_curve import Curve, noise_curve_figure
 from gsl.report.style import GAT, SGAT, spread
@@ -86,7 +86,7 @@ def test_a_learning_curve_tells_what_it_shows() -> None:
     figure = learning_curve_figure([SEARCH, Search("no grounding", SEARCH.points)], unit="cm/s")
     assert figure.get_suptitle() == "Of 4 generation winners 2 stay on their feet in real, 2 are above their start"
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["iteration 1", "no grounding"]
-    beside = learning_curve_figure([SEARCH, SEARCH._replace(label=WITHOUT)], unit="cm/s")
+    beside = learning_curve_figure([SEARCH, SEARCH._replace(bare=True)], unit="cm/s")
     assert beside.get_suptitle() == "1 of 2 generation winners stay up and gain in real, 1 of 2 without grounding"
     head, right = beside._suptitle.get_window_extent(), beside.bbox.x1  # type: ignore[attr-defined]
     assert head.x1 < right

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-WITHOUT = "without grounding"  # label of a search that is there to compare with
-
-
 class Point(NamedTuple):
     """One policy.
 
@@ -52,12 +49,14 @@ class Search(NamedTuple):
         points: Where it starts, then the best of each generation.
         confirmed: The returned policy measured again on fresh episodes, if it was.
         start: Name of the policy where it starts.
+        bare: Whether it is without grounding, there to compare the others with.
     """
 
     label: str
     points: Sequence[Point]
     confirmed: Point | None = None
     start: str = "π0"
+    bare: bool = False
 
 
 def search(
@@ -216,12 +215,11 @@ def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -
 
 
 def _finding(searches: Sequence[Search]) -> str:
-    bare = [one for one in searches if one.label == WITHOUT]
-    grounded = [one for one in searches if one.label != WITHOUT]
+    bare, grounded = [one for one in searches if one.bare], [one for one in searches if not one.bare]
     count, stable, better = _counted(grounded or bare)
     if grounded and bare:
         others, _, gain = _counted(bare)
-        return f"{better} of {count} generation winners stay up and gain in real, {gain} of {others} {WITHOUT}"
+        return f"{better} of {count} generation winners stay up and gain in real, {gain} of {others} without grounding"
     if stable == count:
         return f"{better} of {count} generation winners are above their start in real"
     return f"Of {count} generation winners {stable} stay on their feet in real, {better} are above their start"

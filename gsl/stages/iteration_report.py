@@ -14,7 +14,7 @@ from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import actions
 from gsl.grounding.none import NoGrounding
 from gsl.report.joint_trace import Traces, joint_trace
-from gsl.report.learning_curve import WITHOUT, Search, learning_curve, search
+from gsl.report.learning_curve import Search, learning_curve, search
 from gsl.report.markdown import table
 from gsl.stages.diagnosis_plan import Flight
 from gsl.stages.evaluate import TABLE
@@ -142,9 +142,10 @@ class Rounds:
 
     def searches(self) -> list[Search]:
         """Return the panels of the learning curve."""
-        named = [(f"iteration {k + 1}", one, f"π{k}") for k, one in enumerate(self._done)]
-        named += [] if self._beside is None else [(WITHOUT, self._beside, "π0")]
-        return [self._search(*one) for one in named]
+        found = [self._search(f"iteration {k + 1}", one, f"π{k}") for k, one in enumerate(self._done)]
+        if self._beside is not None:
+            found.append(self._search("without grounding", self._beside, "π0")._replace(bare=True))
+        return found
 
     @property
     def unit(self) -> str:

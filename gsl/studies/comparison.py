@@ -14,11 +14,11 @@ from gsl.core.statistics import Interval, mean_interval
 from gsl.studies.trial import Cell, Trial
 
 Figure = Callable[[Trial], Any]  # of a trial
-IMPROVEMENT: Figure = attrgetter("improvement")
+IMPROVEMENT: Figure = attrgetter("share")
 
 
 class Summary(NamedTuple):
-    """All trials of a cell; improvement and rank are means over trials [%, -], None where a trial has none.
+    """All trials of a cell; improvement and rank are means over trials [%, -], None where a trial has none to tell.
 
     The generation is that which found what was returned, on average over trials that returned something new, if any.
     `without` counts trials in which what was returned fell or was not surely better; `unimproved` those in which no
@@ -127,13 +127,13 @@ def _corrected(found: Sequence[Order]) -> list[Order]:
 
 def _summary(cell: Cell, trials: list[Trial]) -> Summary:
     generations = [trial.generation for trial in trials if trial.generation]
-    improvements = [trial.improvement for trial in trials if trial.improvement is not None]
+    shares = [trial.share for trial in trials if trial.share is not None]
     ranks = [trial.rank for trial in trials if trial.rank is not None]
     return Summary(
         *cell,
         trials=len(trials),
         value=mean_interval([trial.value for trial in trials]),
-        improvement=mean_interval(improvements) if len(improvements) == len(trials) else None,
+        improvement=mean_interval(shares) if len(shares) == len(trials) else None,
         without=sum(trial.without for trial in trials),
         unimproved=sum(trial.improving == 0 for trial in trials),
         stable=sum(trial.stable for trial in trials),

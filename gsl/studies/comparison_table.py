@@ -22,16 +22,14 @@ def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> s
     Trials are told as improvements where π0 is surely worth something in each of them, else as what they are worth.
     """
     first, columns, titles = found[0].method, _columns(found, unit), places(found)
-    as_shares = all(trial.improvement is not None for trial in trials)
-    figure = "improvement" if as_shares else "value"
+    as_shares = all(trial.share is not None for trial in trials)
+    figure, name = ("share", "improvement") if as_shares else ("value", "value")
     own = SHARE if as_shares else unit
-    shown = in_unit(f"{figure} in real", own.name)
+    shown = in_unit(f"{name} in real", own.name)
 
     single, paired = [], []
     for one in found:
-        values = [
-            own.bare(trial.improvement if as_shares else trial.value) + "*" * trial.without for trial in one.own(trials)
-        ]
+        values = [own.bare(getattr(trial, figure)) + "*" * trial.without for trial in one.own(trials)]
         where = one.cells(titles)
         single.append((*where, one.method, ", ".join(values)))
         if one.method != first:

@@ -30,9 +30,9 @@ SPEED = "speed [cm/s]"
 
 def worth(trials: Sequence[Trial], task: Task) -> Drawn:
     """Return improvements where π0 is worth something in every trial, else values."""
-    improvements = [trial.improvement for trial in trials if trial.improvement is not None]
-    if len(improvements) == len(trials):
-        return Drawn("improvement over π0 in real [%]", improvements)
+    shares = [trial.share for trial in trials if trial.share is not None]
+    if len(shares) == len(trials):
+        return Drawn("improvement over π0 in real [%]", shares)
     return Drawn(f"in real [{task.unit}]", [task.shown * trial.value for trial in trials])
 
 
@@ -68,7 +68,7 @@ def one_by_one(trials: Sequence[Trial], task: Task) -> str:
         "trial": lambda one: str(one.number),
         f"π0 [{task.unit}]": lambda one: f"{task.shown * one.start:z.1f}",
         f"returned [{task.unit}]": lambda one: f"{task.shown * one.value:z.1f}",
-        "improvement [%]": lambda one: f"{one.improvement:z.1f}" if one.more else "",
+        "improvement [%]": lambda one: "" if one.share is None else f"{one.share:z.1f}",
         f"gained at least, 95 % [{task.unit}]": lambda one: f"{task.shown * one.surely:.1f}",
         "best generation": lambda one: str(one.generation or ""),
         "stable winners": lambda one: f"{one.stable} of {one.winners}",
@@ -87,4 +87,4 @@ def _field(name: str, trial: Trial) -> str:
 
 
 def _one(trial: Trial) -> str:
-    return "-" if trial.improvement is None else f"{trial.improvement:.1f}{'*' if trial.without else ''}"
+    return "-" if trial.share is None else f"{trial.share:.1f}{'*' if trial.without else ''}"

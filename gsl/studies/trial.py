@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from gsl.stages.headline import Unit, gained
+from gsl.stages.headline import MANY, Unit, gained
 
 
 class Cell(NamedTuple):
@@ -124,12 +124,13 @@ class Trial(NamedTuple):
     def told(self, unit: Unit) -> str:
         """Return the trial in a few words."""
         winners = f", {self.stable} of {self.winners} winners stable" if unit.falls else ""
-        return f"{self.returned}, {unit.shown(self.value)}{f' ({self.more})' if self.more else ''}{winners}"
+        more = "" if self.share is None else f" ({gained(self.share / 100.0)})"
+        return f"{self.returned}, {unit.shown(self.value)}{more}{winners}"
 
     @property
-    def more(self) -> str:
-        """The improvement in words; nothing where π0 is worth nothing, or next to it."""
-        return gained(None if self.improvement is None else self.improvement / 100.0)
+    def share(self) -> float | None:
+        """The improvement where it tells people something [%]: None also where π0 is worth next to nothing."""
+        return None if self.improvement is None or self.improvement > 100.0 * MANY else self.improvement
 
     @property
     def contradiction(self) -> str:
