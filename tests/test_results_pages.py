@@ -113,7 +113,7 @@ def test_the_aims_of_table_2_stand_beside_its_trials() -> None:
     whole = (ROOT / "docs/results/README.md").read_text(encoding="utf-8")
     rows = next(rows for _, titles, rows in tables(whole) if titles[:3] == ["real world", "trials", "grounding"])
     assert len(rows) == 20
-    for place, count, named, gain, more, without, unimproved in rows:
+    for place, count, named, gain, more, without, unimproved, spent in rows:
         world, method = place.strip("`"), named.strip("`")
         among = ten if count == "10" else twenty
         if method.startswith("no gap"):
@@ -125,6 +125,7 @@ def test_the_aims_of_table_2_stand_beside_its_trials() -> None:
         assert gain == f"{found.improvement.mean:.1f} ({bounds(found.improvement)})"
         assert more == ("" if method == "none" else told_difference(differences(among, own[0].cell, "none")))
         assert (without, unimproved) == (f"{found.without} of {count}", f"{found.unimproved} of {count}")
+        assert spent == f"{found.real_episodes:.0f}"
 
 
 def by_number(study: Any) -> dict[int, set[str]]:

@@ -44,7 +44,14 @@ class Table3:
         where = places(found, told=["iteration"])
         titles = (
             *(*where, "grounding", "iteration", f"in real [{task.unit}]", "95 % interval", "improvement [%]"),
-            *("95 % interval", "falls", "refused", "stopped by then", f"where they stop [{task.unit}]"),
+            *(
+                "95 % interval",
+                "best generation",
+                "falls",
+                "refused",
+                "stopped by then",
+                f"where they stop [{task.unit}]",
+            ),
             *("real episodes", f"paper [{task.unit}]", "paper: improvement [%]"),
         )
         rows = []
@@ -59,6 +66,7 @@ class Table3:
                 (*one.cells(where), one.method, str(one.iteration))
                 + (*value_cells(one.value, task), *improvement_cells(one))
                 + (
+                    one.best_generation,
                     str(one.falls),
                     f"{one.refused} of {one.trials}",
                     f"{stops} of {one.trials}",
