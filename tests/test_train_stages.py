@@ -78,6 +78,18 @@ def test_every_encoding_and_horizon_predicts(real: str, tmp_path: Path, encoding
     assert measured["one_step_deg"] < 0.2 * measured["one_step_no_change_deg"]
 
 
+def test_draws_are_calibrated_unless_they_are_to_be_as_fitted(real: str, tmp_path: Path) -> None:
+    widths, memories = [], []
+    for calibrated in (True, False):
+        model = replace(LINEAR, likelihood="gaussian", history=0, calibrated=calibrated)  # a slow plant's errors last
+        TrainForward(data=real, model=model).run(tmp_path, QUIET)
+        f = read_forward_model(str(tmp_path / "forward_model.safetensors"))
+        widths.append(f.head.parts(f.network.predict(np.zeros(f.network.inputs)))[2])
+        memories.append(f.memory)
+    assert np.all(memories[0] > 0.0) and not np.any(memories[1])
+    assert not np.allclose(*widths)
+
+
 def test_trajectories_of_earlier_policies_are_learned_from_and_held_out_of_nothing(real: str, tmp_path: Path) -> None:
     before = tmp_path / "before.parquet"
     write(before, a_batch(SLOW, "real", pi0=2, others=2))

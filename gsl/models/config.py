@@ -61,6 +61,10 @@ class ModelConfig:
         ),
     ] = 0.0
     components: Annotated[int, setting("Gaussians of a mixture", ge=2, le=10)] = 3
+    calibrated: Annotated[
+        bool,
+        setting("a robot's draws are as wide, and last as long, as errors on validation trajectories; else as fitted"),
+    ] = True
     multi_step: Annotated[
         int,
         setting(
@@ -108,6 +112,9 @@ class ModelConfig:
         """
         if self.rested:
             raise ConfigError(f"{where}.rested", "is of a robot; an environment's models look no ticks back")
+        if not self.calibrated:
+            problem = "is of a robot; an environment's draws are as fitted anyway"
+            raise ConfigError(f"{where}.calibrated", problem, given="false")
         if self.variables == "all":
             return tuple(range(states))
         for variable in self.variables:

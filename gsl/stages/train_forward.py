@@ -193,7 +193,7 @@ def _member(
     pieces = _pieces(config, episodes, data.validation.episodes) if config.multi_step > 1 else None
     network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole, pieces=pieces)
     memory = np.zeros(unseen[1].shape[1])
-    if head.draws:
+    if head.draws and config.calibrated:
         network, memory = calibrated(network, head, [_samples(config, [one], base) for one in data.validation.episodes])
     joints = data.training.joints
     return ForwardModel(
