@@ -48,7 +48,7 @@ OFFERED = {
     "table2-paper": ("none", "ane_02", "gat", "gat_alpha_1"),
     "table3": ("gat", "effects"),
     "table4": ("none", "ane_02", "gat", "sgat", "sgat_005"),
-    "linear-walk": ("none", "ane_02", "gat", "gat_residual"),
+    "linear-walk": ("none", "ane_02", "gat", "gat_residual", "effects"),
     "fig5": ("none", "ane_02", "gat", "gat_005", "sgat"),
     "worlds": ("none", "ane_02", "gat_residual_01", "effects"),
 }
