@@ -31,7 +31,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 KEPT = {
     "table2": ("none", "ane_02", "gat", "gat_multi_step", "gat_gated", "identified", "effects_sgat", "randomised"),
-    "table2-paper": ("none", "gat", "gat_alpha_1"),
+    "table2-paper": ("none", "gat", "gat_alpha_1", "sgat"),
     "table3": ("gat",),
     "table4": ("gat", "sgat", "sgat_005"),
     "linear-walk": ("none", "gat", "gat_residual"),
@@ -45,11 +45,11 @@ ALL = (
 )
 OFFERED = {
     "table2": ALL,
-    "table2-paper": ("none", "ane_02", "gat", "gat_alpha_1"),
+    "table2-paper": ("none", "ane_02", "gat", "gat_alpha_1", "sgat"),
     "table3": ("gat", "effects"),
     "table4": ("none", "ane_02", "gat", "sgat", "sgat_005"),
     "linear-walk": ("none", "ane_02", "gat", "gat_residual", "effects"),
-    "fig5": ("none", "ane_02", "gat", "gat_005", "sgat"),
+    "fig5": ("none", "ane_02", "gat", "gat_005", "sgat", "effects"),
     "worlds": ("none", "ane_02", "gat_residual_01", "effects"),
 }
 FEW = ("preset=toy", "iterate.workers=1", "iterate.optimizer.candidates=4")
