@@ -87,7 +87,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
 
 
 def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) -> None:
-    left_out = ("~methods.ane_02", "~methods.gat_005", "~methods.sgat")
+    left_out = ("~methods.ane_02", "~methods.gat_005", "~methods.sgat", "~methods.effects")
     few = (*FEW, *left_out, "iterate.task.duration=1.2", "iterate.optimizer.generations=1")
     done("reproduce", "fig5", *few, folder=tmp_path)
     first = tmp_path / "runs/fig5/trials.json"
