@@ -112,9 +112,6 @@ class ModelConfig:
         """
         if self.rested:
             raise ConfigError(f"{where}.rested", "is of a robot; an environment's models look no ticks back")
-        if not self.calibrated:
-            problem = "is of a robot; an environment's draws are as fitted anyway"
-            raise ConfigError(f"{where}.calibrated", problem, given="false")
         if self.variables == "all":
             return tuple(range(states))
         for variable in self.variables:
