@@ -86,7 +86,7 @@ def test_a_learning_curve_tells_what_it_shows() -> None:
     figure = learning_curve_figure([SEARCH, Search("no grounding", SEARCH.points)], unit="cm/s")
     assert figure.get_suptitle() == "Of 4 generation winners 2 stay on their feet in real, 2 are above their start"
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["iteration 1", "no grounding"]
-    beside = learning_curve_figure([SEARCH, SEARCH._replace(bare=True)], unit="cm/s")
+    beside = learning_curve_figure([SEARCH, SEARCH._replace(label="without grounding", bare=True)], unit="cm/s")
     assert beside.get_suptitle() == "1 of 2 generation winners stay up and gain in real, 1 of 2 without grounding"
     head, right = beside._suptitle.get_window_extent(), beside.bbox.x1  # type: ignore[attr-defined]
     assert head.x1 < right

@@ -219,7 +219,7 @@ def _finding(searches: Sequence[Search]) -> str:
     count, stable, better = _counted(grounded or bare)
     if grounded and bare:
         others, _, gain = _counted(bare)
-        return f"{better} of {count} generation winners stay up and gain in real, {gain} of {others} without grounding"
+        return f"{better} of {count} generation winners stay up and gain in real, {gain} of {others} {bare[0].label}"
     if stable == count:
         return f"{better} of {count} generation winners are above their start in real"
     return f"Of {count} generation winners {stable} stay on their feet in real, {better} are above their start"

@@ -79,9 +79,14 @@ def headline(artifact: Artifact) -> str:
         return ""
 
 
+def telling(share: float) -> bool:
+    """Return whether a gain as a share of π0's value tells people something: it is no more than `MANY` times it."""
+    return abs(share) <= MANY
+
+
 def gained(share: float | None) -> str:
-    """Return a gain as a share of π0's value [%]; nothing without a share, or with more than `MANY`."""
-    return "" if share is None or share > MANY else f"{100 * share:+.1f} %"
+    """Return a gain as a share of π0's value [%]; nothing without a share, or with one that is not telling."""
+    return "" if share is None or not telling(share) else f"{100 * share:+.1f} %"
 
 
 def several(count: int, what: str) -> str:

@@ -14,7 +14,7 @@ from gsl.core.statistics import Interval, mean_interval
 from gsl.studies.trial import Cell, Trial
 
 Figure = Callable[[Trial], Any]  # of a trial
-IMPROVEMENT: Figure = attrgetter("share")
+IMPROVEMENT: Figure = attrgetter("told_improvement")
 
 
 class Summary(NamedTuple):
@@ -127,13 +127,13 @@ def _corrected(found: Sequence[Order]) -> list[Order]:
 
 def _summary(cell: Cell, trials: list[Trial]) -> Summary:
     generations = [trial.generation for trial in trials if trial.generation]
-    shares = [trial.share for trial in trials if trial.share is not None]
+    told = [trial.told_improvement for trial in trials if trial.told_improvement is not None]
     ranks = [trial.rank for trial in trials if trial.rank is not None]
     return Summary(
         *cell,
         trials=len(trials),
         value=mean_interval([trial.value for trial in trials]),
-        improvement=mean_interval(shares) if len(shares) == len(trials) else None,
+        improvement=mean_interval(told) if len(told) == len(trials) else None,
         without=sum(trial.without for trial in trials),
         unimproved=sum(trial.improving == 0 for trial in trials),
         stable=sum(trial.stable for trial in trials),

@@ -19,11 +19,11 @@ BY_FALLS = ("stable winners", "falls in fresh episodes")
 def markdown(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> str:
     """Return the table, the paired differences to the first method, and every single trial.
 
-    Trials are told as improvements where π0 is surely worth something in each of them, else as what they are worth.
+    Trials are told as improvements where each of them has one to tell, else as what they are worth.
     """
     first, columns, titles = found[0].method, _columns(found, unit), places(found)
-    as_shares = all(trial.share is not None for trial in trials)
-    figure, name = ("share", "improvement") if as_shares else ("value", "value")
+    as_shares = all(trial.told_improvement is not None for trial in trials)
+    figure, name = ("told_improvement", "improvement") if as_shares else ("value", "value")
     own = SHARE if as_shares else unit
     shown = in_unit(f"{name} in real", own.name)
 

@@ -29,15 +29,15 @@ SPEED = "speed [cm/s]"
 
 
 def worth(trials: Sequence[Trial], task: Task) -> Drawn:
-    """Return improvements where π0 is worth something in every trial, else values."""
-    shares = [trial.share for trial in trials if trial.share is not None]
-    if len(shares) == len(trials):
-        return Drawn("improvement over π0 in real [%]", shares)
+    """Return improvements where every trial has one to tell, else values."""
+    told = [trial.told_improvement for trial in trials if trial.told_improvement is not None]
+    if len(told) == len(trials):
+        return Drawn("improvement over π0 in real [%]", told)
     return Drawn(f"in real [{task.unit}]", [task.shown * trial.value for trial in trials])
 
 
 def improvement_cells(one: Summary) -> tuple[str, str]:
-    """Return a mean improvement and its interval [%], nothing where π0 is worth nothing."""
+    """Return a mean improvement and its interval [%], nothing where a trial has none to tell."""
     return ("", "") if one.improvement is None else (f"{one.improvement.mean:.1f}", bounds(one.improvement))
 
 
@@ -68,7 +68,7 @@ def one_by_one(trials: Sequence[Trial], task: Task) -> str:
         "trial": lambda one: str(one.number),
         f"π0 [{task.unit}]": lambda one: f"{task.shown * one.start:z.1f}",
         f"returned [{task.unit}]": lambda one: f"{task.shown * one.value:z.1f}",
-        "improvement [%]": lambda one: "" if one.share is None else f"{one.share:z.1f}",
+        "improvement [%]": lambda one: "" if one.told_improvement is None else f"{one.told_improvement:z.1f}",
         f"gained at least, 95 % [{task.unit}]": lambda one: f"{task.shown * one.surely:.1f}",
         "best generation": lambda one: str(one.generation or ""),
         "stable winners": lambda one: f"{one.stable} of {one.winners}",
@@ -87,4 +87,5 @@ def _field(name: str, trial: Trial) -> str:
 
 
 def _one(trial: Trial) -> str:
-    return "-" if trial.share is None else f"{trial.share:.1f}{'*' if trial.without else ''}"
+    told = trial.told_improvement
+    return "-" if told is None else f"{told:.1f}{'*' if trial.without else ''}"

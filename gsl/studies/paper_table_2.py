@@ -98,7 +98,7 @@ def _apart(trials: Sequence[Trial], one: Summary, other: str) -> str:
     cell = Cell(*one[:4])
     pair = [trial for trial in trials if trial.cell in (cell, cell._replace(method=other))]
     tried = {trial.method for trial in pair}
-    if one.method == other or other not in tried or any(trial.share is None for trial in pair):
+    if one.method == other or other not in tried or any(trial.told_improvement is None for trial in pair):
         return ""
     return told_difference(differences(trials, cell, other))
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from gsl.stages.headline import MANY, Unit, gained
+from gsl.stages.headline import Unit, telling
 
 
 class Cell(NamedTuple):
@@ -124,13 +124,13 @@ class Trial(NamedTuple):
     def told(self, unit: Unit) -> str:
         """Return the trial in a few words."""
         winners = f", {self.stable} of {self.winners} winners stable" if unit.falls else ""
-        more = "" if self.share is None else f" ({gained(self.share / 100.0)})"
+        more = "" if self.told_improvement is None else f" ({self.told_improvement:+.1f} %)"
         return f"{self.returned}, {unit.shown(self.value)}{more}{winners}"
 
     @property
-    def share(self) -> float | None:
-        """The improvement where it tells people something [%]: None also where π0 is worth next to nothing."""
-        return None if self.improvement is None or self.improvement > 100.0 * MANY else self.improvement
+    def told_improvement(self) -> float | None:
+        """The improvement that tables tell [%]: None also where it is of a π0 next to nothing, more than tenfold."""
+        return self.improvement if self.improvement is not None and telling(self.improvement / 100.0) else None
 
     @property
     def contradiction(self) -> str:
