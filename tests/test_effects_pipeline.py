@@ -121,13 +121,15 @@ def test_an_identification_that_finds_nothing_better_leaves_the_simulator_as_it_
     assert found["shrinkage"]["after"] == pytest.approx(found["shrinkage"]["before"], rel=1e-6)
 
 
-@pytest.mark.parametrize("grounding", ["sgat", "gat_gated", "randomised"])
-def test_every_other_grounding_goes_through_an_iteration(grounding: str, tmp_path: Path) -> None:
-    said = done(*LINE[:-2], f"name={grounding}", "accept=true", f"grounding={grounding}", folder=tmp_path)
+@pytest.mark.parametrize(
+    ("grounding", "predicts"), [("sgat", "gaussian"), ("sgat", "mixture"), ("gat_gated", "point"), ("randomised", "")]
+)
+def test_every_other_grounding_goes_through_an_iteration(grounding: str, predicts: str, tmp_path: Path) -> None:
+    chosen = [f"grounding={grounding}", *(["grounding.predicts=mixture"] if predicts == "mixture" else [])]
+    said = done(*LINE[:-2], f"name={grounding}", "accept=true", *chosen, folder=tmp_path)
     assert "real data: " in said.out
     optimized = loaded(tmp_path / f"runs/{grounding}/iteration_01/optimize/metrics.json")
     assert ("width" if grounding == "randomised" else "alpha") in optimized
     if grounding != "randomised":
         trained = loaded(tmp_path / f"runs/{grounding}/iteration_01/train_forward/config.yaml")["model"]
-        wanted = ("gaussian", 1) if grounding == "sgat" else ("point", 5)
-        assert (trained["likelihood"], trained["members"]) == wanted
+        assert (trained["likelihood"], trained["members"]) == (predicts, 5 if grounding == "gat_gated" else 1)
