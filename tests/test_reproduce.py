@@ -77,6 +77,9 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     assert what != "table2-paper" or {one["alpha"] for one in trials if one["method"] == "gat_alpha_1"} == {1.0}
     assert {one["simulator"] for one in trials} == ({"nao_ideal", "nao_weak"} if what == "table3" else {""})
     assert all((one["rank"] is not None) == (what in ("table2", "worlds")) for one in trials)
+    for one in trials:
+        assert [policy[0] for policy in one["tried"]] == list(range(one["winners"] + 1))
+        assert sum(policy[3] == 0 for policy in one["tried"][1:]) <= one["stable"]
     learned = {
         path.parent.parent.name: json.loads(path.read_text())["trajectories"]
         for path in folder.parent.rglob("sgat/*/**/train_forward/metrics.json")

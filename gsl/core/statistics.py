@@ -1,4 +1,4 @@
-"""Means, shares, medians and rank correlations of a handful of numbers, with intervals."""
+"""Means, shares, medians, rank correlations and concordances of a handful of numbers, with intervals."""
 
 from __future__ import annotations
 
@@ -65,6 +65,18 @@ def quantile_interval(values: Sequence[float] | np.ndarray, *, confidence: float
     outside = int(stats.binom.ppf((1.0 - confidence) / 2, n, 0.5))
     low, high = max(0, outside - 1), min(n - 1, n - outside)
     return Interval(float(np.median(ordered)), float(ordered[low]), float(ordered[high]))
+
+
+def concordance(figures: Sequence[float], outcomes: Sequence[float]) -> float:
+    """Return how often the larger figure goes with the larger outcome, of pairs whose outcomes differ; NaN if none do.
+
+    Both have the shape (n,); equal figures count half. It is Harrell's c, and of two outcomes the area under the ROC
+    curve.
+    """
+    x, y = np.asarray(figures, dtype=float), np.asarray(outcomes, dtype=float)
+    apart = y[:, None] > y[None, :]
+    larger = (x[:, None] > x[None, :]) + 0.5 * (x[:, None] == x[None, :])
+    return float(larger[apart].mean()) if apart.any() else np.nan
 
 
 def rank_correlation(first: np.ndarray, second: np.ndarray) -> float:

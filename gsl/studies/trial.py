@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -43,6 +43,7 @@ class Trial(NamedTuple):
         last: The same of the last generation's winner, which nothing real has chosen, in the episodes of the choice: up
             to its first fall where none is tolerated.
         last_falls: Of these episodes; None of trials that were written down before it was.
+        tried: Fields of the policies that were tried in real (see `Tried`); None likewise.
     """
 
     simulator: str
@@ -68,6 +69,7 @@ class Trial(NamedTuple):
     outcome: Mapping[str, float]
     last: Mapping[str, float]
     last_falls: int | None = None
+    tried: Sequence[Sequence[float | None]] | None = None
 
     @classmethod
     def of(
@@ -80,6 +82,7 @@ class Trial(NamedTuple):
         spent: int,
         first: Mapping[str, Any] | None = None,
         rank: float | None = None,
+        tried: Sequence[Sequence[float | None]] | None = None,
     ) -> Trial:
         """Read the metrics of a search and of its evaluation.
 
@@ -91,6 +94,7 @@ class Trial(NamedTuple):
             spent: Real episodes before this evaluation.
             first: Metrics of the first iteration's evaluation, which has measured π0; none if this is the first.
             rank: See the class.
+            tried: See the class.
         """
         start, after = (first or measured)["baseline"], measured["returned"]
         return cls(
@@ -114,6 +118,7 @@ class Trial(NamedTuple):
             outcome=after["outcome"],
             last=measured["last"]["outcome"],
             last_falls=measured["last"]["falls"],
+            tried=tried,
         )
 
     @property
