@@ -19,6 +19,7 @@ import pytest
 from gsl.errors import ArtifactError, GslError
 from gsl.storage import hashing, manifest
 from gsl.storage.artifact import Artifact, build
+from gsl.storage.documents import write_json
 
 
 @dataclass
@@ -326,3 +327,13 @@ def test_a_manifest_of_another_version_or_damaged_is_refused(out: Path) -> None:
         (out / "manifest.json").write_text(contents)
         with pytest.raises(ArtifactError):
             manifest.read(out)
+
+
+def test_a_json_file_has_numbers_of_a_list_on_one_line_and_is_read_as_it_was(tmp_path: Path) -> None:
+    value = {"a": [[1, -2.5e-07, None], [], ["1,\n2", 3]], "b": [{"c": [1.0]}], "d": "[\n 1,\n 2\n]"}
+    write_json(tmp_path / "a.json", value)
+    written = (tmp_path / "a.json").read_text(encoding="utf-8")
+    assert json.loads(written) == value
+    lines = [line.strip() for line in written.splitlines()]
+    assert "[1, -2.5e-07, null]," in lines
+    assert '"c": [1.0]' in lines

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from gsl.storage.whole import replacing
+
+_NUMBERS = re.compile(r"\[\s+(?:(?:-?\d[\d.eE+-]*|null),?\s+)+\]")  # no string holds a line end as such
 
 
 def plain(value: Any) -> Any:
@@ -47,6 +50,10 @@ def text(value: Any, *, indent: int | None = None) -> str:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write `value` as a JSON file a person can read, whole or not at all."""
+    """Write `value` as a JSON file a person can read, numbers of a list on one line, whole or not at all."""
     with replacing(path) as temporary:
-        temporary.write_text(text(value, indent=2) + "\n", encoding="utf-8")
+        temporary.write_text(_NUMBERS.sub(_on_one_line, text(value, indent=2)) + "\n", encoding="utf-8")
+
+
+def _on_one_line(numbers: re.Match[str]) -> str:
+    return f"[{', '.join(numbers[0][1:-1].replace(',', ' ').split())}]"
