@@ -36,8 +36,8 @@ def test_a_promise_that_tells_who_falls_is_told_with_its_interval_over_trials() 
         a_trial(1, "none", None, 1, 0, 0, 0),
     ]
     told = foretold(trials)
-    assert "| w | gat | 1 | 3 | 8 of 12 | 0.88 (0.00 to 1.00) | 0.88 (0.00 to 1.00) | 0.50 (0.50 to 0.50) |" in told
-    assert "| w | none | 1 | 1 | 1 of 4 | 0.00 | 0.00 |  |" in told
+    assert "| w | gat | 1 | 8 of 12 | 2 of 3 | 0.88 (0.00 to 1.00) | 0.88 (0.00 to 1.00) | 0.50 (0.50 to 0.50) |" in told
+    assert "| w | none | 1 | 1 of 4 | 1 of 1 | 0.00 | 0.00 |  |" in told
 
 
 def test_nothing_is_told_of_trials_without_a_fall_or_of_those_that_kept_none() -> None:

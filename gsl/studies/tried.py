@@ -75,15 +75,18 @@ def foretold(trials: Sequence[Trial]) -> str:
         own = [search for trial, search in searches if trial.cell == cell]
         fell = [one.falls > 0 for search in own for one in search]
         where = " ".join(filter(None, (cell.simulator, cell.world)))
-        told = (where, cell.method, str(cell.iteration), str(len(own)), f"{sum(fell)} of {len(fell)}")
+        telling = sum(len({one.falls for one in search}) > 1 for search in own)
+        counts = f"{sum(fell)} of {len(fell)}", f"{telling} of {len(own)}"
+        told = (where, cell.method, str(cell.iteration), *counts)
         rows.append((*told, *(_told(own, figure) for figure in TELLERS.values())))
     if not any(one.falls for _, search in searches for one in search):
         return ""
     head = (
         "What tells beforehand who falls: of two policies of a search, one of which falls more often in the choice,\n"
-        "how often that is the one with the larger figure (.5 is chance; 95 % over trials in which some do):\n"
+        "how often that is the one with the larger figure (.5 is chance; 95 % over the trials that have such two):\n"
     )
-    return "\n".join([head, table(("worlds", "grounding", "iteration", "trials", "tried that fell", *TELLERS), rows)])
+    titles = ("worlds", "grounding", "iteration", "tried that fell", "trials with such two", *TELLERS)
+    return "\n".join([head, table(titles, rows)])
 
 
 def _told(searches: Sequence[Sequence[Tried]], figure: Callable[[Tried], Any]) -> str:
