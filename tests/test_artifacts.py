@@ -330,7 +330,11 @@ def test_a_manifest_of_another_version_or_damaged_is_refused(out: Path) -> None:
 
 
 def test_a_json_file_has_numbers_of_a_list_on_one_line_and_is_read_as_it_was(tmp_path: Path) -> None:
-    value = {"a": [[1, -2.5e-07, None], [], ["1,\n2", 3]], "b": [{"c": [1.0]}], "d": "[\n 1,\n 2\n]"}
+    value = {
+        "a": [[1, -2.5e-07, None], [], ["1,\n2", 3]],
+        "b": [{"c": [1.0]}],
+        "d": "[\n 1,\n 2\n] [ 1, 2 ] [\u2028 3 \u2028]",
+    }
     write_json(tmp_path / "a.json", value)
     written = (tmp_path / "a.json").read_text(encoding="utf-8")
     assert json.loads(written) == value

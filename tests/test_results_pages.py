@@ -25,7 +25,7 @@ from gsl.studies.paper_cells import one_by_one
 from gsl.studies.replays import Replay, Replays
 from gsl.studies.reproduce import Reproduce
 from gsl.studies.trial import Trial
-from gsl.studies.tried import foretold
+from gsl.studies.tried import foretelling
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted((ROOT / "docs/results").glob("*.md")), ROOT / "docs/environments.md"]
@@ -98,7 +98,9 @@ def test_a_page_tells_what_is_committed(typed: list[str], tmp_path: Path) -> Non
     else:
         text = markdown(summaries(trials), trials, Unit.of(task))
     assert text.strip() in table.read_text(encoding="utf-8")
-    assert foretold(trials).strip() in table.read_text(encoding="utf-8")
+    foretold = foretelling(trials).strip()
+    assert foretold in table.read_text(encoding="utf-8")
+    assert bool(foretold) == ("What tells beforehand" in table.read_text(encoding="utf-8"))
 
 
 def trials_of(*names: str) -> list[Trial]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from gsl.storage.whole import replacing
 
-_NUMBERS = re.compile(r"\[\s+(?:(?:-?\d[\d.eE+-]*|null),?\s+)+\]")  # no string holds a line end as such
+_NUMBERS = re.compile(r"\[\n *(?:(?:-?[0-9][0-9.eE+-]*|null),?\n *)+\]")  # no string of JSON holds a bare line end
 
 
 def plain(value: Any) -> Any:

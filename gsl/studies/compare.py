@@ -24,7 +24,7 @@ from gsl.studies.comparison_table import markdown
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl.studies.trial import Cell, Trial
-from gsl.studies.tried import foretold, tried
+from gsl.studies.tried import foretelling, read_tried
 from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import try_out
 from gsl.worlds.world import World
@@ -68,7 +68,7 @@ class Compare:
         """Run all trials; write every trial's figures and the tables."""
         found, made = self.carried_out(folder, console)
         summary = summaries(found)
-        text = "\n".join(filter(None, (markdown(summary, found, Unit.of(self.iterate.task)), foretold(found))))
+        text = "\n".join(filter(None, (markdown(summary, found, Unit.of(self.iterate.task)), foretelling(found))))
         sizes = f"{sizes_of(self.preset_name)} {trials_of(self.first, self.trials)}."
         (folder / TABLE).write_text(f"{text}\n{sizes} {made}\n", encoding="utf-8")
         return {"trials": self.trials, "summaries": [one._asdict() for one in summary]}
@@ -152,7 +152,7 @@ class Compare:
                 spent=spent,
                 first=first,
                 rank=rank,
-                tried=tried(found.metrics, measured),
+                tried=read_tried(found.metrics, measured),
             )
             yield trial
             spent, previous, first = trial.real_episodes, str(measured.folder), first or measured.metrics

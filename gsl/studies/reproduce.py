@@ -18,7 +18,7 @@ from gsl.studies.method_colour import method_colour
 from gsl.studies.paper_cells import Drawn, one_by_one
 from gsl.studies.sizes import sizes_of, trials_of
 from gsl.studies.trial import Trial
-from gsl.studies.tried import foretold
+from gsl.studies.tried import foretelling
 from gsl.tasks.task import Task
 
 FIGURE, TRIALS = "trials.png", "trials.md"
@@ -60,7 +60,7 @@ class Reproduce(Compare):
         if absent := sorted(_named(self.table) - self.methods.keys()):
             console.status(f"no methods here, so that the table sets nothing against them: {', '.join(absent)}")
         trials, made = self.carried_out(folder, console, lambda: seconds(self))
-        told = filter(None, (self.table.markdown(trials, task), foretold(trials)))
+        told = filter(None, (self.table.markdown(trials, task), foretelling(trials)))
         parts = [*told, f"{sizes_of(self.preset_name)} {_sizes(self)}\n", made]
         (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
         (folder / TRIALS).write_text(one_by_one(trials, task), encoding="utf-8")

@@ -19,6 +19,25 @@ class Cell(NamedTuple):
     iteration: int
 
 
+class Tried(NamedTuple):
+    """A policy that a search found, or began with, in the real episodes of the choice.
+
+    Attributes:
+        generation: That found it, 0 for the one that the search began with.
+        promised: Its value in simulation, in the unit of the task; None of the first.
+        drift: Share of its time, 0 to 1, where the grounding has seen nothing; None where none is learned.
+        falls, episodes: Of the choice; up to the first fall where none is tolerated.
+        value: Mean of these in the unit of the task, falls counting as there.
+    """
+
+    generation: int
+    promised: float | None
+    drift: float | None
+    falls: int
+    episodes: int
+    value: float
+
+
 class Trial(NamedTuple):
     """One method, once, in one real world, after one iteration.
 
@@ -43,7 +62,7 @@ class Trial(NamedTuple):
         last: The same of the last generation's winner, which nothing real has chosen, in the episodes of the choice: up
             to its first fall where none is tolerated.
         last_falls: Of these episodes; None of trials that were written down before it was.
-        tried: Fields of the policies that were tried in real (see `Tried`); None likewise.
+        tried: Fields of each `Tried`, the policy that the search began with first; None likewise.
     """
 
     simulator: str
@@ -146,10 +165,23 @@ class Trial(NamedTuple):
                 return f"{few} {less}, {many} {more}"
         if not 0 <= self.falls <= self.episodes:
             return f"falls {self.falls}, episodes {self.episodes}"
+        if problem := self._untold():
+            return problem
         right = _improvement(self.start, self.value) if self.start > 0.0 else math.nan
         if self.improvement is not None and not math.isclose(self.improvement, right, abs_tol=1e-6):
             return f"improvement {self.improvement}, but start {self.start} and value {self.value}"
         return "" if self.number > 0 else f"number {self.number}"
+
+    def _untold(self) -> str:
+        """Return what is wrong with the policies that were tried."""
+        if self.tried is None:
+            return ""
+        if len(self.tried) != self.winners + 1:
+            return f"winners {self.winners}, but tried holds {len(self.tried)} policies and not one more"
+        for index, one in enumerate(self.tried):
+            if len(one) != len(Tried._fields) or None in (one[0], *one[3:]):
+                return f"tried[{index}] is not {', '.join(Tried._fields)}"
+        return ""
 
     @property
     def without(self) -> bool:
