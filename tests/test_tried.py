@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 
 from gsl.core.statistics import concordance
+from gsl.errors import ArtifactError
+from gsl.storage.documents import write_json
+from gsl.studies.ledger_file import read
 from gsl.studies.trial import Trial, Tried
 from gsl.studies.tried import foretelling, read_tried
 
@@ -42,7 +45,7 @@ def a_trial(number: int, method: str, *policies: tuple[float, float | None, int]
     some = {"start": 0.2, "value": 0.2, "improvement": 0.0, "surely": 0.0, "returned": "pi0", "generation": 0}
     counts = {"falls": 0, "episodes": 20, "stable": len(found), "improving": 0, "winners": len(found)}
     rest = {"alpha": None, "refused": False, "rank": None, "real_episodes": 9, "outcome": {}, "last": {}}
-    return Trial("", "w", method, 1, number, **some, **counts, **rest, tried=[list(one) for one in (start, *found)])
+    return Trial("", "w", method, 1, number, **some, **counts, **rest, tried=[start, *found])
 
 
 def test_figures_that_tell_who_falls_are_told_apart_with_intervals_over_trials() -> None:
@@ -65,9 +68,20 @@ def test_nothing_is_told_of_trials_without_a_fall_or_of_those_that_kept_none() -
     assert foretelling([a_trial(1, "gat", (0.1, 0.5, 1), (0.2, 0.5, 0))._replace(tried=None)]) == ""
 
 
-def test_a_file_that_keeps_something_else_contradicts_itself() -> None:
-    trial = a_trial(1, "gat", (0.1, 0.5, 1), (0.2, 0.5, 0))
-    assert trial.contradiction == ""
-    assert "tried holds 2 policies" in trial._replace(tried=[[0, None, None, 0, 5, 0.2]] * 2).contradiction
-    assert trial._replace(tried=[[1, 2, 3]] * 3).contradiction.startswith("tried[0] is not generation, promised, drift")
-    assert trial._replace(tried=[[None, None, None, 0, 5, 0.2]] * 3).contradiction.startswith("tried[0] is not")
+@pytest.mark.parametrize(
+    ("rows", "problem"),
+    [
+        ([[0, None, None, 0, 5, 0.2]] * 2, "tried holds 2 policies"),
+        ([[1, 2.0, 3.0]] * 3, "has tried.0.3"),
+        ([[0, None, None, 0, 5, 0.2, 1.0]] * 3, "has tried.0"),
+        ([[None, None, None, 0, 5, 0.2]] * 3, "has tried.0.0 None"),
+    ],
+)
+def test_a_file_that_keeps_something_else_is_refused(rows: list[Any], problem: str, tmp_path: Path) -> None:
+    trial, path = a_trial(1, "gat", (0.1, 0.5, 1), (0.2, 0.5, 0)), tmp_path / "trials.json"
+    whole = {**trial._asdict(), "recipe": "r", "made_by": "m"}
+    write_json(path, [whole])
+    assert Trial.read({name: read(path, Trial)["r"][0][name] for name in Trial._fields}) == trial
+    write_json(path, [{**whole, "tried": rows}])
+    with pytest.raises(ArtifactError, match=f"row 1 .*{problem}"):
+        read(path, Trial)

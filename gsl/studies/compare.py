@@ -99,14 +99,13 @@ class Compare:
         for (number, cell), key in keys.items():
             if ledger.take(key):
                 continue
-            where = " ".join(filter(None, (cell.simulator, cell.world)))
-            trials, part = [], f"{where}, {cell.method}, trial {number}"
+            trials, part = [], f"{cell.worlds}, {cell.method}, trial {number}"
             with console.part(part):
                 for trial in self._trial(home, simulators[cell.simulator], cell, number, console):
                     trials.append(trial)
                     console.status(f"{part}: {trial.told(Unit.of(self.iterate.task))}")
             ledger.add(key, [trial._asdict() for trial in trials])
-        return [Trial(**row) for row in ledger.figures], ledger.close(folder / DATA)
+        return [Trial.read(row) for row in ledger.figures], ledger.close(folder / DATA)
 
     @property
     def recipes(self) -> dict[tuple[int, Cell], str]:

@@ -51,7 +51,7 @@ def every_trial(trials: Sequence[Trial]) -> str:
     """Return the improvement of each single trial as a table."""
     cells = dict.fromkeys(trial.cell for trial in trials)
     rows = [
-        (" ".join(filter(None, (cell.simulator, cell.world))), cell.method, str(cell.iteration))
+        (cell.worlds, cell.method, str(cell.iteration))
         + (", ".join(_one(trial) for trial in trials if trial.cell == cell),)
         for cell in cells
     ]

@@ -18,6 +18,11 @@ class Cell(NamedTuple):
     method: str
     iteration: int
 
+    @property
+    def worlds(self) -> str:
+        """Both worlds as people are told them; the simulator only if it has a name."""
+        return f"{self.simulator} {self.world}".lstrip()
+
 
 class Tried(NamedTuple):
     """A policy that a search found, or began with, in the real episodes of the choice.
@@ -62,7 +67,7 @@ class Trial(NamedTuple):
         last: The same of the last generation's winner, which nothing real has chosen, in the episodes of the choice: up
             to its first fall where none is tolerated.
         last_falls: Of these episodes; None of trials that were written down before it was.
-        tried: Fields of each `Tried`, the policy that the search began with first; None likewise.
+        tried: The policies that were tried in real, that which the search began with first; None likewise.
     """
 
     simulator: str
@@ -88,7 +93,13 @@ class Trial(NamedTuple):
     outcome: Mapping[str, float]
     last: Mapping[str, float]
     last_falls: int | None = None
-    tried: Sequence[Sequence[float | None]] | None = None
+    tried: Sequence[Tried] | None = None
+
+    @classmethod
+    def read(cls, row: Mapping[str, Any]) -> Trial:
+        """Return a trial as a file's row, which has been checked, tells it."""
+        tried = row.get("tried")
+        return cls(**{**row, "tried": None if tried is None else [Tried._make(one) for one in tried]})
 
     @classmethod
     def of(
@@ -101,7 +112,7 @@ class Trial(NamedTuple):
         spent: int,
         first: Mapping[str, Any] | None = None,
         rank: float | None = None,
-        tried: Sequence[Sequence[float | None]] | None = None,
+        tried: Sequence[Tried] | None = None,
     ) -> Trial:
         """Read the metrics of a search and of its evaluation.
 
@@ -165,23 +176,12 @@ class Trial(NamedTuple):
                 return f"{few} {less}, {many} {more}"
         if not 0 <= self.falls <= self.episodes:
             return f"falls {self.falls}, episodes {self.episodes}"
-        if problem := self._untold():
-            return problem
+        if self.tried is not None and len(self.tried) != self.winners + 1:
+            return f"winners {self.winners}, but tried holds {len(self.tried)} policies and not one more"
         right = _improvement(self.start, self.value) if self.start > 0.0 else math.nan
         if self.improvement is not None and not math.isclose(self.improvement, right, abs_tol=1e-6):
             return f"improvement {self.improvement}, but start {self.start} and value {self.value}"
         return "" if self.number > 0 else f"number {self.number}"
-
-    def _untold(self) -> str:
-        """Return what is wrong with the policies that were tried."""
-        if self.tried is None:
-            return ""
-        if len(self.tried) != self.winners + 1:
-            return f"winners {self.winners}, but tried holds {len(self.tried)} policies and not one more"
-        for index, one in enumerate(self.tried):
-            if len(one) != len(Tried._fields) or None in (one[0], *one[3:]):
-                return f"tried[{index}] is not {', '.join(Tried._fields)}"
-        return ""
 
     @property
     def without(self) -> bool:

@@ -11,7 +11,7 @@ from gsl.core.statistics import concordance, mean_interval
 from gsl.report.markdown import table
 from gsl.stages.evaluate import TABLE
 from gsl.storage.artifact import Artifact
-from gsl.studies.trial import Trial, Tried
+from gsl.studies.trial import Cell, Trial, Tried
 
 DIGITS = 6  # of a value that is kept
 FEWEST = 5  # trials for an interval
@@ -46,17 +46,18 @@ def read_tried(found: Mapping[str, Any], measured: Artifact) -> list[Tried]:
 
 def foretelling(trials: Sequence[Trial]) -> str:
     """Return as a table how well figures of the simulator tell which policies fall, nothing where none fell."""
-    searches = [(trial, [Tried._make(one) for one in trial.tried[1:]]) for trial in trials if trial.tried]
-    if not any(one.falls for _, search in searches for one in search):
+    searches: dict[Cell, list[Sequence[Tried]]] = {}
+    for trial in trials:
+        if trial.tried:
+            searches.setdefault(trial.cell, []).append(trial.tried[1:])
+    if not any(one.falls for own in searches.values() for search in own for one in search):
         return ""
     rows = []
-    for cell in dict.fromkeys(trial.cell for trial, _ in searches):
-        own = [search for trial, search in searches if trial.cell == cell]
+    for cell, own in searches.items():
         telling = [search for search in own if len({one.falls for one in search}) > 1]
         fell = [one.falls > 0 for search in own for one in search]
-        where = " ".join(filter(None, (cell.simulator, cell.world)))
         counts = f"{sum(fell)} of {len(fell)}", f"{len(telling)} of {len(own)}"
-        told = (where, cell.method, str(cell.iteration), *counts)
+        told = (cell.worlds, cell.method, str(cell.iteration), *counts)
         rows.append((*told, *(_told(telling, figure) for figure in PREDICTORS.values())))
     head = (
         "What tells beforehand who falls: of two policies of a search, one of which falls more often in the choice,\n"
