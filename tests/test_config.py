@@ -220,16 +220,18 @@ NEEDED = {  # what has no default
 
 
 def _choices() -> Iterator[tuple[str, ...]]:
-    """Commands with choices as they are typed: in a command's n-th line every group takes its n-th option."""
+    """Commands with choices as they are typed: every option of a group is in a line, those of methods among them."""
     conf = configuration_folder()
     for command in sorted(conf.glob("*.yaml")):
         defaults = yaml.safe_load(command.read_text()).get("defaults", [])
         groups = [
-            entry for entry in defaults if isinstance(entry, dict) and not next(iter(entry)).startswith("override")
+            next(iter(entry)).lstrip("/")
+            for entry in defaults
+            if isinstance(entry, dict) and not next(iter(entry)).startswith("override")
         ]
-        found = [_typed(next(iter(entry)).lstrip("/"), conf, command.stem) for entry in groups]
+        found = [typed for typed in _shares(groups, conf, command.stem) if typed]
         for number in range(max(map(len, found), default=0)):
-            chosen = (typed[min(number, len(typed) - 1)] for typed in found if typed)
+            chosen = (typed[min(number, len(typed) - 1)] for typed in found)
             yield command.stem.replace("_", "-"), *chosen, *NEEDED.get(command.stem, ())
     experiments = sorted(option.stem for option in (conf / "experiment").glob("*.yaml"))
     cart = ("sim.env_id=examples.cart:Cart", "real.env_id=examples.cart:Cart")
@@ -256,6 +258,14 @@ def _choices() -> Iterator[tuple[str, ...]]:
         policy = "action_table" if world.stem.startswith("cliff") else "mlp"
         for command in ("collect", "optimize"):
             yield command, f"world={world.stem}", *place, "task=own_reward", f"policy={policy}"
+
+
+def _shares(groups: list[str], conf: Path, command: str) -> Iterator[list[str]]:
+    """Yield what each group takes, line by line; the methods of a study, or its worlds, share the options."""
+    kinds = [group.partition(".")[0] for group in groups]
+    for place, (group, kind) in enumerate(zip(groups, kinds, strict=True)):
+        typed = _typed(group, conf, command)
+        yield typed[kinds[:place].count(kind) :: kinds.count(kind)] or typed[-1:]
 
 
 def _typed(group: str, conf: Path, command: str) -> list[str]:
