@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import yaml
 from commands import SMALL, Said, done
 
+from gsl.errors import ConfigError
+from gsl.policies.excitation import Excitation
+from gsl.stages import diagnosis_plan
+from gsl.stages.diagnosis_plan import DiagnosisPlan
 from gsl.storage.policies import read_policies
 from gsl.storage.trajectories import read
+from gsl.worlds.bullet import BulletWorld
 
 LATE = ("real=nao_ideal", "real.effects.command_latency.delay=0.02")
 LINE = ("iterate", *SMALL, *LATE, "name=air", "accept=true")
@@ -111,6 +117,19 @@ def test_identification_fits_the_same_log_without_a_verdict(air: tuple[Path, Sai
     assert 0.01 < found["effects"]["command_latency"][0]["delay"] < 0.025
     assert found["shrinkage"]["after"] < 0.6 * found["shrinkage"]["before"]
     assert "Diagnosis: identified. 18 parameters of 17 effects were fitted at once: held out, " in said.out
+
+
+def test_what_a_plan_leaves_out_is_no_candidate(monkeypatch: pytest.MonkeyPatch) -> None:
+    stages: list[Any] = []
+    log = SimpleNamespace(folder="log")
+    monkeypatch.setattr(diagnosis_plan, "built", lambda stage, *_: stages.append(stage) or log)
+    plan = DiagnosisPlan(Excitation("nao"), without=("command_latency",))
+    world = BulletWorld("nao", {})
+    for method in ("diagnose", "identify"):
+        plan.carried_out(world, world, method, Path("home"), workers=1, seed=1, console=None)
+        assert (stages[-1].kind, stages[-1].without) == (method, ("command_latency",))
+    with pytest.raises(ConfigError, match="latency: no effect of this name; did you mean command_latency"):
+        DiagnosisPlan(Excitation("nao"), without=("latency",))
 
 
 def test_an_identification_that_finds_nothing_better_leaves_the_simulator_as_it_is(air: tuple[Path, Said]) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 from gsl.core.setting import component, setting
+from gsl.diagnosis.options import Options
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, Diagnosis
 from gsl.grounding.grounding import Grounding
@@ -14,6 +15,7 @@ from gsl.policies.excitation import Excitation
 from gsl.stages.collect import Collect
 from gsl.stages.diagnose import Diagnose
 from gsl.stages.diagnosis_files import read_diagnosis
+from gsl.stages.diagnosis_settings import Without
 from gsl.stages.identify import Identify
 from gsl.stages.link import built
 from gsl.storage import manifest
@@ -36,6 +38,11 @@ class DiagnosisPlan:
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
     evaluations: Annotated[int, setting("replays that an identification may take", ge=16)] = 4800
+    without: Without = ()
+
+    def __post_init__(self) -> None:
+        """Refuse names that no effect has, before a robot moves."""
+        Options(self.without)
 
     def carried_out(
         self, real: World, sim: World, method: str, home: Path, *, workers: int, seed: int, console: Any
@@ -58,12 +65,13 @@ class DiagnosisPlan:
         )
         log = built(played, home / EXCITATION, console)
         stage: Diagnose | Identify = Identify(
-            str(log.folder), sim, evaluations=self.evaluations, workers=workers, seed=seed
+            str(log.folder), sim, self.without, evaluations=self.evaluations, workers=workers, seed=seed
         )
         if method == Diagnose.kind:
             stage = Diagnose(
                 real=str(log.folder),
                 sim=sim,
+                without=self.without,
                 most=self.most,
                 duels=self.duels,
                 nulls=self.nulls,
