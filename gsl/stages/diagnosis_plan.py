@@ -65,7 +65,7 @@ class DiagnosisPlan:
         )
         log = built(played, home / EXCITATION, console)
         stage: Diagnose | Identify = Identify(
-            str(log.folder), sim, self.without, evaluations=self.evaluations, workers=workers, seed=seed
+            str(log.folder), sim, without=self.without, evaluations=self.evaluations, workers=workers, seed=seed
         )
         if method == Diagnose.kind:
             stage = Diagnose(
