@@ -87,7 +87,7 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["gsl", "collect", "world", "=", "nao_w"], {"nao_weak", "nao_worn"}),
+        (["gsl", "collect", "world", "=", "nao_w"], {"nao_weak", "nao_weak_uneven", "nao_worn"}),
         (["gsl", "collect", "world", "=", "wo"], {"worn"}),
         (["gsl", "collect", "world", "=", "id"], {"ideal"}),
         (["gsl", "evaluate", "real", "=", "id"], {"ideal"}),
