@@ -52,6 +52,10 @@ def told() -> list[list[str]]:
     return found
 
 
+def as_trial(row: dict[str, Any]) -> Trial:
+    return Trial.read({name: row[name] for name in Trial._fields if name in row})
+
+
 def composed(typed: list[str]) -> Any:
     what, rest = (f"reproduce_{typed[1]}", typed[2:]) if typed[0] == "reproduce" else (typed[0], typed[1:])
     with opened(None):
@@ -82,7 +86,7 @@ def test_a_page_tells_what_is_committed(typed: list[str], tmp_path: Path) -> Non
         return
     of = {row["recipe"]: [] for row in rows}
     for row in rows:
-        of[row["recipe"]].append(Trial.read({name: row[name] for name in Trial._fields if name in row}))
+        of[row["recipe"]].append(as_trial(row))
     for (number, cell), key in keys.items():
         told_of = {(one.number, one.simulator, one.world, one.method) for one in of[key]}
         assert told_of == {(number, cell.simulator, cell.world, cell.method)}
@@ -108,7 +112,7 @@ def trials_of(*names: str) -> list[Trial]:
     rows = [
         row for name in names for row in json.loads((ROOT / "docs/results" / name / "trials.json").read_text("utf-8"))
     ]
-    return [Trial.read({name: row[name] for name in Trial._fields if name in row}) for row in rows]
+    return [as_trial(row) for row in rows]
 
 
 def test_the_aims_of_table_2_stand_beside_its_trials() -> None:
