@@ -11,10 +11,15 @@ import pytest
 import yaml
 from commands import SMALL, Said, done
 
+from gsl.core.setting import settings_of
+from gsl.core.validation import make
 from gsl.errors import ConfigError
 from gsl.policies.excitation import Excitation
 from gsl.stages import diagnosis_plan
+from gsl.stages.cross_validate import CrossValidate
+from gsl.stages.diagnose import Diagnose
 from gsl.stages.diagnosis_plan import DiagnosisPlan
+from gsl.stages.identify import Identify
 from gsl.storage.policies import read_policies
 from gsl.storage.trajectories import read
 from gsl.worlds.bullet import BulletWorld
@@ -128,8 +133,15 @@ def test_what_a_plan_leaves_out_is_no_candidate(monkeypatch: pytest.MonkeyPatch)
     for method in ("diagnose", "identify"):
         plan.carried_out(world, world, method, Path("home"), workers=1, seed=1, console=None)
         assert (stages[-1].kind, stages[-1].without) == (method, ("command_latency",))
-    with pytest.raises(ConfigError, match="latency: no effect of this name; did you mean command_latency"):
-        DiagnosisPlan(Excitation("nao"), without=("latency",))
+
+
+@pytest.mark.parametrize("stage", [Diagnose, Identify, CrossValidate, DiagnosisPlan])
+def test_no_stage_leaves_out_an_effect_that_there_is_none_of(stage: type) -> None:
+    needed = {"real": "log", "sim": BulletWorld("nao", {}), "excitation": Excitation("nao"), "by": "gain"}
+    given = {name: value for name, value in needed.items() if name in settings_of(stage)}
+    where = r"^plan\.without = .*: latency: no effect of this name; did you mean command_latency\?$"
+    with pytest.raises(ConfigError, match=where):
+        make(stage, {**given, "without": ["latency"]}, where="plan")
 
 
 def test_an_identification_that_finds_nothing_better_leaves_the_simulator_as_it_is(air: tuple[Path, Said]) -> None:

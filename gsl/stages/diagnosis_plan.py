@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 from gsl.core.setting import component, setting
-from gsl.diagnosis.options import Options
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, Diagnosis
 from gsl.grounding.grounding import Grounding
@@ -39,10 +38,6 @@ class DiagnosisPlan:
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
     evaluations: Annotated[int, setting("replays that an identification may take", ge=16)] = 4800
     without: Without = ()
-
-    def __post_init__(self) -> None:
-        """Refuse names that no effect has, before a robot moves."""
-        Options(self.without)
 
     def carried_out(
         self, real: World, sim: World, method: str, home: Path, *, workers: int, seed: int, console: Any

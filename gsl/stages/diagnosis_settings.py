@@ -5,12 +5,29 @@ from __future__ import annotations
 import time
 from typing import Annotated, Any, Literal
 
+from pydantic import AfterValidator
+
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import setting
+from gsl.effects.effect import effect_class
+from gsl.errors import ConfigError
 
 QUIET = 15.0  # of a phase that takes long [s]
 
-Without = Annotated[tuple[str, ...], setting("effects that are left out of the library")]
+
+def _in_the_library(effects: tuple[str, ...]) -> tuple[str, ...]:
+    """Refuse names that no effect has, before a robot moves."""
+    for name in effects:
+        try:
+            effect_class(name)
+        except ConfigError as error:
+            raise ValueError(f"{name}: {error.problem}") from None
+    return effects
+
+
+Without = Annotated[
+    tuple[str, ...], setting("effects that are left out of the library"), AfterValidator(_in_the_library)
+]
 Clocks = Annotated[
     Literal["synchronised", "unsynchronised"] | None,
     setting("whether commands and measurements share a clock, else no latency is claimed; what the log says if null"),
