@@ -20,9 +20,10 @@ demo: $(INSTALLED) ## Improve a walk for a "real" robot that the optimiser never
 	@echo "what there is to look at:"
 	@find runs/demo -type f \( -name '*.png' -o -name '*.md' -o -name '*.parquet' -o -name 'policies.json' \) | sort
 
+# Two workers have two cores: threads of matrix products would only be in their way.
 test: $(INSTALLED) ## Check the style, run the tests.
 	$(VENV)/bin/ruff check
-	$(VENV)/bin/python -m pytest -q -n 2
+	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n 2
 
 real: xl330 so101 menagerie go2 ## Diagnose logs of three real robots (docs/real-robots.md); half an hour.
 
