@@ -136,6 +136,29 @@ def test_the_aims_of_table_2_stand_beside_its_trials() -> None:
         assert spent == f"{found.real_episodes:.0f}"
 
 
+def test_the_guide_tells_gains_and_falls_of_the_trials() -> None:
+    """Of a policy that was returned, and of those that were tried."""
+    guide = (ROOT / "docs/grounding.md").read_text(encoding="utf-8")
+    _, (_, *worlds), rows = next(one for one in tables(guide) if "`nao_harsh`" in one[1])
+    ten, twenty = trials_of("table2"), trials_of("table2", "table2_again")
+    itself = [
+        one._replace(method="learned in this world itself") for one in trials_of("table2_in_weak", "table2_in_worn")
+    ]
+    elsewhere = {"`nao_worn`, its causes withheld": trials_of("withheld")}
+    told = 0
+    for named, *cells in rows:
+        method = named.strip("`")
+        first = twenty if method in {one.method for one in trials_of("table2_again")} else [*ten, *itself]
+        for title, cell in zip(worlds, cells, strict=True):
+            among = elsewhere.get(title, [*first, *trials_of("worlds")])
+            own = [one for one in among if (one.world, one.method) == (title.split("`")[1], method)]
+            gain = sum(one.improvement for one in own) / max(len(own), 1)
+            fell = 100 * sum(one.winners - one.stable for one in own) / max(sum(one.winners for one in own), 1)
+            assert cell == (f"{gain:.1f} ({fell:.0f})" if own else ""), (method, title)
+            told += bool(cell)
+    assert told == 30
+
+
 def by_number(study: Any) -> dict[int, set[str]]:
     """The recipes of each trial."""
     found: dict[int, set[str]] = {}
