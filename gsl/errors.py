@@ -1,6 +1,7 @@
 """The tree of errors a user can cause; each says what is wrong, where, and what to do.
 
 GslError                    exit code 1: a stage failed
+├── Refused                 a grounding fails its check
 └── InputError              exit code 2: usage, configuration, files
     ├── ConfigError         a setting does not exist or has an impossible value
     ├── ArtifactError       an artifact is missing, foreign, incomplete or of another version
@@ -29,6 +30,10 @@ def _again(kind: type[GslError], args: tuple[Any, ...], state: dict[str, Any]) -
     error = kind.__new__(kind, *args)
     error.__dict__.update(state)
     return error
+
+
+class Refused(GslError):
+    """A grounding fails its check, so that nothing is optimised in it."""
 
 
 class Waiting(GslError):

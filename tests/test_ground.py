@@ -5,11 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import STANCE, held, walked, world
+from scenarios import GROUND
 from scipy.spatial.transform import Rotation
 from test_rotor import momentum
 
 from gsl.core.plant import Contact, Push, nominal
+from gsl.errors import ConfigError
+from gsl.grounding.none import NoGrounding
+from gsl.policies.walk_engine import WalkEngine
 from gsl.robots.nao import nao
+from gsl.stages.rollout import Scenario
+from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletEnv
 from gsl.worlds.engine import Engine, Physics
 from gsl.worlds.ground import FLAT, REACH, random_heights
@@ -184,3 +190,11 @@ def test_a_held_base_does_not_feel_a_push() -> None:
         rows.append([env.step(STANCE)[0] for _ in range(10)])
         env.close()
     np.testing.assert_allclose(rows[1], rows[0], atol=1e-9)
+
+
+def test_a_walk_beyond_the_end_of_random_ground_is_refused() -> None:
+    uneven = replace(GROUND, effects=ROUGH)
+    Scenario(uneven, Walk(duration=7.5), WalkEngine(), "real", NoGrounding())
+    Scenario(GROUND, Walk(duration=20.0), WalkEngine(), "real", NoGrounding())
+    with pytest.raises(ConfigError, match=r"task.duration = 20: leads beyond the uneven ground, .* after 7\.5 s"):
+        Scenario(uneven, Walk(duration=20.0), WalkEngine(), "real", NoGrounding())

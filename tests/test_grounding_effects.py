@@ -22,6 +22,7 @@ from gsl.grounding.ane import ActionNoise
 from gsl.grounding.effects import DiagnosedEffects, Diagnosis, innermost, switched_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.randomised import RandomisedEffects
 from gsl.stages.effects_check import check_effects
 from gsl.stages.grounding_gate import Gate, grounding_parents
 from gsl.stages.rollout import Scenario, rollout
@@ -109,6 +110,13 @@ def test_effects_with_which_nobody_can_stand_are_refused(tmp_path: Path) -> None
     _, about = replace(gate, accept=True).passed(scenario)
     assert about["grounding_acceptable"] is False
     assert json.loads((tmp_path / "grounding.json").read_text())["pi0"]["falls"] == 4
+
+
+def test_effects_around_drawn_ones_are_checked_too(tmp_path: Path) -> None:
+    given = DiagnosedEffects(effects=LATE, inner=RandomisedEffects(("link_mass",), width=0.1))
+    _, about = passed(replace(arm(), grounding=given), tmp_path)
+    assert about["width"] == 0.1 and about["grounding_acceptable"]
+    assert json.loads((tmp_path / "grounding.json").read_text())["effects"] == LATE
 
 
 def test_effects_that_take_the_held_out_gap_nowhere_are_a_problem() -> None:

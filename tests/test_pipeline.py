@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from commands import SMALL, Said, done, gsl, started
+
+from gsl.errors import Refused
+from gsl.stages.chain import Chain
+from gsl.stages.iteration_report import Rounds
 
 NAMED = (*SMALL, "name=chain")
 STAGES = ("collect_real", "collect_sim", "train_forward", "train_inverse", "optimize", "evaluate")
@@ -21,6 +26,24 @@ def test_every_stage_leaves_a_complete_artifact(chain: Path) -> None:
         assert there == files | {"manifest.json"}
     stored = json.loads((chain / "runs/chain/optimize/manifest.json").read_text())
     assert {one["role"] for one in stored["parents"]} == {"grounding.forward_model", "grounding.inverse_model"}
+
+
+def test_an_iteration_whose_grounding_is_refused_leaves_what_the_one_before_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    once = Chain.round
+
+    def round_(chain: Chain, place: Path, *rest: Any, **more: Any) -> Any:
+        if place.name != "iteration_01":
+            raise Refused("this grounding is refused: it is no nearer. Collect more data")
+        return once(chain, place, *rest, **more)
+
+    monkeypatch.setattr(Chain, "round", round_)
+    monkeypatch.setattr(Rounds, "rising", True)
+    said = done("iterate", *NAMED, "grounding=none", "iterations=3", folder=tmp_path)
+    why = "Iteration 2 ended after 0 real episodes: this grounding is refused: it is no nearer. Collect more data."
+    assert f"warning: {why}" in said.err and why in (tmp_path / "runs/chain/iterate/table.md").read_text()
+    assert (tmp_path / "runs/chain/iterate/policies.json").is_file()
 
 
 def test_nothing_half_written_is_left_behind(chain: Path) -> None:
@@ -103,7 +126,7 @@ def test_a_grounding_that_fails_its_check_is_refused_with_the_reason(chain: Path
     said = gsl("optimize", *NAMED, *settings, folder=chain)
     assert said.code == 1
     assert "this grounding is refused: " in said.err and "accept=true" in said.err
-    assert "forward 0.2 s [mm]" in said.out
+    assert "forward 10 ticks [mm]" in said.out
     test_nothing_half_written_is_left_behind(chain)
 
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scenarios import QUIET, walk
 
 from gsl.effects.effect import documented
-from gsl.errors import ConfigError
+from gsl.errors import ConfigError, Refused
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import Draw, RandomisedEffects, randomised
 from gsl.robots.catalogue import robot
+from gsl.stages.grounding_gate import Gate
 from gsl.worlds.bullet import BulletWorld
 
 WORLD = BulletWorld(robot="nao", effects={"coulomb_friction": {"torque": 0.1}}, floating=False, settle=0.0)
@@ -66,6 +69,17 @@ def test_effects_that_cannot_be_drawn_are_refused(name: str) -> None:
 def test_a_world_without_effects_is_refused() -> None:
     with pytest.raises(ConfigError, match="only Bullet worlds"):
         randomised(NoGrounding(), SETTINGS, 0.5)
+
+
+def test_a_width_in_which_pi0_falls_is_refused_even_if_it_is_the_least(tmp_path: Path) -> None:
+    drawn = RandomisedEffects(("gravity_tilt",), width=1.0)
+    scenario = replace(walk(duration=2.0), grounding=drawn)
+    scenario = replace(scenario, world=replace(scenario.world, effects={"torque_limit": {"factor": 0.05}}))
+    gate = Gate(scenario.policy.initial, tmp_path, QUIET, False, 1)
+    with pytest.raises(Refused, match=r"π0 falls in 4 of 4 episodes that draw from 100 % of the documented ranges"):
+        gate.passed(scenario)
+    _, about = replace(gate, accept=True).passed(scenario)
+    assert about == {"width": 1.0, "grounding_acceptable": False}
 
 
 def test_a_width_of_ones_own_is_the_only_one_tried() -> None:

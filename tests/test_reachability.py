@@ -112,6 +112,8 @@ def test_a_region_holds_its_own_kind_and_little_else() -> None:
     known = region(samples(2000), samples(2000))
     assert known.outside(samples(4000)) == pytest.approx(1.0 - INSIDE, abs=0.006)
     assert known.outside(samples(100) + 20.0) == 1.0
+    still = region(samples(2000) * [0, 1, 1, 1, 1, 1], samples(2000) * [0, 1, 1, 1, 1, 1])
+    assert still.outside(samples(4000) * [0, 1, 1, 1, 1, 1] + [1e-6, 0, 0, 0, 0, 0]) < 0.02
 
 
 def test_a_policy_that_does_something_else_drifts_from_the_data() -> None:

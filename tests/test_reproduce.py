@@ -211,6 +211,10 @@ def test_two_studies_may_write_one_ledger(tmp_path: Path) -> None:
     one.add("a", [{"number": 1, "value": 1.0}])
     other.add("b", [{"number": 2, "value": 2.0}])
     assert [row["recipe"] for row in json.loads(path.read_text())] == ["b", "a"]
+    third = Ledger(path, {}, Figure, Silent())
+    one.add("c", [{"number": 3, "value": 3.0}])
+    assert third.take("a")
+    assert {row["recipe"] for row in json.loads(path.read_text())} == {"a", "b", "c"}
 
 
 @pytest.mark.parametrize(

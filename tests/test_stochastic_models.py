@@ -148,6 +148,15 @@ def test_calibration_finds_how_wide_errors_are_and_how_long_they_last(head: Head
     np.testing.assert_allclose(scale, np.broadcast_to([1.5, 0.8], scale.shape), rtol=0.06)
 
 
+def test_a_joint_that_is_quite_still_has_no_memory() -> None:
+    network, rng = a_network(GAUSSIAN), np.random.default_rng(0)
+    inputs = rng.normal(size=(300, SIZE))
+    outputs = GAUSSIAN.expected(network.predict_many(inputs))
+    outputs[:, 0] += rng.normal(size=300)
+    _, memory = calibrated(network, GAUSSIAN, [(inputs, outputs)])
+    assert memory[1] == 0.0 and np.isfinite(memory).all()
+
+
 def test_a_linear_mixture_is_refused() -> None:
     with pytest.raises(ConfigError, match="a linear model has no mixture"):
         ModelConfig(family="linear", likelihood="mixture")

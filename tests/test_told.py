@@ -10,7 +10,8 @@ import pytest
 from gsl.stages.account import returned
 from gsl.stages.headline import Unit
 from gsl.stages.iteration_report import Rounds
-from gsl.stages.measured import gain
+from gsl.stages.measured import gain, summary
+from gsl.stages.population import Episode
 from gsl.storage.artifact import Artifact
 from gsl.tasks.own_reward import OwnReward
 from gsl.tasks.walk import Walk
@@ -59,6 +60,24 @@ def test_the_verdict_says_which_iteration_is_returned_and_why_there_are_no_more(
     rounds.add(evaluation(-14.2, -13.4, -2.0, 4.0), 10)
     assert "returned by iteration 1 -14.6" in rounds.verdict
     assert "The gain of iteration 2 is not sure: no other follows." in rounds.verdict
+
+
+def test_an_iteration_that_ends_at_its_grounding_costs_what_it_collected() -> None:
+    rounds = Rounds(OwnReward())
+    rounds.add(evaluation(-20.0, -14.6, 3.0, 8.0), 10)
+    spent = rounds.metrics()["real_episodes"]
+    said = rounds.refused("this grounding is refused: it is no nearer", 7)
+    found = rounds.metrics()
+    assert said == "warning: Iteration 2 ended after 7 real episodes: this grounding is refused: it is no nearer."
+    assert said.removeprefix("warning: ") in found["verdict"] and found["returned_iteration"] == 1
+    assert (found["real_episodes"], found["learned_from"], found["stopped_by_itself"]) == (spent + 7, 17, True)
+
+
+def test_a_value_that_somebody_wrote_down_stands_beside_a_log() -> None:
+    logged, written = Episode(0.2, False, 50, {"speed [cm/s]": 20.0}), Episode(0.3, False, 50, {})
+    for done in ([logged, written], [written, logged]):
+        assert summary(done)["outcome"] == {} and summary(done)["value"] == pytest.approx(0.25)
+    assert summary([logged, logged])["outcome"] == {"speed [cm/s]": 20.0}
 
 
 def test_where_pi0_is_returned_nothing_is_gained() -> None:

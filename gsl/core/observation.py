@@ -32,9 +32,9 @@ def observations(episode: Trajectory, layout: Layout) -> np.ndarray:
     return states
 
 
-def placed(episode: Trajectory) -> bool:
-    """Tell whether an episode was recorded with anything of the base, so that a simulation may start from it."""
-    return any(name.startswith("base.") for name in episode.sensors)
+def missing(episode: Trajectory, layout: Layout) -> list[str]:
+    """Return the parts of an observation that an episode does not tell, without which no simulation starts from it."""
+    return [part for part, columns in layout.columns.items() if not episode.sensors.keys() >= set(columns)]
 
 
 def sensed(episode: Trajectory, sensors: Iterable[str]) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 
 INSIDE = 0.99  # share of unseen samples of the same kind that the ellipsoid holds
 RIDGE = 1e-3  # of the correlations: a gait makes all joints nearly collinear
+LEAST = 1e-4  # standard deviation of a column [rad, or its own unit]: no encoder sees that a joint is not quite still
 
 
 class Region(NamedTuple):
@@ -34,7 +35,7 @@ class Region(NamedTuple):
 
 def region(samples: np.ndarray, unseen: np.ndarray) -> Region:
     """Return the ellipsoid of samples, shape (N, n), as wide as unseen ones of the same kind, shape (M, n), need it."""
-    mean, sd = samples.mean(axis=0), np.maximum(samples.std(axis=0), 1e-9)
+    mean, sd = samples.mean(axis=0), np.maximum(samples.std(axis=0), LEAST)
     scaled = (samples - mean) / sd
     values, axes = np.linalg.eigh(scaled.T @ scaled / len(scaled))
     whitening = (axes / np.sqrt(values + RIDGE)).T / sd

@@ -32,7 +32,9 @@ def calibrated(network: Network, head: Head, episodes: Sequence[Samples]) -> tup
     scale = np.clip(np.sqrt(np.mean(together**2, axis=0)), *SCALE)
     mean, variance = together.mean(axis=0), together.var(axis=0)
     steps = np.concatenate([(one[:-1] - mean) * (one[1:] - mean) for one in errors])
-    memory = steps.mean(axis=0) / variance if len(steps) else np.zeros_like(scale)
+    memory = np.zeros_like(scale)
+    if len(steps):  # an error that never changes, as of a joint that is quite still, has no memory
+        np.divide(steps.mean(axis=0), variance, out=memory, where=variance > 0.0)
     *hidden, (weight, bias) = [(weight, bias) for weight, bias in network.layers]
     wider = np.tile(np.log(scale), head.components)  # the last outputs are logarithms of standard deviations
     added = np.concatenate([np.zeros(len(bias) - len(wider)), wider])

@@ -1,4 +1,4 @@
-"""How far the simulator, grounded or not, is from the real robot after 0.2 s of the same actions, joint by joint."""
+"""How far the simulator, grounded or not, is from the real robot after ten ticks of the same actions, joint by joint."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def grounding_errors_figure(groups: Mapping[str, Errors], *, title: str | None =
         for axes, (name, errors) in zip(panels, groups.items(), strict=True):
             _draw(axes, errors)
             axes.set_title(f"trajectories {name}", loc="left", fontsize=10.5)
-            axes.set_ylabel("error after 0.2 s [°]")
+            axes.set_ylabel("error after ten ticks [°]")
         panels[0].set_ylim(0.0, _top(groups))
         panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, borderaxespad=0.2)
         headline(whole, title or _finding(groups))

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from gsl.models.free_run import TICKS
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.markdown import in_unit
 from gsl.stages.diagnosis_files import report_of
 from gsl.stages.headline import Unit, several, unit_of
-from gsl.stages.measured import cells, columns
+from gsl.stages.measured import cells, columns, shared
 from gsl.storage.artifact import Artifact
 
 
@@ -76,8 +77,8 @@ def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told
         "one_step_deg": "one tick [°]",
         "one_step_no_change_deg": "no change, one tick [°]",
         "r2": "R²",
-        "free_run_deg": "0.2 s [°]",
-        "free_run_no_change_deg": "no change, 0.2 s [°]",
+        "free_run_deg": f"{TICKS} ticks [°]",
+        "free_run_no_change_deg": f"no change, {TICKS} ticks [°]",
     }
     rows = [
         (
@@ -120,13 +121,11 @@ def _problems(folder: Path) -> str:
 
 def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     document = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
-    rows = [
-        tuple(cells(one | {"interval": _bounds(one["interval"])}, f"{one['name']}{purpose}", unit))
-        for phase, purpose in {"policies": "", "check": ", checked", "confirmation": ", fresh"}.items()
-        for one in document[phase]
-    ]
-    titles = tuple(columns(document["policies"][0], unit))
-    return Told("policies in the real world", titles, rows, returned(metrics, unit))
+    phases = {"policies": "", "check": ", checked", "confirmation": ", fresh"}
+    found = [(one, f"{one['name']}{purpose}") for phase, purpose in phases.items() for one in document[phase]]
+    told = shared([one["outcome"] for one, _ in found])
+    rows = [tuple(cells(one | {"interval": _bounds(one["interval"])}, name, unit, told)) for one, name in found]
+    return Told("policies in the real world", tuple(columns(told, unit)), rows, returned(metrics, unit))
 
 
 def _bounds(interval: list[float | None]) -> list[float]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from gsl.core.observation import placed
+from gsl.core.observation import missing
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import InputError
@@ -35,7 +35,7 @@ class GroundingReport:
 
     Attributes:
         deviations: By group (pi0, off_pi0), simulator (grounded, ungrounded, no_change) and ticks; nothing where the
-            real robot did not tell where its base was.
+            real robot did not tell all of its state.
         joints: Names of the joints.
         episodes: Of pi0 in the grounded simulator.
         falls: How many of them ended in a fall.
@@ -44,6 +44,7 @@ class GroundingReport:
         alpha: How far the grounding goes.
         reach: What of the forward model's predictions the simulator can do, where that was asked.
         cut: How many held-out episodes off π0 ended in a fall or were stopped.
+        lacking: What the real trajectories do not tell, without which no simulation can start from them.
     """
 
     deviations: Mapping[str, Mapping[str, Mapping[int, Deviations]]]
@@ -55,6 +56,7 @@ class GroundingReport:
     alpha: float | None = None
     reach: Reachability | None = None
     cut: int = 0
+    lacking: tuple[str, ...] = ()
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -141,7 +143,7 @@ class GroundingReport:
 
 TITLES = (
     *("trajectories", "simulator", "joints 1 tick [°]", "pitch 1 tick [°]", "forward 1 tick [mm]"),
-    *("joints 0.2 s [°]", "pitch 0.2 s [°]", "forward 0.2 s [mm]"),
+    *(f"joints {TICKS} ticks [°]", f"pitch {TICKS} ticks [°]", f"forward {TICKS} ticks [mm]"),
 )
 
 
@@ -161,7 +163,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         seed: Of all randomness.
 
     Raises:
-        InputError: The trajectories are of other joints, or lack what a simulation starts from.
+        InputError: The trajectories are of other joints or of another period.
     """
     layout = scenario.world.layout
     if heldout.joints != layout.joints:
@@ -172,18 +174,15 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         raise InputError(f"the held-out trajectories have a control period of {periods}")
     grounding = scenario.grounding
     assert isinstance(grounding, LoadedTransformation), "only learned groundings are checked so"
-    env, told = scenario.world.make(), any(map(placed, heldout.episodes))
-    try:
-        deviations = {
-            group: _compared(env, grounding.expected, of_policy(heldout, pi0=group == PI0), seed)
-            for group in (PI0, OFF)
-            if told
-        }
-        reach = asked(env, grounding, heldout.episodes, seed) if told else None
-    except KeyError as error:
-        raise InputError(f"the real trajectories lack {error.args[0]}: no simulation can start from them") from error
-    finally:
-        env.close()
+    lacking = tuple(dict.fromkeys(part for episode in heldout.episodes for part in missing(episode, layout)))
+    env = scenario.world.make()
+    deviations = {
+        group: _compared(env, grounding.expected, of_policy(heldout, pi0=group == PI0), seed)
+        for group in (PI0, OFF)
+        if not lacking
+    }
+    reach = None if lacking else asked(env, grounding, heldout.episodes, seed)
+    env.close()
     ran = pi0_in(scenario, parameters, derived_seed(seed, EPISODES))
     return GroundingReport(
         {group: found for group, found in deviations.items() if found},
@@ -195,6 +194,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         grounding.alpha,
         reach,
         sum(one.ended_in_a_fall for one in of_policy(heldout, pi0=False)),
+        lacking,
     )
 
 

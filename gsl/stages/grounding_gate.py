@@ -11,7 +11,7 @@ import numpy as np
 
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
-from gsl.errors import ConfigError, GslError, InputError, TrajectoryError
+from gsl.errors import ConfigError, InputError, Refused, TrajectoryError
 from gsl.grounding.effects import DiagnosedEffects, switched_on
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.none import NoGrounding
@@ -20,7 +20,7 @@ from gsl.grounding.randomised import RandomisedEffects, randomised
 from gsl.report.grounding_errors import grounding_errors
 from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.effects_check import check_effects
-from gsl.stages.grounding_check import ALPHAS, REPLAYS, TITLES, allowed_falls, check, largest_stable
+from gsl.stages.grounding_check import ALPHAS, EPISODES, REPLAYS, TITLES, allowed_falls, check, largest_stable, pi0_in
 from gsl.stages.grounding_joints import fewest
 from gsl.stages.grounding_replay import places
 from gsl.stages.grounding_states import TITLES as VALUE_TITLES
@@ -88,7 +88,7 @@ class Gate:
         """Return the scenario with a grounding ready to act, in the world that it makes, and what to report of it.
 
         Raises:
-            GslError: The grounding fails its check and `accept` is not set.
+            Refused: The grounding fails its check and `accept` is not set.
         """
         if isinstance(scenario.grounding, DiagnosedEffects):
             return self._diagnosed(scenario, scenario.grounding)
@@ -100,12 +100,15 @@ class Gate:
         return scenario, {}
 
     def _randomised(self, scenario: Scenario, settings: RandomisedEffects) -> tuple[Scenario, Mapping[str, Any]]:
-        """Settle the width; what knows nothing of the real robot has nothing else to pass."""
+        """Settle the width; of what knows nothing of the real robot there is nothing else to check."""
         bare, seed = replace(scenario, grounding=NoGrounding()), derived_seed(self.seed, "width")
         worlds = {width: replace(bare, world=randomised(bare.world, settings, width)) for width in settings.widths}
         width = largest_stable(worlds, self.parameters, seed)
-        self.console.status(f"drawing from {100 * width:.0f} % of the documented ranges")
-        return worlds[width], {"width": width}
+        share = f"{100 * width:.0f} % of the documented ranges"
+        self.console.status(f"drawing from {share}")
+        fell = sum(fell for _, fell in pi0_in(worlds[width], self.parameters, seed)) if width == min(worlds) else 0
+        self._judge([f"π0 falls in {fell} of {EPISODES} episodes that draw from {share}"] * (fell > 0), "Draw less")
+        return worlds[width], {"width": width, "grounding_acceptable": not fell}
 
     def _diagnosed(self, scenario: Scenario, settings: DiagnosedEffects) -> tuple[Scenario, Mapping[str, Any]]:
         """Switch effects on; an inner grounding that learns is checked in the world that they make."""
@@ -114,10 +117,11 @@ class Gate:
         inside = replace(scenario, world=switched_on(scenario.world, found), grounding=settings.inner)
         about = {"effects": list(found.causes), "diagnosis": found.verdict}
         ready, checked = self.passed(inside)
-        if not checked:
+        if not isinstance(settings.inner, ActionTransformation):
             report = check_effects(found, ready, self.parameters, derived_seed(self.seed, "check"))
             write_json(self.folder / REPORT, report)
-            checked = {"grounding_acceptable": report["acceptable"]}
+            passed = report["acceptable"] and checked.get("grounding_acceptable", True)
+            checked = {**checked, "grounding_acceptable": passed}
             self._judge(report["problems"], "Diagnose again")
         return ready, {**about, **checked}
 
@@ -147,8 +151,10 @@ class Gate:
             grounding_errors(self.folder / FIGURE, report.by_joint())
             self.console.table("grounded simulator against held-out real trajectories", TITLES, report.rows())
         else:
-            problem = "the real robot does not tell where its base is, so no simulation can start from its trajectories"
-            self.console.status(f"warning: {problem}: of the grounding only the falls of π0 in it were checked")
+            lack = f"the real trajectories lack {', '.join(report.lacking)}"
+            problem = lack if report.lacking else "the held-out real trajectories are too short"
+            only = "no simulation can start from them: of the grounding only the falls of π0 in it were checked"
+            self.console.status(f"warning: {problem}, so {only}")
         if report.remark:
             self.console.status(f"{report.remark}, whatever its joints are: look at what the search returns")
         if report.reach:
@@ -192,5 +198,5 @@ class Gate:
             return
         problem = "; ".join(problems)
         if not self.accept:
-            raise GslError(f"this grounding is refused: {problem}. {advice}, or go on with accept=true")
+            raise Refused(f"this grounding is refused: {problem}. {advice}, or go on with accept=true")
         self.console.status(f"warning: {problem}")

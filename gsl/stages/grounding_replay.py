@@ -102,7 +102,8 @@ def replay(
     sent = [run.transform(place.seen[k], place.actions[k]) for k in range(watched, tick)]
     start = _start(env, place.seen[tick], np.array(sent[::-1]))
     observation, _ = env.reset(seed=int(rng.integers(2**31)), options={"start": start})
-    observation[env.layout["foot_force"]] = place.seen[tick][env.layout["foot_force"]]  # no contact is solved yet
+    if "foot_force" in env.layout.sizes:
+        observation[env.layout["foot_force"]] = place.seen[tick][env.layout["foot_force"]]  # no contact is solved yet
     for k in range(tick, tick + ticks):
         observation, *_ = env.step(run.transform(observation, place.actions[k]))
         yield observation

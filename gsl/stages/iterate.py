@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.core.layout import check_alike
-from gsl.core.observation import placed
+from gsl.core.observation import missing
 from gsl.core.setting import component, setting
-from gsl.errors import ConfigError
+from gsl.errors import ConfigError, Refused
 from gsl.grounding.effects import learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
@@ -45,6 +45,8 @@ FIRST = "iteration_01"
 @component
 class Iterate:
     """The whole chain; every link is an artifact of its own beside this one, and what is unchanged is not done anew.
+
+    A later iteration whose grounding is refused ends it with the policy of the one before.
 
     With diagnosed effects an excitation in the air comes before the first iteration, and all of them take place in the
     simulator that its diagnosis leaves; without a cause that is the calibrated one.
@@ -100,7 +102,13 @@ class Iterate:
             chain = self.chain
             for number in range(1, self.iterations + 1):
                 place = home / f"iteration_{number:02d}"
-                done = chain.round(place, grounding, rounds.last or start, round_seed(self.seed, number), console)
+                try:
+                    done = chain.round(place, grounding, rounds.last or start, round_seed(self.seed, number), console)
+                except Refused as refusal:
+                    if number == 1:
+                        raise
+                    console.status(rounds.refused(str(refusal), self._collected_real))
+                    break
                 chain = chain.after(place)
                 first = done.ready if number == 1 else first
                 for row in rounds.add(done.measured, self._collected_real):
@@ -171,7 +179,7 @@ class Iterate:
         scenario = settled(Scenario(self.sim, self.task, self.policy, SIM, ready), search.metrics)
         heldout = read(place / "train_forward" / HELDOUT)
         walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
-        if not isinstance(scenario.world, BulletWorld) or not placed(walk):
+        if not isinstance(scenario.world, BulletWorld) or missing(walk, scenario.world.layout):
             return  # there are no joints to draw, or nobody knows where the body was
         write_trace(folder, scenario.world, scenario.grounding, walk)
         walk_strip(scenario.world.plant.robot, walk, folder / "walk.png")

@@ -40,6 +40,7 @@ class Rounds:
         self._flight: Flight | None = None
         self._spent = 0
         self._collected = 0
+        self._refusal = ""
         self.rows: list[tuple[str, ...]] = []
         self.best: Artifact | None = None
 
@@ -76,6 +77,13 @@ class Rounds:
         in_the_air = f" + {self._flight.episodes} in the air" if first and self._flight else ""
         return self._added(str(len(self._done)), evaluation.metrics, f"{cost}{in_the_air}", first=first)
 
+    def refused(self, why: str, collected: int) -> str:
+        """Take in an iteration that ended at its grounding, after some real episodes, and return what to say."""
+        self._spent += collected
+        self._collected += collected
+        self._refusal = f"Iteration {len(self._done) + 1} ended after {collected} real episodes: {why}. "
+        return f"warning: {self._refusal.strip()}"
+
     def add_beside(self, evaluation: Artifact) -> list[tuple[str, ...]]:
         """Take in what is shown for comparison, and return its rows."""
         self._beside = evaluation
@@ -103,8 +111,9 @@ class Rounds:
 
     @property
     def _ended(self) -> str:
-        """Why no iteration followed, where the last one's gain is not sure."""
-        return "" if self.rising else f"The gain of iteration {len(self._done)} is not sure: no other follows. "
+        """Why no iteration followed: the last one's gain is not sure, or the next one's grounding was refused."""
+        unsure = f"The gain of iteration {len(self._done)} is not sure: no other follows. "
+        return self._refusal if self.rising else unsure
 
     def metrics(self) -> Mapping[str, Any]:
         """Return the figures of all rounds."""
@@ -121,7 +130,7 @@ class Rounds:
             "real_episodes": self._spent,
             "learned_from": self._collected,
             **self._of_the_flight(),
-            "stopped_by_itself": not self.rising,
+            "stopped_by_itself": not self.rising or bool(self._refusal),
             "verdict": self.verdict,
             "ungrounded": None if self._beside is None else self._beside.metrics,
         }

@@ -25,11 +25,17 @@ def mean(done: Sequence[Episode]) -> float:
 
 
 def summary(done: Sequence[Episode]) -> dict[str, Any]:
-    """Return mean value with its 95 % interval, falls, number of episodes, and the mean outcome."""
+    """Return mean value with its 95 % interval, falls, number of episodes, and the mean of what all outcomes tell."""
     interval = mean_interval([episode.value for episode in done])
-    outcome = {name: float(np.mean([episode.outcome[name] for episode in done])) for name in done[0].outcome}
+    told = shared([episode.outcome for episode in done])
+    outcome = {name: float(np.mean([episode.outcome[name] for episode in done])) for name in told}
     bounds = [interval.lower, interval.upper]
     return {"value": interval.mean, "interval": bounds, "falls": falls(done), "episodes": len(done), "outcome": outcome}
+
+
+def shared(outcomes: Sequence[Mapping[str, float]]) -> list[str]:
+    """Return the names that all outcomes have: a value that somebody wrote down has none."""
+    return [name for name in outcomes[0] if all(name in one for one in outcomes)]
 
 
 def row(theta: PolicyRecord, done: Sequence[Episode]) -> dict[str, Any]:
@@ -52,10 +58,10 @@ def gain(after: Sequence[Episode], before: Sequence[Episode]) -> dict[str, Any]:
     return {"value": difference.mean, "interval": [difference.lower, difference.upper], "share": share}
 
 
-def columns(first: Mapping[str, Any], unit: Unit) -> list[str]:
+def columns(outcomes: Sequence[str], unit: Unit) -> list[str]:
     """Return the titles of `cells`."""
     places = [in_unit(place, unit.name) for place in ("in simulation", "in real")]
-    return ["policy", *places, "95 % interval", ends(unit), *first["outcome"]]
+    return ["policy", *places, "95 % interval", ends(unit), *outcomes]
 
 
 def ends(unit: Unit) -> str:
@@ -68,9 +74,9 @@ def ended(one: Mapping[str, Any], unit: Unit) -> str:
     return f"{one['falls']} of {one['episodes']}" if unit.falls else str(one["episodes"])
 
 
-def cells(one: Mapping[str, Any], name: str, unit: Unit) -> list[str]:
+def cells(one: Mapping[str, Any], name: str, unit: Unit, outcomes: Sequence[str]) -> list[str]:
     """Return a row for people; a policy that stopped at its fall has no interval."""
     interval = unit.interval(one["interval"]) if np.isfinite(one["interval"]).all() and not one["falls"] else ""
     simulated = "" if one["value_sim"] is None else unit.bare(one["value_sim"])
-    outcome = [f"{value:.1f}" for value in one["outcome"].values()]
+    outcome = [f"{one['outcome'][name]:.1f}" for name in outcomes]
     return [name, simulated, unit.bare(one["value"]), interval, ended(one, unit), *outcome]

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 
 from gsl.core.layout import check_alike
 from gsl.core.setting import component, setting
+from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
@@ -26,6 +27,7 @@ from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl.studies.trial import Cell, Trial
 from gsl.studies.tried import foretelling, read_tried
 from gsl.tasks.task import REAL, SIM
+from gsl.worlds.external import ExternalRobot
 from gsl.worlds.gymnasium import try_out
 from gsl.worlds.world import World
 
@@ -86,6 +88,8 @@ class Compare:
         for name, grounding in self.methods.items():
             check_trainable(self.iterate, f"methods.{name}", grounding)
         check_aggregate(self.iterate, self.methods.values(), "iterate.aggregate")
+        if self.rank and any(isinstance(world, ExternalRobot) for world in self.worlds.values()):
+            raise ConfigError("rank", "needs worlds that are simulated: forty policies are tried in each", given="true")
         home, simulators = folder.parent, self._simulators
         for sim, real in product(simulators.values(), self.worlds.values()):
             check_alike(sim.layout, real.layout)

@@ -40,7 +40,7 @@ class Summary(NamedTuple):
     generation: float | None
     falls: int
     refused: int
-    rank: Interval | None
+    rank: float | None
     real_episodes: float
 
     @property
@@ -142,6 +142,6 @@ def _summary(cell: Cell, trials: list[Trial]) -> Summary:
         generation=sum(generations) / len(generations) if generations else None,
         falls=sum(trial.falls for trial in trials),
         refused=sum(trial.refused for trial in trials),
-        rank=mean_interval(ranks) if len(ranks) == len(trials) else None,
+        rank=sum(ranks) / len(ranks) if len(ranks) == len(trials) else None,
         real_episodes=sum(trial.real_episodes for trial in trials) / len(trials),
     )

@@ -93,7 +93,7 @@ def _columns(found: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[str]
         "best generation": lambda one: one.best_generation,
         "falls in fresh episodes": lambda one: f"{one.falls}",
         "refused by the check": lambda one: f"{one.refused} of {one.trials}",
-        "rank correlation": lambda one: "" if one.rank is None else f"{one.rank.mean:.2f}",
+        "rank correlation": lambda one: "" if one.rank is None else f"{one.rank:.2f}",
         "real episodes": lambda one: f"{one.real_episodes:.0f}",
     }
     columns = {title: [str(tell(one)) for one in found] for title, tell in tellers.items()}

@@ -159,8 +159,7 @@ class Ledger:
         return bool(rows)
 
     def add(self, key: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Write down a trial that has ended, beside those that another study of this name wrote meanwhile."""
-        self._kept = self._here()
+        """Write down a trial that has ended."""
         self._write(key, [{**row, RECIPE: key, MADE_BY: self._me} for row in rows])
 
     def close(self, path: Path) -> str:
@@ -189,7 +188,8 @@ class Ledger:
         return sorted((row for rows in self._done.values() for row in rows), key=_number)
 
     def _write(self, key: str, rows: Sequence[dict[str, Any]]) -> None:
-        self._done[key] = list(rows)
+        """Write a trial beside all others, and those that another study of this name wrote meanwhile."""
+        self._done[key], self._kept = list(rows), self._here()
         others = {other: made for other, made in {**self._known, **self._kept}.items() if other not in self._done}
         write_json(self._path, [*self._rows(), *(row for made in others.values() for row in made)])
 

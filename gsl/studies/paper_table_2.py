@@ -54,7 +54,7 @@ class Table2:
             + (f"{one.unimproved} of {one.trials}", one.best_generation)
             + (f"{one.stable} of {one.winners}", f"{one.improving} of {one.winners}", _last(trials, one, task))
             + (_speeds(trials, one, task), str(one.falls), f"{one.refused} of {one.trials}")
-            + ("" if one.rank is None else f"{one.rank.mean:.2f}", f"{one.real_episodes:.0f}")
+            + ("" if one.rank is None else f"{one.rank:.2f}", f"{one.real_episodes:.0f}")
             + self._paper(one)
             for one in found
         ]

@@ -6,6 +6,7 @@ function of the world's configuration, the actions and the seed of `reset`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -23,7 +24,7 @@ from gsl.errors import GslError
 from gsl.robots.catalogue import read_files, robot
 from gsl.worlds.engine import Engine, Physics, Reading
 from gsl.worlds.fits import check_base, check_periods, check_plant
-from gsl.worlds.ground import random_heights
+from gsl.worlds.ground import CROSSED, random_heights
 from gsl.worlds.start import Start, resting
 
 FALLEN_TILT = 0.5  # cosine of the tilt beyond which the robot has fallen
@@ -57,6 +58,11 @@ class BulletWorld:
     def plant(self) -> Plant:
         """The robot with its effects."""
         return applied(nominal(robot(self.robot)), built(self.effects))
+
+    @property
+    def crossed(self) -> float:
+        """How long the ground reaches for who walks fast [s]."""
+        return CROSSED if self.floating and self.plant.contact.roughness else math.inf
 
     @property
     def layout(self) -> Layout:
