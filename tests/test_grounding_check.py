@@ -13,22 +13,13 @@ from gsl.errors import InputError
 from gsl.grounding.gat import LoadedTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.models.forward import ForwardModel
+from gsl.models.free_run import TICKS
 from gsl.models.inverse import Solver
 from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.grounding_check import (
-    ALPHAS,
-    BARE,
-    GROUNDED,
-    OFF,
-    PI0,
-    STILL,
-    GroundingReport,
-    allowed_falls,
-    check,
-    largest_stable,
-)
-from gsl.stages.grounding_replay import PAST, TICKS, Deviations, places, replay
+from gsl.stages.grounding_check import ALPHAS, allowed_falls, check, largest_stable
+from gsl.stages.grounding_replay import PAST, Deviations, places, replay
+from gsl.stages.grounding_report import BARE, GROUNDED, OFF, PI0, STILL, GroundingReport
 from gsl.stages.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld

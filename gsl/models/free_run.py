@@ -14,7 +14,7 @@ from gsl.core.transitions import actions, usable
 from gsl.models.ensemble import Forward
 from gsl.models.inverse import InverseModel
 
-TICKS = 10  # of a free run: 0.2 s at 50 Hz
+TICKS = 10  # of a free run, and of a replay in the simulator: 0.2 s at 50 Hz
 
 
 def shortest(history: History, horizon: int) -> int:

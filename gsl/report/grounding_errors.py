@@ -1,4 +1,4 @@
-"""How far the simulator, grounded or not, is from the real robot after ten ticks of the same actions, joint by joint."""
+"""How far the simulator, grounded or not, is from the real robot after ten ticks of real actions, joint by joint."""
 
 from __future__ import annotations
 

@@ -20,9 +20,10 @@ from gsl.grounding.randomised import RandomisedEffects, randomised
 from gsl.report.grounding_errors import grounding_errors
 from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.effects_check import check_effects
-from gsl.stages.grounding_check import ALPHAS, EPISODES, REPLAYS, TITLES, allowed_falls, check, largest_stable, pi0_in
+from gsl.stages.grounding_check import ALPHAS, EPISODES, REPLAYS, allowed_falls, check, largest_stable, pi0_in
 from gsl.stages.grounding_joints import fewest
 from gsl.stages.grounding_replay import places
+from gsl.stages.grounding_report import TITLES
 from gsl.stages.grounding_states import TITLES as VALUE_TITLES
 from gsl.stages.grounding_states import value_report
 from gsl.stages.rollout import Scenario

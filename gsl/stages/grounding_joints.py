@@ -11,7 +11,8 @@ import numpy as np
 from gsl.errors import InputError
 from gsl.grounding.gat import LoadedTransformation
 from gsl.grounding.none import NoGrounding
-from gsl.stages.grounding_replay import TICKS, Place, replayed
+from gsl.models.free_run import TICKS
+from gsl.stages.grounding_replay import Place, replayed
 
 
 def fewest(env: Any, grounding: LoadedTransformation, starts: Sequence[Place], seed: int) -> tuple[str, ...]:

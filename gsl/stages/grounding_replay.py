@@ -14,11 +14,11 @@ from gsl.core.observation import observations
 from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import actions, usable
 from gsl.grounding.grounding import Grounding
+from gsl.models.free_run import TICKS
 from gsl.worlds.bullet import BulletEnv
 from gsl.worlds.engine import Reading
 from gsl.worlds.start import Start
 
-TICKS = 10  # of a replay: 0.2 s at 50 Hz
 PAST = 6  # ticks for which a grounding watches the real robot before, at least; as many as its models look back
 STRIDE = 15  # ticks from one replay to the next
 

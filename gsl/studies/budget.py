@@ -17,10 +17,11 @@ from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
+from gsl.models.free_run import TICKS
 from gsl.report.budget_curve import Line, budget_curve
 from gsl.report.markdown import table
 from gsl.stages.grounding_gate import settled
-from gsl.stages.grounding_replay import TICKS, replayed
+from gsl.stages.grounding_replay import replayed
 from gsl.stages.iterate import Iterate, check_trainable
 from gsl.stages.rollout import Scenario
 from gsl.stages.training import FEWEST, degrees

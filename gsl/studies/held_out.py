@@ -8,10 +8,11 @@ from typing import Any
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError, GslError
+from gsl.models.free_run import TICKS
 from gsl.stages.chain import Chain
 from gsl.stages.collect import FILE, Collect
 from gsl.stages.grounding_check import REPLAYS
-from gsl.stages.grounding_replay import PAST, TICKS, Place, places
+from gsl.stages.grounding_replay import PAST, Place, places
 from gsl.stages.iterate import Iterate
 from gsl.stages.link import built
 from gsl.stages.training import of_policy

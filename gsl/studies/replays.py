@@ -19,11 +19,12 @@ from gsl.grounding.effects import DiagnosedEffects, innermost
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
+from gsl.models.free_run import TICKS
 from gsl.report.markdown import table
 from gsl.report.trial_dots import Dots, trial_dots
 from gsl.stages.grounding_check import asked
 from gsl.stages.grounding_gate import Gate
-from gsl.stages.grounding_replay import TICKS, replayed
+from gsl.stages.grounding_replay import replayed
 from gsl.stages.iterate import Iterate, check_trainable
 from gsl.stages.rollout import Scenario
 from gsl.stages.training import degrees, of_policy
