@@ -33,7 +33,11 @@ def _again(kind: type[GslError], args: tuple[Any, ...], state: dict[str, Any]) -
 
 
 class Refused(GslError):
-    """A grounding fails its check, so that nothing is optimised in it."""
+    """A grounding fails its check, so that nothing is optimised in it; `why` says the problems without advice."""
+
+    def __init__(self, why: str, advice: str) -> None:
+        super().__init__(f"this grounding is refused: {why}. {advice}, or go on with accept=true")
+        self.why = why
 
 
 class Waiting(GslError):

@@ -60,6 +60,7 @@ ARM = "experiment=arm preset=toy grounding=gat"
             f"iterate {ARM} forward_model.variables=[LKnePitch]",
             "forward_model.variables = LKnePitch: the robot has no ",
         ),
+        ("compare +world@worlds.mine=robot rank=true", "rank = true: needs worlds that are simulated"),
         ("iterate world=nao_worn", "world: here a world has a role; say real=... or sim=..."),
     ],
 )

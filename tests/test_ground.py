@@ -5,17 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import STANCE, held, walked, world
-from scenarios import GROUND
 from scipy.spatial.transform import Rotation
 from test_rotor import momentum
 
 from gsl.core.plant import Contact, Push, nominal
-from gsl.errors import ConfigError
-from gsl.grounding.none import NoGrounding
-from gsl.policies.walk_engine import WalkEngine
+from gsl.errors import GslError
 from gsl.robots.nao import nao
-from gsl.stages.rollout import Scenario
-from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletEnv
 from gsl.worlds.engine import Engine, Physics
 from gsl.worlds.ground import FLAT, REACH, random_heights
@@ -192,9 +187,13 @@ def test_a_held_base_does_not_feel_a_push() -> None:
     np.testing.assert_allclose(rows[1], rows[0], atol=1e-9)
 
 
-def test_a_walk_beyond_the_end_of_random_ground_is_refused() -> None:
-    uneven = replace(GROUND, effects=ROUGH)
-    Scenario(uneven, Walk(duration=7.5), WalkEngine(), "real", NoGrounding())
-    Scenario(GROUND, Walk(duration=20.0), WalkEngine(), "real", NoGrounding())
-    with pytest.raises(ConfigError, match=r"task.duration = 20: leads beyond the uneven ground, .* after 7\.5 s"):
-        Scenario(uneven, Walk(duration=20.0), WalkEngine(), "real", NoGrounding())
+def test_who_comes_to_the_edge_of_random_ground_is_told_so(rough: BulletEnv, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gsl.worlds.bullet.REACH", 1e-5)
+    rough.reset(seed=1)
+    with pytest.raises(GslError, match=r"the edge of the uneven ground .* shorten task\.duration"):
+        for _ in range(5):
+            rough.step(np.full(len(rough.layout.joints), 0.2))
+    plane = world({}).make()
+    plane.reset(seed=1)
+    plane.step(np.full(len(rough.layout.joints), 0.2))
+    plane.close()

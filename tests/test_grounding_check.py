@@ -18,7 +18,7 @@ from gsl.models.inverse import Solver
 from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
 from gsl.stages.grounding_check import ALPHAS, allowed_falls, check, largest_stable
-from gsl.stages.grounding_replay import PAST, Deviations, places, replay
+from gsl.stages.grounding_replay import PAST, Deviations, Place, places, replay
 from gsl.stages.grounding_report import BARE, GROUNDED, OFF, PI0, STILL, GroundingReport
 from gsl.stages.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
@@ -159,3 +159,15 @@ def test_trajectories_of_another_robot_are_refused() -> None:
 def test_pi0_may_fall_as_it_does_in_real(share: float, allowed: int) -> None:
     heldout = Batch((), ("a",), 0.02, {"pi0_falls": share})
     assert allowed_falls(heldout) == allowed
+
+
+def test_a_robot_without_feet_is_replayed() -> None:
+    env = BulletWorld(robot="so101", effects={}, floating=False, start_noise=0.0).make()
+    n, position = len(env.layout.joints), env.layout["position"]
+    seen, sent = [env.reset(seed=1)[0]], [np.full(n, 0.1 * np.sin(0.3 * tick)) for tick in range(20)]
+    for action in sent:
+        seen.append(env.step(action)[0])
+    place = Place(np.array(seen), np.array(sent), PAST)
+    ends = list(replay(env, NoGrounding(), place, np.random.default_rng(0), 5))
+    env.close()
+    np.testing.assert_allclose(ends[-1][position], seen[PAST + 5][position], atol=2e-3)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 from commands import SMALL, Said, done, gsl, started
 
-from gsl.errors import Refused
-from gsl.stages.chain import Chain
+from gsl.stages.grounding_gate import Gate
 from gsl.stages.iteration_report import Rounds
 
 NAMED = (*SMALL, "name=chain")
@@ -31,19 +30,25 @@ def test_every_stage_leaves_a_complete_artifact(chain: Path) -> None:
 def test_an_iteration_whose_grounding_is_refused_leaves_what_the_one_before_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    once = Chain.round
+    judge = Gate._judge
 
-    def round_(chain: Chain, place: Path, *rest: Any, **more: Any) -> Any:
-        if place.name != "iteration_01":
-            raise Refused("this grounding is refused: it is no nearer. Collect more data")
-        return once(chain, place, *rest, **more)
+    def judged(gate: Gate, problems: Sequence[str], advice: str) -> None:
+        judge(gate, ["it is no nearer"] if "iteration_02" in gate.folder.parts else [], advice)
 
-    monkeypatch.setattr(Chain, "round", round_)
+    monkeypatch.setattr(Gate, "_judge", judged)
     monkeypatch.setattr(Rounds, "rising", True)
-    said = done("iterate", *NAMED, "grounding=none", "iterations=3", folder=tmp_path)
-    why = "Iteration 2 ended after 0 real episodes: this grounding is refused: it is no nearer. Collect more data."
-    assert f"warning: {why}" in said.err and why in (tmp_path / "runs/chain/iterate/table.md").read_text()
-    assert (tmp_path / "runs/chain/iterate/policies.json").is_file()
+    line = ("iterate", *NAMED, "grounding=gat", "optimizer.generations=1", "iterations=3")
+    said = done(*line, folder=tmp_path)
+    assert "warning: this grounding is refused: it is no nearer. Collect more data, or go on with" in said.err
+    table = (tmp_path / "runs/chain/iterate/table.md").read_text()
+    assert "| 2 | grounding refused |  |  |  |  |  | 6 |" in table
+    assert "The grounding of iteration 2 was refused: it is no nearer. " in table
+    places = [tmp_path / "runs/chain" / name for name in ("iterate", "iteration_01/evaluate")]
+    one, other = ((place / "policies.json").read_text() for place in places)
+    assert one == other and not (tmp_path / "runs/chain/iteration_02/optimize").exists()
+    assert "(unchanged)" in done(*line, folder=tmp_path).out
+    monkeypatch.setattr(Gate, "_judge", lambda gate, problems, advice: judge(gate, ["it is no nearer"], advice))
+    assert "is refused: it is no nearer" in gsl(*line, "name=other", folder=tmp_path).lines[-1]
 
 
 def test_nothing_half_written_is_left_behind(chain: Path) -> None:

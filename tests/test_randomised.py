@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 from dataclasses import replace
 from pathlib import Path
@@ -72,14 +73,16 @@ def test_a_world_without_effects_is_refused() -> None:
 
 
 def test_a_width_in_which_pi0_falls_is_refused_even_if_it_is_the_least(tmp_path: Path) -> None:
-    drawn = RandomisedEffects(("gravity_tilt",), width=1.0)
-    scenario = replace(walk(duration=2.0), grounding=drawn)
+    scenario = walk(duration=2.0)
     scenario = replace(scenario, world=replace(scenario.world, effects={"torque_limit": {"factor": 0.05}}))
     gate = Gate(scenario.policy.initial, tmp_path, QUIET, False, 1)
-    with pytest.raises(Refused, match=r"π0 falls in 4 of 4 episodes that draw from 100 % of the documented ranges"):
-        gate.passed(scenario)
-    _, about = replace(gate, accept=True).passed(scenario)
-    assert about == {"width": 1.0, "grounding_acceptable": False}
+    for width, least in ((1.0, 100), ("auto", 8)):
+        drawn = replace(scenario, grounding=RandomisedEffects(("gravity_tilt",), width=width))
+        with pytest.raises(Refused, match=rf"π0 falls in 4 of 4 episodes that draw from {least} % of the documented"):
+            gate.passed(drawn)
+    _, about = replace(gate, accept=True).passed(drawn)
+    assert about == {"width": 0.08, "grounding_acceptable": False}
+    assert not json.loads((tmp_path / "grounding.json").read_text())["acceptable"]
 
 
 def test_a_width_of_ones_own_is_the_only_one_tried() -> None:

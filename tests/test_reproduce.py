@@ -195,7 +195,7 @@ def test_a_ledger_only_grows(tmp_path: Path) -> None:
     with pytest.raises(ArtifactError, match=r"say number 2 says 1; leave it out"):
         Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent()).judge({"a": {"number": 2}})
     given.write_text(path.read_text().replace("3.0", '"fast"'))
-    with pytest.raises(ArtifactError, match="row 2 has value 'fast': input should be a valid number"):
+    with pytest.raises(ArtifactError, match="row 1 has value 'fast': input should be a valid number"):
         Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent())
     given.write_text(path.read_text().replace("3.0", "NaN"))
     with pytest.raises(ArtifactError, match="NaN is no figure"):

@@ -10,7 +10,7 @@ import pytest
 from gsl.stages.account import returned
 from gsl.stages.headline import Unit
 from gsl.stages.iteration_report import Rounds
-from gsl.stages.measured import gain, summary
+from gsl.stages.measured import cells, gain, summary
 from gsl.stages.population import Episode
 from gsl.storage.artifact import Artifact
 from gsl.tasks.own_reward import OwnReward
@@ -66,10 +66,11 @@ def test_an_iteration_that_ends_at_its_grounding_costs_what_it_collected() -> No
     rounds = Rounds(OwnReward())
     rounds.add(evaluation(-20.0, -14.6, 3.0, 8.0), 10)
     spent = rounds.metrics()["real_episodes"]
-    said = rounds.refused("this grounding is refused: it is no nearer", 7)
+    row = rounds.refused("it is no nearer", 7)
     found = rounds.metrics()
-    assert said == "warning: Iteration 2 ended after 7 real episodes: this grounding is refused: it is no nearer."
-    assert said.removeprefix("warning: ") in found["verdict"] and found["returned_iteration"] == 1
+    assert (row[0], row[1], row[-1], len(row)) == ("2", "grounding refused", "7", len(rounds.columns))
+    assert rounds.rows[-1] == row and found["returned_iteration"] == 1
+    assert "The grounding of iteration 2 was refused: it is no nearer." in found["verdict"]
     assert (found["real_episodes"], found["learned_from"], found["stopped_by_itself"]) == (spent + 7, 17, True)
 
 
@@ -78,6 +79,8 @@ def test_a_value_that_somebody_wrote_down_stands_beside_a_log() -> None:
     for done in ([logged, written], [written, logged]):
         assert summary(done)["outcome"] == {} and summary(done)["value"] == pytest.approx(0.25)
     assert summary([logged, logged])["outcome"] == {"speed [cm/s]": 20.0}
+    one = {**summary([logged, written]), "value_sim": None}
+    assert cells(one, "pi0", Unit(), ["speed [cm/s]"])[-1] == ""
 
 
 def test_where_pi0_is_returned_nothing_is_gained() -> None:

@@ -14,7 +14,7 @@ from gsl.report.diagnosis_text import summary_lines
 from gsl.report.markdown import in_unit
 from gsl.stages.diagnosis_files import report_of
 from gsl.stages.headline import Unit, several, unit_of
-from gsl.stages.measured import cells, columns, shared
+from gsl.stages.measured import cells, columns
 from gsl.storage.artifact import Artifact
 
 
@@ -123,7 +123,7 @@ def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     document = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
     phases = {"policies": "", "check": ", checked", "confirmation": ", fresh"}
     found = [(one, f"{one['name']}{purpose}") for phase, purpose in phases.items() for one in document[phase]]
-    told = shared([one["outcome"] for one, _ in found])
+    told = list(dict.fromkeys(name for one, _ in found for name in one["outcome"]))
     rows = [tuple(cells(one | {"interval": _bounds(one["interval"])}, name, unit, told)) for one, name in found]
     return Told("policies in the real world", tuple(columns(told, unit)), rows, returned(metrics, unit))
 

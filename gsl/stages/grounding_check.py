@@ -56,13 +56,15 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
     assert isinstance(grounding, LoadedTransformation), "only learned groundings are checked so"
     lacking = tuple(dict.fromkeys(part for episode in heldout.episodes for part in missing(episode, layout)))
     env = scenario.world.make()
-    deviations = {
-        group: _compared(env, grounding.expected, of_policy(heldout, pi0=group == PI0), seed)
-        for group in (PI0, OFF)
-        if not lacking
-    }
-    reach = None if lacking else asked(env, grounding, heldout.episodes, seed)
-    env.close()
+    try:
+        deviations = {
+            group: _compared(env, grounding.expected, of_policy(heldout, pi0=group == PI0), seed)
+            for group in (PI0, OFF)
+            if not lacking
+        }
+        reach = None if lacking else asked(env, grounding, heldout.episodes, seed)
+    finally:
+        env.close()
     ran = pi0_in(scenario, parameters, derived_seed(seed, EPISODES))
     return GroundingReport(
         {group: found for group, found in deviations.items() if found},

@@ -108,8 +108,10 @@ class Gate:
         share = f"{100 * width:.0f} % of the documented ranges"
         self.console.status(f"drawing from {share}")
         fell = sum(fell for _, fell in pi0_in(worlds[width], self.parameters, seed)) if width == min(worlds) else 0
-        self._judge([f"π0 falls in {fell} of {EPISODES} episodes that draw from {share}"] * (fell > 0), "Draw less")
-        return worlds[width], {"width": width, "grounding_acceptable": not fell}
+        problems = [f"π0 falls in {fell} of {EPISODES} episodes that draw from {share}"] if fell else []
+        write_json(self.folder / REPORT, {"width": width, "acceptable": not problems, "problems": problems})
+        self._judge(problems, "Draw less")
+        return worlds[width], {"width": width, "grounding_acceptable": not problems}
 
     def _diagnosed(self, scenario: Scenario, settings: DiagnosedEffects) -> tuple[Scenario, Mapping[str, Any]]:
         """Switch effects on; an inner grounding that learns is checked in the world that they make."""
@@ -161,7 +163,8 @@ class Gate:
         if report.reach:
             self.console.status(report.reach.told)
         self._judge(report.problems, "Collect more data")
-        return ready, {"alpha": report.alpha, "x": loaded.x, "grounding_acceptable": report.acceptable}
+        about = {"alpha": report.alpha, "x": loaded.x, "grounding_acceptable": report.acceptable}
+        return ready, {**about, **({"grounding_lacks": report.lacking} if report.lacking else {})}
 
     def _of_states(self, ready: Scenario, heldout: Batch) -> tuple[Scenario, Mapping[str, Any]]:
         """Compare what π0 is worth with held-out real episodes."""
@@ -199,5 +202,5 @@ class Gate:
             return
         problem = "; ".join(problems)
         if not self.accept:
-            raise Refused(f"this grounding is refused: {problem}. {advice}, or go on with accept=true")
+            raise Refused(problem, advice)
         self.console.status(f"warning: {problem}")

@@ -100,6 +100,7 @@ class GroundingReport:
             "acceptable": self.acceptable,
             "problems": self.problems,
             "remark": self.remark,
+            "lacking": self.lacking,
         }
 
     def by_joint(self) -> Mapping[str, Mapping[str, Mapping[str, float]]]:

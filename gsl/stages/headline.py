@@ -152,11 +152,12 @@ def _optimize(metrics: Metrics, unit: Unit) -> str:
     told = f"{several(metrics['generations'], 'generation')}, best {best} in simulation"
     if "effects" in metrics:
         told += f"; {named(metrics['effects']) or 'calibration'} switched on"
-    alpha = metrics.get("alpha")
-    if alpha is None:
+    alpha, passed = metrics.get("alpha"), metrics.get("grounding_acceptable", True)
+    if alpha is None and passed:
         return told
-    verdict = "passed" if metrics["grounding_acceptable"] else "failed its check"
-    return f"{told}; grounding (alpha {alpha:g}) {verdict}"
+    far = "" if alpha is None else f" (alpha {alpha:g})"
+    verdict = "passed, by the falls of π0 alone" if metrics.get("grounding_lacks") else "passed"
+    return f"{told}; grounding{far} {verdict if passed else 'failed its check'}"
 
 
 def _evaluate(metrics: Metrics, unit: Unit) -> str:

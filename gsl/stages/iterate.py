@@ -107,7 +107,8 @@ class Iterate:
                 except Refused as refusal:
                     if number == 1:
                         raise
-                    console.status(rounds.refused(str(refusal), self._collected_real))
+                    table.row(*rounds.refused(refusal.why, self._collected_real))
+                    console.status(f"warning: {refusal}")
                     break
                 chain = chain.after(place)
                 first = done.ready if number == 1 else first

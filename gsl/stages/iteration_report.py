@@ -77,12 +77,15 @@ class Rounds:
         in_the_air = f" + {self._flight.episodes} in the air" if first and self._flight else ""
         return self._added(str(len(self._done)), evaluation.metrics, f"{cost}{in_the_air}", first=first)
 
-    def refused(self, why: str, collected: int) -> str:
-        """Take in an iteration that ended at its grounding, after some real episodes, and return what to say."""
+    def refused(self, why: str, collected: int) -> tuple[str, ...]:
+        """Take in an iteration that ended at its grounding, after some real episodes, and return its row."""
         self._spent += collected
         self._collected += collected
-        self._refusal = f"Iteration {len(self._done) + 1} ended after {collected} real episodes: {why}. "
-        return f"warning: {self._refusal.strip()}"
+        number = len(self._done) + 1
+        self._refusal = f"The grounding of iteration {number} was refused: {why}. "
+        row = (str(number), "grounding refused", *[""] * (len(self.columns) - 3), str(collected))
+        self.rows.append(row)
+        return row
 
     def add_beside(self, evaluation: Artifact) -> list[tuple[str, ...]]:
         """Take in what is shown for comparison, and return its rows."""

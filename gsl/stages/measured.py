@@ -25,17 +25,15 @@ def mean(done: Sequence[Episode]) -> float:
 
 
 def summary(done: Sequence[Episode]) -> dict[str, Any]:
-    """Return mean value with its 95 % interval, falls, number of episodes, and the mean of what all outcomes tell."""
+    """Return mean value with its 95 % interval, falls, number of episodes, and the mean of what all of them tell.
+
+    A value that somebody wrote down tells of nothing besides.
+    """
     interval = mean_interval([episode.value for episode in done])
-    told = shared([episode.outcome for episode in done])
+    told = [name for name in done[0].outcome if all(name in episode.outcome for episode in done)]
     outcome = {name: float(np.mean([episode.outcome[name] for episode in done])) for name in told}
     bounds = [interval.lower, interval.upper]
     return {"value": interval.mean, "interval": bounds, "falls": falls(done), "episodes": len(done), "outcome": outcome}
-
-
-def shared(outcomes: Sequence[Mapping[str, float]]) -> list[str]:
-    """Return the names that all outcomes have: a value that somebody wrote down has none."""
-    return [name for name in outcomes[0] if all(name in one for one in outcomes)]
 
 
 def row(theta: PolicyRecord, done: Sequence[Episode]) -> dict[str, Any]:
@@ -78,5 +76,5 @@ def cells(one: Mapping[str, Any], name: str, unit: Unit, outcomes: Sequence[str]
     """Return a row for people; a policy that stopped at its fall has no interval."""
     interval = unit.interval(one["interval"]) if np.isfinite(one["interval"]).all() and not one["falls"] else ""
     simulated = "" if one["value_sim"] is None else unit.bare(one["value_sim"])
-    outcome = [f"{one['outcome'][name]:.1f}" for name in outcomes]
+    outcome = [f"{one['outcome'][name]:.1f}" if name in one["outcome"] else "" for name in outcomes]
     return [name, simulated, unit.bare(one["value"]), interval, ended(one, unit), *outcome]

@@ -153,17 +153,22 @@ class Ledger:
                     raise ArtifactError(self._whose(key), f"{problem}; leave it out")
 
     def take(self, key: str) -> bool:
-        """Make a trial that is known, or was made here by this very version, one of this study; say whether it is."""
+        """Make a trial that is known, or was made here by this very version, one of this study; say whether it is.
+
+        The file has it from the next trial that ends, or the study's end.
+        """
         if rows := self._rows_of(key):
-            self._write(key, rows)
+            self._done[key] = rows
         return bool(rows)
 
     def add(self, key: str, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write down a trial that has ended."""
-        self._write(key, [{**row, RECIPE: key, MADE_BY: self._me} for row in rows])
+        self._done[key] = [{**row, RECIPE: key, MADE_BY: self._me} for row in rows]
+        self._write()
 
     def close(self, path: Path) -> str:
         """Write this study's trials to `path`; say what of the known ones is not among them, return who made which."""
+        self._write()
         if unused := len(self._known.keys() - self._done.keys()):
             why = "are of other settings, methods or trials and were not used"
             self._console.status(f"{unused} of {len(self._known)} known trials {why}")
@@ -187,9 +192,9 @@ class Ledger:
     def _rows(self) -> list[dict[str, Any]]:
         return sorted((row for rows in self._done.values() for row in rows), key=_number)
 
-    def _write(self, key: str, rows: Sequence[dict[str, Any]]) -> None:
-        """Write a trial beside all others, and those that another study of this name wrote meanwhile."""
-        self._done[key], self._kept = list(rows), self._here()
+    def _write(self) -> None:
+        """Write this study's trials beside all others, and those that another study of this name wrote meanwhile."""
+        self._kept = self._here()
         others = {other: made for other, made in {**self._known, **self._kept}.items() if other not in self._done}
         write_json(self._path, [*self._rows(), *(row for made in others.values() for row in made)])
 

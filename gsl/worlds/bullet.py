@@ -6,7 +6,6 @@ function of the world's configuration, the actions and the seed of `reset`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -24,7 +23,7 @@ from gsl.errors import GslError
 from gsl.robots.catalogue import read_files, robot
 from gsl.worlds.engine import Engine, Physics, Reading
 from gsl.worlds.fits import check_base, check_periods, check_plant
-from gsl.worlds.ground import CROSSED, random_heights
+from gsl.worlds.ground import REACH, random_heights
 from gsl.worlds.start import Start, resting
 
 FALLEN_TILT = 0.5  # cosine of the tilt beyond which the robot has fallen
@@ -58,11 +57,6 @@ class BulletWorld:
     def plant(self) -> Plant:
         """The robot with its effects."""
         return applied(nominal(robot(self.robot)), built(self.effects))
-
-    @property
-    def crossed(self) -> float:
-        """How long the ground reaches for who walks fast [s]."""
-        return CROSSED if self.floating and self.plant.contact.roughness else math.inf
 
     @property
     def layout(self) -> Layout:
@@ -116,7 +110,9 @@ class BulletEnv(gymnasium.Env):
             physics = Physics(self.world.step, self.world.iterations, self.world.period, self.world.floating)
             self._engine = Engine(self._plant, physics)
         before = 0 if options.get("start") else round(self.world.settle / self.world.period)
-        self._engine.load(start.reading, start.commands, -before * self.world.period, self._surface())
+        surface, self._middle = self._surface(), np.array(start.reading.place[:2])
+        self._edge = np.inf if surface is None else REACH
+        self._engine.load(start.reading, start.commands, -before * self.world.period, surface)
         reading = self._engine.read()
         for _ in range(before):
             self._engine.run(start.commands[0])
@@ -127,7 +123,8 @@ class BulletEnv(gymnasium.Env):
         """Hold desired joint positions [rad], shape (n_joints,), for one control period.
 
         Raises:
-            GslError: if the action has another size or holds what is not a finite number.
+            GslError: if the action has another size or holds what is not a finite number, or the robot has come to the
+                edge of an uneven ground.
         """
         assert self._engine is not None, "reset comes first"
         targets, noise = self._checked(action)[self._drive], self._plant.action_noise
@@ -135,6 +132,8 @@ class BulletEnv(gymnasium.Env):
             targets = targets + noise * self.np_random.standard_normal(len(noise))
         self._engine.run(targets)
         reading = self._engine.read()
+        if np.abs(reading.place[:2] - self._middle).max() > self._edge:
+            raise GslError(f"the robot has come to the edge of the uneven ground ({REACH} m): shorten task.duration")
         fell = self.world.floating and (reading.up < FALLEN_TILT or reading.place[2] < self._robot.upright_height)
         return self._observe(reading), 0.0, bool(fell), False, {"fell": bool(fell)}
 

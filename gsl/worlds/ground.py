@@ -9,8 +9,7 @@ import numpy as np
 
 from gsl.core.plant import Contact
 
-REACH = 2.5  # half the edge of a random surface [m]
-CROSSED = 7.5  # in that time a walk at 30 cm/s has come to its edge, but for a foot [s]
+REACH = 2.5  # half the edge of a random surface [m]: 7.5 s at 30 cm/s, and a foot
 FLAT = 0.15  # radius of the flat place in its middle [m]: both soles
 BELOW = 0.05  # a plane this much lower lies under a random surface and goes on beyond it [m]
 # The visual keeps Bullet from preparing to draw the plane at every load, which takes half a millisecond.
