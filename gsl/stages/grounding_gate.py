@@ -110,7 +110,7 @@ class Gate:
         fell = sum(fell for _, fell in pi0_in(worlds[width], self.parameters, seed)) if width == min(worlds) else 0
         problems = [f"π0 falls in {fell} of {EPISODES} episodes that draw from {share}"] if fell else []
         write_json(self.folder / REPORT, {"width": width, "acceptable": not problems, "problems": problems})
-        self._judge(problems, "Draw less")
+        self._judge(problems, "Lower grounding.width")
         return worlds[width], {"width": width, "grounding_acceptable": not problems}
 
     def _diagnosed(self, scenario: Scenario, settings: DiagnosedEffects) -> tuple[Scenario, Mapping[str, Any]]:
