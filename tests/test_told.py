@@ -8,7 +8,7 @@ from typing import Any, cast
 import pytest
 
 from gsl.stages.account import returned
-from gsl.stages.headline import Unit
+from gsl.stages.headline import Unit, _optimize
 from gsl.stages.iteration_report import Rounds
 from gsl.stages.measured import cells, gain, summary
 from gsl.stages.population import Episode
@@ -122,3 +122,21 @@ def test_a_gain_below_one_is_told() -> None:
     rounds = Rounds(OwnReward())
     rounds.add(evaluation(0.06, 0.64, 0.43, 0.73), 10)
     assert "gain of the last step +0.43 to +0.73 (95 %)" in rounds.verdict
+
+
+@pytest.mark.parametrize(
+    ("checked", "told"),
+    [
+        ({}, ""),
+        ({"grounding_acceptable": True}, ""),
+        ({"grounding_acceptable": False}, "; grounding failed its check"),
+        ({"alpha": 0.9, "grounding_acceptable": True, "grounding_compared": True}, "; grounding (alpha 0.9) passed"),
+        (
+            {"alpha": 1.0, "grounding_acceptable": True, "grounding_compared": False},
+            "; grounding (alpha 1) passed, by the falls of π0 alone",
+        ),
+    ],
+)
+def test_a_search_says_how_its_grounding_was_checked(checked: dict[str, Any], told: str) -> None:
+    metrics = {"best_value_sim": 0.25, "generations": 2, **checked}
+    assert _optimize(metrics, Unit.of(Walk())) == f"2 generations, best 25.0 cm/s in simulation{told}"

@@ -163,8 +163,8 @@ class Gate:
         if report.reach:
             self.console.status(report.reach.told)
         self._judge(report.problems, "Collect more data")
-        about = {"alpha": report.alpha, "x": loaded.x, "grounding_acceptable": report.acceptable}
-        return ready, {**about, **({"grounding_lacks": report.lacking} if report.lacking else {})}
+        judged = {"grounding_acceptable": report.acceptable, "grounding_compared": bool(report.deviations)}
+        return ready, {"alpha": report.alpha, "x": loaded.x, **judged}
 
     def _of_states(self, ready: Scenario, heldout: Batch) -> tuple[Scenario, Mapping[str, Any]]:
         """Compare what π0 is worth with held-out real episodes."""

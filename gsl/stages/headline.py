@@ -156,7 +156,7 @@ def _optimize(metrics: Metrics, unit: Unit) -> str:
     if alpha is None and passed:
         return told
     far = "" if alpha is None else f" (alpha {alpha:g})"
-    verdict = "passed, by the falls of π0 alone" if metrics.get("grounding_lacks") else "passed"
+    verdict = "passed" if metrics.get("grounding_compared", True) else "passed, by the falls of π0 alone"
     return f"{told}; grounding{far} {verdict if passed else 'failed its check'}"
 
 
