@@ -67,7 +67,7 @@ def test_another_setting_is_refused_and_named(chain: Path) -> None:
     assert said.code == 2
     assert said.lines == [
         "gsl collect: runs/chain/collect_real: was built otherwise (changed: seed 1 -> 2); "
-        "force=true rebuilds it, out= keeps both"
+        "force=true rebuilds it, another name= keeps both"
     ]
 
 
@@ -200,3 +200,10 @@ def test_models_of_two_joints_ground_no_others(grounding: str, tmp_path: Path) -
         "LShoulderPitch",
         "RShoulderPitch",
     }
+
+
+def test_a_link_that_takes_another_ones_place_is_told(tmp_path: Path) -> None:
+    line = ("iterate", *NAMED, "grounding=none", "optimizer.generations=1")
+    assert "in the place of" not in done(*line, folder=tmp_path).err
+    said = done(*line, "seed=2", "force=true", folder=tmp_path)
+    assert "runs/chain/iteration_01/optimize: in the place of what a chain with other settings had built" in said.err

@@ -151,7 +151,7 @@ def _optimize(metrics: Metrics, unit: Unit) -> str:
     best = unit.shown(metrics["best_value_sim"])
     told = f"{several(metrics['generations'], 'generation')}, best {best} in simulation"
     if "effects" in metrics:
-        told += f"; {named(metrics['effects']) or 'calibration'} switched on"
+        told += f"; {named(metrics['effects'])} switched on" if metrics["effects"] else "; joints calibrated"
     alpha, passed = metrics.get("alpha"), metrics.get("grounding_acceptable", True)
     if alpha is None and passed:
         return told

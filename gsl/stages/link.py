@@ -16,8 +16,10 @@ COMMAND = "gsl iterate"
 
 def built(stage: Stage, out: Path, console: Any) -> Artifact:
     """Build one link; what an earlier chain built otherwise in its place is replaced, what anyone else built is not."""
-    command = f"{COMMAND} ({stage.kind})"
-    made = build(stage, config=described(stage), out=out, command=command, force=_ours(out), console=console)
+    command, ours = f"{COMMAND} ({stage.kind})", _ours(out)
+    made = build(stage, config=described(stage), out=out, command=command, force=ours, console=console)
+    if ours and not made.unchanged:
+        console.status(f"{out.as_posix()}: in the place of what a chain with other settings had built")
     console.status(f"{out.as_posix()}: {headline(made)}{' (unchanged)' if made.unchanged else ''}")
     return made
 

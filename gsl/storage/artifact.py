@@ -111,7 +111,7 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
     if force:
         return None
     reason = f"changed since: {damaged}" if damaged else changes(found.manifest, found.config, identity, config)
-    raise ArtifactError(out, f"was built otherwise ({reason}); force=true {forced}, out= keeps both")
+    raise ArtifactError(out, f"was built otherwise ({reason}); force=true {forced}, another name= keeps both")
 
 
 def _work(
