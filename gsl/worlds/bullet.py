@@ -92,6 +92,7 @@ class BulletEnv(gymnasium.Env):
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self.layout.size,), dtype=np.float64)
         self._neutral = np.clip(np.zeros(self._n), low, high)
         self._engine: Engine | None = None
+        self._middle: np.ndarray | None = None  # of an uneven ground [m], shape (2,)
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -110,8 +111,8 @@ class BulletEnv(gymnasium.Env):
             physics = Physics(self.world.step, self.world.iterations, self.world.period, self.world.floating)
             self._engine = Engine(self._plant, physics)
         before = 0 if options.get("start") else round(self.world.settle / self.world.period)
-        surface, self._middle = self._surface(), np.array(start.reading.place[:2])
-        self._edge = np.inf if surface is None else REACH
+        surface = self._surface()
+        self._middle = None if surface is None else start.reading.place[:2]
         self._engine.load(start.reading, start.commands, -before * self.world.period, surface)
         reading = self._engine.read()
         for _ in range(before):
@@ -132,7 +133,7 @@ class BulletEnv(gymnasium.Env):
             targets = targets + noise * self.np_random.standard_normal(len(noise))
         self._engine.run(targets)
         reading = self._engine.read()
-        if np.abs(reading.place[:2] - self._middle).max() > self._edge:
+        if self._middle is not None and np.abs(reading.place[:2] - self._middle).max() > REACH:
             raise GslError(f"the robot has come to the edge of the uneven ground ({REACH} m): shorten task.duration")
         fell = self.world.floating and (reading.up < FALLEN_TILT or reading.place[2] < self._robot.upright_height)
         return self._observe(reading), 0.0, bool(fell), False, {"fell": bool(fell)}
