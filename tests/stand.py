@@ -69,7 +69,7 @@ def run(
     paths = np.broadcast_to(targets[:, None] if targets.ndim == 1 else targets, (len(targets), n))
     motion, torque = np.array([paths[0], np.zeros(n)]), np.zeros(n)
     state, rows = first_state(paths[:1], motion, STEP), []
-    inertia = LINK + parameters[OUTPUT_ARMATURE]
+    inertia = LINK + parameters.rows[OUTPUT_ARMATURE]
 
     def note() -> None:
         told = np.empty((2, n))

@@ -10,11 +10,22 @@ import numpy as np
 from gsl.blind.extras import extra_rows, extra_torque
 from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
+from gsl.core.servo_law import HIDDEN
 from gsl.effects.effect import applied, built
 from gsl.worlds.chain import COLUMNS, Chain, accelerate, nothing
 from gsl.worlds.encoder import first_history
 from gsl.worlds.held import Held
-from gsl.worlds.servo import COMMANDS, DRIVE, SMOOTHED, SPEED, ServoState, encoder_motion, servo_torque
+from gsl.worlds.servo import (
+    COMMANDS,
+    DRIVE,
+    MEMORY,
+    SMOOTHED,
+    SPEED,
+    ServoParameters,
+    ServoState,
+    encoder_motion,
+    servo_torque,
+)
 
 STEP = 0.001  # physics period [s]
 SETTLE = 25  # control periods for which the first command is held before a motion begins
@@ -55,17 +66,19 @@ def play_same(
 
 @compiled
 def _play(
-    servo: np.ndarray, tree: Chain, rows: np.ndarray, extras: np.ndarray, rest: np.ndarray, commands: np.ndarray,
+    servo: ServoParameters, tree: Chain, rows: np.ndarray, extras: np.ndarray, rest: np.ndarray, commands: np.ndarray,
     motion: np.ndarray, step: float, substeps: int, settle: int, told: np.ndarray,
 ) -> None:  # fmt: skip
     periods, n = told.shape
     torque, work, matrix, pushed = np.zeros(n), np.zeros((n, COLUMNS)), np.zeros((n, n)), nothing()
-    memory, encoders, steps = np.zeros((8, n)), np.zeros((2, n)), np.zeros(1, dtype=np.int64)
+    memory, encoders, steps = np.zeros((MEMORY, n)), np.zeros((2, n)), np.zeros(1, dtype=np.int64)
     clock = np.array([-settle * substeps * step])
     memory[1], memory[2], memory[SPEED], memory[SMOOTHED] = motion[0], motion[1], motion[1], commands[periods]
     history = first_history(motion, step)
     for t in range(periods):
-        state = ServoState(commands[periods - 1 - t : periods - 1 - t + COMMANDS], memory, history, clock, steps)
+        state = ServoState(
+            commands[periods - 1 - t : periods - 1 - t + COMMANDS], memory, history, clock, steps, np.zeros((3, HIDDEN))
+        )
         for k in range(substeps):
             servo_torque(servo, state, motion, k * step, step, substeps * step, torque)
             extra_torque(rows, extras, rest, motion, memory[DRIVE], step, torque)

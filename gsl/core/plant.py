@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.servo_law import ServoLaw
 
 GRAVITY = 9.81  # [m/s²]
 Hook = Callable[[np.ndarray, float], np.ndarray]
@@ -142,6 +143,7 @@ class Plant:
         gravity: In world axes [m/s²], shape (3,).
         pushes: Forces from outside.
         action_noise: Standard deviation of the noise on each motor's target [rad], shape (n_motors,).
+        law: What the servos do beyond their parameters, if that was learned.
         hook: A user's own joint torque: (motion (2, n_motors), time since the episode began [s]) -> (n_motors,) [N·m].
     """
 
@@ -152,6 +154,7 @@ class Plant:
     gravity: np.ndarray
     action_noise: np.ndarray
     pushes: tuple[Push, ...] = ()
+    law: ServoLaw | None = None
     hook: Hook | None = None
 
     def mask(self, joints: str | Sequence[str]) -> np.ndarray:

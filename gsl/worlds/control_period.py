@@ -15,7 +15,7 @@ from numba import carray  # type: ignore[attr-defined]
 from gsl.core.compiled import compiled
 from gsl.worlds import bullet_c as c
 from gsl.worlds.rotor import Rotors, compensation
-from gsl.worlds.servo import ServoState, servo_torque
+from gsl.worlds.servo import ServoParameters, ServoState, servo_torque
 
 
 class Drive(NamedTuple):
@@ -27,7 +27,7 @@ class Drive(NamedTuple):
         parent, order, axis, carried, armature, gain: See `rotor.Rotors`.
     """
 
-    servo: np.ndarray
+    servo: ServoParameters
     base_axes: np.ndarray
     parent: np.ndarray
     order: np.ndarray
@@ -37,7 +37,7 @@ class Drive(NamedTuple):
     gain: np.ndarray
 
     @classmethod
-    def of(cls, servo: np.ndarray, rotor: Rotors, base_axes: np.ndarray) -> Drive:
+    def of(cls, servo: ServoParameters, rotor: Rotors, base_axes: np.ndarray) -> Drive:
         """Put together what `torques` needs."""
         return cls(servo, base_axes, rotor.parent, rotor.order, rotor.axis, rotor.carried, rotor.armature, rotor.gain)
 

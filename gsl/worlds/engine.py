@@ -102,9 +102,9 @@ class Engine:
         self.body = NOTHING
         self.plant, self.physics, self.robot = plant, physics, lumped(plant.robot)
         self.handle = client_handle(pybullet.__file__, self.client)
-        servo = packed(plant.servo, plant.robot.supply_voltage)
-        armature = plant.servo.armature - servo[ROTOR]
-        rotor = rotors(self.robot, armature, floating=physics.floating, apart=servo[ROTOR])
+        servo = packed(plant.servo, plant.robot.supply_voltage, plant.law)
+        apart = servo.rows[ROTOR]
+        rotor = rotors(self.robot, plant.servo.armature - apart, floating=physics.floating, apart=apart)
         self._loaded = _heavier(self.robot, carried_inertia(self.robot, rotor.carried))
         self._inertia = {name: principal_axes(link.inertia)[0].tolist() for name, link in self._loaded.links.items()}
         base = self._loaded.links[self.robot.base]

@@ -15,16 +15,19 @@ from gsl.core.body import Robot, carrier
 from gsl.core.compiled import compiled
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
 from gsl.core.plant import Plant, Push
+from gsl.core.servo_law import HIDDEN
 from gsl.worlds.chain import COLUMNS, Chain, Pushed, accelerate, chain
 from gsl.worlds.encoder import REMEMBERED, fill_history
 from gsl.worlds.pushes import acting
 from gsl.worlds.servo import (
     COMMANDS,
+    MEMORY,
     ROTOR,
     ROTOR_ANGLE,
     ROTOR_SPEED,
     SMOOTHED,
     SPEED,
+    ServoParameters,
     ServoState,
     encoder_motion,
     packed,
@@ -67,7 +70,7 @@ class Held:
         period: Control period [s].
     """
 
-    servo: np.ndarray
+    servo: ServoParameters
     tree: Chain
     pushes: np.ndarray
     bias: np.ndarray
@@ -77,9 +80,9 @@ class Held:
     @classmethod
     def of(cls, plant: Plant, step: float, period: float) -> Held:
         """Prepare a plant."""
-        servo = packed(plant.servo, plant.robot.supply_voltage)
+        servo = packed(plant.servo, plant.robot.supply_voltage, plant.law)
         pushes = [row for push in plant.pushes for row in _aimed(push, plant.robot)]
-        tree = chain(plant, plant.servo.armature - servo[ROTOR])
+        tree = chain(plant, plant.servo.armature - servo.rows[ROTOR])
         return cls(servo, tree, np.array(pushes).reshape(-1, 9), plant.sensors.bias, step, period)
 
     def replay(self, windows: Windows) -> np.ndarray:
@@ -118,7 +121,13 @@ def _aimed(push: Push, robot: Robot) -> list[tuple[float, ...]]:
 
 @compiled
 def _replay(
-    servo: np.ndarray, tree: Chain, pushes: np.ndarray, windows: Windows, step: float, substeps: int, told: np.ndarray
+    servo: ServoParameters,
+    tree: Chain,
+    pushes: np.ndarray,
+    windows: Windows,
+    step: float,
+    substeps: int,
+    told: np.ndarray,
 ) -> None:
     for first in range(0, told.shape[0], LANES):
         _side_by_side(servo, tree, pushes, windows, first, step, substeps, told)
@@ -126,7 +135,7 @@ def _replay(
 
 @compiled
 def _side_by_side(
-    servo: np.ndarray, tree: Chain, pushes: np.ndarray, windows: Windows, first: int, step: float, substeps: int,
+    servo: ServoParameters, tree: Chain, pushes: np.ndarray, windows: Windows, first: int, step: float, substeps: int,
     told: np.ndarray,
 ) -> None:  # fmt: skip
     """Replay as many windows as there are lanes, from the first one on."""
@@ -136,14 +145,16 @@ def _side_by_side(
     asked, since = zeros_in_lanes(periods + COMMANDS - 1, n), zeros_in_lanes(1, 1)
     _fill(windows, first, numbers, asked, since)
     commands, clock, steps = side_by_side(asked), side_by_side(since)[0], np.zeros(1, dtype=np.int64)
-    memory = side_by_side(zeros_in_lanes(8, n))
+    memory, layers = side_by_side(zeros_in_lanes(MEMORY, n)), side_by_side(zeros_in_lanes(3, HIDDEN))
     history = side_by_side(zeros_in_lanes(REMEMBERED, 2 * n).reshape((REMEMBERED, 2, n, LANES)))
     _settle(memory, history, motion, commands[periods], step)
     pushed = Pushed(pushes[:, 0].astype(np.int64), pushes[:, 6:].copy(), side_by_side(zeros_in_lanes(len(pushes), 3)))
     torque, work = side_by_side(zeros_in_lanes(1, n))[0], side_by_side(zeros_in_lanes(n, COLUMNS))
     matrix = side_by_side(zeros_in_lanes(n, n))
     for t in range(periods):
-        state = ServoState(commands[periods - 1 - t : periods - 1 - t + COMMANDS], memory, history, clock, steps)
+        state = ServoState(
+            commands[periods - 1 - t : periods - 1 - t + COMMANDS], memory, history, clock, steps, layers
+        )
         for k in range(substeps):
             servo_torque(servo, state, motion, k * step, step, substeps * step, torque)
             _push(pushes, state.clock[0] + k * step, step, pushed.force)

@@ -8,6 +8,8 @@ The same for one robot and for robots side by side (`lanes`): then what changes 
     rotor inertia                                     see rotor.py; beyond play or a spring the rotor is a second mass
     torque = u (1 - duty_loss |u| / limit) - viscous dq/dt - dry friction - hard stops
 
+A learned law, if there is one, adds to u and to the torque (gsl/core/servo_law.py).
+
 Dry friction is a bristle that gives way at the friction's size (Dahl 1968): torque = k z, z follows the motion and is
 held within +-BRISTLE; it holds a joint at rest under load without creep, which a clipped stopping torque does not. Its
 size is coulomb + stribeck exp(-(v / stribeck_velocity)²) + load_friction |u - external torque| (Rhoban/bam, M4), the
@@ -23,6 +25,7 @@ import numpy as np
 from gsl.core.compiled import compiled
 from gsl.core.lanes import where
 from gsl.core.plant import Servo
+from gsl.core.servo_law import HIDDEN, LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, ServoLaw, act, correction, no_law
 from gsl.worlds.drive_train import ROTOR_SHARE, STIFFEST, limited, through_gear
 from gsl.worlds.encoder import REMEMBERED, first_history, seen
 
@@ -35,7 +38,15 @@ COMMANDS = 16  # control periods of targets that are remembered: the longest del
     QUANTUM, DEADBAND, PLAY, COMPLIANCE, SAG, DUTY_LOSS, FADE, OFFSET, SENSOR_DELAY, LOWER, UPPER, MOTOR_ENCODER,
     PER_AMPERE, ROTOR,
 ) = range(26)  # rows of the parameters  # fmt: skip
-BENT, ROTOR_ANGLE, ROTOR_SPEED, SMOOTHED, SPEED, DRIVE, THROUGH, FRICTION = range(8)  # rows of the state
+BENT, ROTOR_ANGLE, ROTOR_SPEED, SMOOTHED, SPEED, DRIVE, THROUGH, FRICTION, LAW_BENT = range(9)  # rows of the state
+MEMORY = 9  # how many these are
+
+
+class ServoParameters(NamedTuple):
+    """What never changes: rows of numbers, shape (26, n_motors), and the learned law."""
+
+    rows: np.ndarray
+    law: ServoLaw
 
 
 class ServoState(NamedTuple):
@@ -45,10 +56,11 @@ class ServoState(NamedTuple):
         commands: Targets of the last control periods, newest first [rad], shape (COMMANDS, n_motors).
         memory: Bristle deflection [rad]; rotor angle [rad] and speed [rad/s] as seen at the output; filtered target
             [rad]; at the last physics step: output speed [rad/s], motor torque, torque through the gear, friction
-            [N·m]; shape (8, n_motors).
+            [N·m]; bristle of the learned law [rad]; shape (MEMORY, n_motors).
         history: What the encoders measured at the last physics steps, see `encoder.seen`.
         clock: Time of the newest command since the episode began [s], shape (1,).
         steps: Number of physics steps so far, shape (1,).
+        layers: Scratch of the learned law, shape (3, HIDDEN).
     """
 
     commands: np.ndarray
@@ -56,14 +68,16 @@ class ServoState(NamedTuple):
     history: np.ndarray
     clock: np.ndarray
     steps: np.ndarray
+    layers: np.ndarray
 
 
-def packed(servo: Servo, supply_voltage: float) -> np.ndarray:
-    """Return the parameters as the kernel reads them, shape (26, n_motors).
+def packed(servo: Servo, supply_voltage: float, law: ServoLaw | None = None) -> ServoParameters:
+    """Return the parameters as the kernel reads them.
 
     Args:
         servo: The servos.
         supply_voltage: Of the common supply without load [V].
+        law: What they do beyond their parameters.
     """
     two_masses = (servo.play > 0.0) | (servo.compliance >= STIFFEST)
     rotor = np.where(two_masses, ROTOR_SHARE * servo.armature, 0.0)
@@ -74,7 +88,7 @@ def packed(servo: Servo, supply_voltage: float) -> np.ndarray:
         servo.duty_loss, servo.fade, servo.offset, servo.sensor_delay, servo.lower_stop, servo.upper_stop,
         servo.motor_encoder, 1.0 / servo.torque_constant, rotor,
     )  # fmt: skip
-    return np.array(rows)
+    return ServoParameters(np.array(rows), no_law(len(servo.kp)) if law is None else law)
 
 
 def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: float = 0.0) -> ServoState:
@@ -87,7 +101,7 @@ def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: fl
         clock: Time since the episode began [s].
     """
     older = np.repeat(commands[-1:], max(0, COMMANDS - len(commands)), axis=0)
-    memory = np.zeros((8, motion.shape[1]))
+    memory = np.zeros((MEMORY, motion.shape[1]))
     memory[ROTOR_ANGLE], memory[ROTOR_SPEED], memory[SMOOTHED], memory[SPEED] = *motion, commands[0], motion[1]
     return ServoState(
         np.vstack([commands, older])[:COMMANDS].copy(),
@@ -95,12 +109,13 @@ def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: fl
         first_history(motion, step),
         np.array([clock]),
         np.zeros(1, dtype=np.int64),
+        np.zeros((3, HIDDEN)),
     )
 
 
 @compiled
 def servo_torque(
-    parameters: np.ndarray,
+    servos: ServoParameters,
     state: ServoState,
     motion: np.ndarray,
     elapsed: float,
@@ -111,7 +126,7 @@ def servo_torque(
     """Fill `torque` [N·m] for one physics step and move `state` on.
 
     Args:
-        parameters: From `packed`.
+        servos: From `packed`.
         state: Changed in place, but for `commands` and the time, which are the caller's.
         motion: Positions [rad] then velocities [rad/s] at the output, shape (2, n_motors).
         elapsed: Time since the newest command was issued [s].
@@ -119,32 +134,92 @@ def servo_torque(
         period: Control period [s].
         torque: Result, shape (n_motors,).
     """
-    memory, count = state.memory, state.steps[0]
-    current = 0.0
+    parameters = servos.rows
+    current = drawn_current(parameters, state.memory)
     for i in range(motion.shape[1]):
-        current += abs(memory[DRIVE, i]) * parameters[PER_AMPERE, i]
-    for i in range(motion.shape[1]):
-        target = _delayed(state.commands, i, (elapsed - parameters[DELAY, i]) / period, step / period)
-        target = _shaped(parameters, memory, i, target, step)
-        q, v = _measured(parameters, memory, i, motion)
-        if parameters[SENSOR_DELAY, i] > 0.0:
-            delay, now = parameters[SENSOR_DELAY, i], (q, v)
-            q, v = seen(delay, state.history, count, q, 0, i, step), seen(delay, state.history, count, v, 1, i, step)
-            for row in range(2):
-                state.history[count % REMEMBERED, row, i] = now[row]
-        fade = max(0.0, 1.0 - parameters[FADE, i] * max(0.0, state.clock[0] + elapsed))
-        error = target + parameters[OFFSET, i] - q
-        error -= min(parameters[DEADBAND, i], max(-parameters[DEADBAND, i], error))
-        u = fade * parameters[KP, i] * error - parameters[KD, i] * v
-        torque[i] = _output(parameters, memory, i, motion, u, max(1e-3, 1.0 - parameters[SAG, i] * current), step)
+        error, q, v = sensed_error(parameters, state, i, motion, elapsed, step, period)
+        u, output = wanted_torque(servos, state, i, motion, error, q, v, elapsed, step, period)
+        supply = supply_share(parameters, i, current)
+        torque[i] = output_torque(parameters, state.memory, i, motion, u, output, supply, step)
     state.steps[0] += 1
 
 
 @compiled
+def drawn_current(parameters: np.ndarray, memory: np.ndarray) -> float:
+    """Return the current of all motors at the last physics step [A]."""
+    current = 0.0
+    for i in range(memory.shape[1]):
+        current += abs(memory[DRIVE, i]) * parameters[PER_AMPERE, i]
+    return current
+
+
+@compiled
+def supply_share(parameters: np.ndarray, i: int, current: float) -> float:
+    """Return the share of the supply's voltage that is left at a current of all motors [A]."""
+    return max(1e-3, 1.0 - parameters[SAG, i] * current)
+
+
+@compiled
+def sensed_error(
+    parameters: np.ndarray, state: ServoState, i: int, motion: np.ndarray, elapsed: float, step: float, period: float
+) -> tuple[float, float, float]:
+    """Return motor i's control error [rad], and position [rad] and velocity [rad/s] as its servo sees them."""
+    count = state.steps[0]
+    target = delayed(state.commands, i, (elapsed - parameters[DELAY, i]) / period, step / period)
+    target = _shaped(parameters, state.memory, i, target, step)
+    q, v = _measured(parameters, state.memory, i, motion)
+    if parameters[SENSOR_DELAY, i] > 0.0:
+        delay, now = parameters[SENSOR_DELAY, i], (q, v)
+        q, v = seen(delay, state.history, count, q, 0, i, step), seen(delay, state.history, count, v, 1, i, step)
+        for row in range(2):
+            state.history[count % REMEMBERED, row, i] = now[row]
+    return target + parameters[OFFSET, i] - q, q, v
+
+
+@compiled
+def kept_gain(parameters: np.ndarray, state: ServoState, i: int, elapsed: float) -> float:
+    """Return motor i's proportional gain after what time has taken of it [N·m/rad]."""
+    fade = max(0.0, 1.0 - parameters[FADE, i] * max(0.0, state.clock[0] + elapsed))
+    return fade * parameters[KP, i]
+
+
+@compiled
+def wanted_torque(
+    servos: ServoParameters, state: ServoState, i: int, motion: np.ndarray, error: float, q: float, v: float,
+    elapsed: float, step: float, period: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the torque that motor i's servo wants and what a learned law adds at the output [N·m]."""
+    parameters, law = servos.rows, servos.law
+    error -= min(parameters[DEADBAND, i], max(-parameters[DEADBAND, i], error))
+    u, output = kept_gain(parameters, state, i, elapsed) * error - parameters[KD, i] * v, 0.0 * v
+    if law.group[i] != NOBODY:
+        since = elapsed - parameters[DELAY, i]
+        for k in range(LAGS):
+            lagged = delayed(state.commands, i, (since - LAG * k) / period, step / period)
+            state.layers[0, k] = law.stiffness[i] * (lagged + parameters[OFFSET, i] - q)
+        drive, output = _learned(law, state.memory, i, motion[1, i], step, state.layers)
+        u += drive
+    return u, output
+
+
+@compiled
+def _learned(
+    law: ServoLaw, memory: np.ndarray, i: int, v: float, step: float, layers: np.ndarray
+) -> tuple[float, float]:
+    """Return what motor i's law adds before the torque limit and behind it [N·m], errors being in `layers` already."""
+    memory[LAW_BENT, i] = min(BRISTLE, max(-BRISTLE, memory[LAW_BENT, i] + v * step))
+    layers[0, LAGS] = v / SPEED_UNIT
+    layers[0, LAGS + 1] = act(SIGN * v)
+    layers[0, LAGS + 2] = memory[LAW_BENT, i] / BRISTLE
+    return correction(law, i, layers)
+
+
+@compiled
 def encoder_motion(
-    parameters: np.ndarray, state: ServoState, motion: np.ndarray, step: float, told: np.ndarray
+    servos: ServoParameters, state: ServoState, motion: np.ndarray, step: float, told: np.ndarray
 ) -> None:
     """Fill `told` with what the encoders tell between two physics steps, given the outputs', both (2, n_motors)."""
+    parameters = servos.rows
     for i in range(motion.shape[1]):
         told[0, i], told[1, i] = _measured(parameters, state.memory, i, motion)
         if parameters[SENSOR_DELAY, i] > 0.0:
@@ -162,7 +237,7 @@ def _measured(parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.nda
 
 
 @compiled
-def _delayed(commands: np.ndarray, i: int, start: float, length: float) -> float:
+def delayed(commands: np.ndarray, i: int, start: float, length: float) -> float:
     """Mean of a delayed, held command over one physics step: continuous in the delay.
 
     Args:
@@ -189,10 +264,22 @@ def _shaped(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, s
 
 
 @compiled
-def _output(
-    parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndarray, u: float, supply: float, step: float
-) -> float:
-    """Return the torque at the output, given what the servo wants and the supply's share of its voltage."""
+def output_torque(
+    parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndarray, u: float, output: float, supply: float,
+    step: float,
+) -> float:  # fmt: skip
+    """Return the torque at the output [N·m], given what the servo wants and the supply's share of its voltage.
+
+    Args:
+        parameters: Rows of `ServoParameters`.
+        memory: Of `ServoState`, column i moved on by one step.
+        i: Motor.
+        motion: Positions [rad] and velocities [rad/s] at the output, shape (2, n_motors).
+        u: Wanted torque [N·m].
+        output: Torque that a learned law adds at the output, as less friction [N·m].
+        supply: Share of the supply's voltage that is left.
+        step: Physics period [s].
+    """
     q, v = motion[0, i], motion[1, i]
     bound, no_load = supply * parameters[LIMIT, i], supply * parameters[NO_LOAD, i]
     if parameters[DUTY_LOSS, i] > 0.0:
@@ -206,7 +293,7 @@ def _output(
             memory[ROTOR_ANGLE : ROTOR_SPEED + 1], i, motion, u, bound, no_load, parameters[ROTOR, i],
             parameters[PLAY, i], parameters[COMPLIANCE, i], step,
         )  # fmt: skip
-    friction = parameters[VISCOUS, i] * v + _dry(parameters, memory, i, v, through, step)
+    friction = parameters[VISCOUS, i] * v + _dry(parameters, memory, i, v, through, step) - output
     memory[DRIVE, i], memory[THROUGH, i], memory[FRICTION, i], memory[SPEED, i] = drive, through, friction, v
     return through - friction + _stop(q - parameters[UPPER, i], v) - _stop(parameters[LOWER, i] - q, -v)
 

@@ -1,0 +1,97 @@
+"""A learned servo: changes of a servo's own numbers joint by joint, and a law for what no number says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from gsl.core.plant import Plant
+from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, NOBODY, ServoLaw
+
+FACTORS = ("kp", "kd", "limit")  # numbers that are multiplied
+SUMS = ("delay", "coulomb", "viscous", "deadband", "armature", "offset")  # and those that are added to
+NUMBERS = (*FACTORS, *SUMS)
+LEAST_INERTIA = 0.2  # share of the rotor's inertia that is left: below it the joint is not stable at 2 ms
+
+
+@dataclass(frozen=True)
+class ServoModel:
+    """A learned servo of a robot with n motors, which share networks in G groups.
+
+    Attributes:
+        robot: Name of the robot.
+        joints: Its motors, in order.
+        groups: Names of the groups.
+        numbers: Logarithms of FACTORS [-] and SUMS [s, N·m, N·m·s/rad, rad, kg·m², rad], by name, shape (n,) each.
+        lag: See `ServoLaw`, shape (n, LAGS).
+        group: Of each motor, shape (n,).
+        network: The other fields of `ServoLaw` by name; None where no network was kept.
+    """
+
+    kind: ClassVar[str] = "servo_model"
+
+    robot: str
+    joints: tuple[str, ...]
+    groups: tuple[str, ...]
+    numbers: Mapping[str, np.ndarray]
+    group: np.ndarray
+    lag: np.ndarray
+    network: Mapping[str, np.ndarray]
+
+    def on(self, plant: Plant) -> Plant:
+        """Return a plant of the same robot whose servos are the learned ones."""
+        servo, change = plant.servo, self.numbers
+        fields = {name: getattr(servo, name) * np.exp(change[name]) for name in FACTORS}
+        fields |= {name: np.maximum(0.0, getattr(servo, name) + change[name]) for name in SUMS[:-2]}
+        least = LEAST_INERTIA * servo.armature
+        fields |= {"armature": np.maximum(least, servo.armature + change["armature"])}
+        fields |= {"offset": servo.offset + change["offset"]}
+        law = ServoLaw(self.group, servo.kp / servo.limit, servo.limit, self.lag, **self.network)
+        return replace(plant.with_servo(**fields), law=law)
+
+    def moved(self, plant: Plant, change: np.ndarray) -> ServoModel:
+        """Return the model with numbers changed, in `units`, shape (NUMBERS, n_joints); coupled motors follow."""
+        each = change[:, plant.robot.drive] * np.array([units(plant)[name] for name in NUMBERS])
+        return replace(self, numbers={name: self.numbers[name] + each[k] for k, name in enumerate(NUMBERS)})
+
+
+def units(plant: Plant) -> dict[str, np.ndarray]:
+    """Return what one unit of each number is, shape (n,): logarithms, [s], [N·m], [N·m·s/rad], [rad], [kg·m²], [rad].
+
+    About how far robots of one class are from their data sheets: see the ranges of the effects.
+    """
+    each, servo = np.ones(len(plant.servo.kp)), plant.servo
+    return {
+        "kp": 0.2 * each, "kd": 0.3 * each, "limit": 0.1 * each, "delay": 0.01 * each, "coulomb": 0.05 * servo.limit,
+        "viscous": 0.1 * servo.kd, "deadband": 0.003 * each, "armature": 0.3 * (servo.armature + 1e-3 * servo.kd), "offset": 0.005 * each,
+    }  # fmt: skip
+
+
+NETWORK = ("first", "first_bias", "second", "second_bias", "last", "last_bias")
+
+
+def shapes(groups: int) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of a network's arrays by name."""
+    sizes = (INPUTS, HIDDEN), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (HIDDEN, 2), (2,)
+    return {name: (groups, *size) for name, size in zip(NETWORK, sizes, strict=True)}
+
+
+def neutral(plant: Plant, rng: np.random.Generator) -> ServoModel:
+    """Return a learned servo that changes nothing, its hidden layers drawn at random."""
+    motors, robot = plant.robot.motors, plant.robot
+    names = tuple(robot.groups) or ("all",)
+    member = {motor: names.index(name) for name in reversed(names) for motor in robot.groups.get(name, motors)}
+    if len(member) < len(motors):
+        names = (*names, "others")
+    group = np.array([member.get(motor, len(names) - 1) for motor in motors])
+    n = len(motors)
+    arrays = {
+        name: rng.standard_normal(shape) / np.sqrt(shape[1]) if name in ("first", "second") else np.zeros(shape)
+        for name, shape in shapes(len(names)).items()
+    }
+    return ServoModel(
+        robot.name, motors, names, {name: np.zeros(n) for name in NUMBERS}, group, np.zeros((n, LAGS)), arrays
+    )
