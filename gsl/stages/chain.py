@@ -14,6 +14,7 @@ from gsl.grounding.gat import ActionTransformation, check_known
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import RandomisedEffects
+from gsl.grounding.torque_noise import TorqueNoise, torque_limits
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.optimizer import Learner
@@ -116,6 +117,8 @@ class Chain:
         if isinstance(grounding, DiagnosedEffects | RandomisedEffects):
             having_effects(self.sim)
         inner = innermost(grounding)
+        if isinstance(inner, TorqueNoise):
+            torque_limits(self.sim)
         if not isinstance(inner, ActionTransformation):
             return
         self._check_joints(inner)
