@@ -62,7 +62,7 @@ class TorqueNoise:
         return self.step, self.constant
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """What is done, in a few words."""
         step, constant = (f"{100 * share:g} %" for share in self.shares)
         return f"torque noise of {step} of each joint's limit at every step and {constant} constant in an episode"

@@ -97,8 +97,8 @@ class Evaluate:
         write_policies(folder / FILE, policies(self.policy, self.task, [found[best]]))
         stable = [done for done in tried[1:] if self._stable(done)]
         promised = promise(found, best, summary(fresh[best]), Unit.of(self.task))
-        if promised and promised["told"]:
-            console.status(f"warning: {promised['told']}")
+        if promised and promised["warning"]:
+            console.status(f"warning: {promised['warning']}")
         return {
             "best": found[best].name,
             "best_generation": found[best].generation or 0,

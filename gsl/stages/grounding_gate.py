@@ -122,8 +122,8 @@ class Gate:
         """Switch torque noise on; all that can be checked of it is whether π0 keeps its feet."""
         ready = replace(scenario, world=settings.switched_on(scenario.world), grounding=NoGrounding())
         fell = sum(fell for _, fell in pi0_in(ready, self.parameters, derived_seed(self.seed, "check")))
-        self.console.status(settings.told)
-        problems = [f"π0 falls in {fell} of {EPISODES} episodes with {settings.told}"] if fell else []
+        self.console.status(settings.description)
+        problems = [f"π0 falls in {fell} of {EPISODES} episodes with {settings.description}"] if fell else []
         write_json(self.folder / REPORT, {"acceptable": not problems, "problems": problems})
         self._judge(problems, "Lower grounding.step or grounding.constant")
         return ready, {"grounding_acceptable": not problems}

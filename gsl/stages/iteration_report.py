@@ -147,8 +147,8 @@ class Rounds:
     @property
     def broken_promises(self) -> list[str]:
         """What searches promised and the real world did not give, a line each."""
-        found = {k: one.metrics.get("promise") for k, one in enumerate(self._done, 1)}
-        return [f"Iteration {k}: {one['told']}." for k, one in found.items() if one and one["told"]]
+        promises = {k: evaluation.metrics.get("promise") for k, evaluation in enumerate(self._done, 1)}
+        return [f"Iteration {k}: {kept['warning']}." for k, kept in promises.items() if kept and kept["warning"]]
 
     def _of_the_flight(self) -> Mapping[str, Any]:
         if self._flight is None:

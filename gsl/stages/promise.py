@@ -18,27 +18,29 @@ from gsl.storage.policies import PolicyRecord
 ROOM = 0.05
 
 
-def promise(found: Sequence[PolicyRecord], best: int, measured: Mapping[str, Any], unit: Unit) -> dict[str, Any] | None:
-    """Return what was promised beside what was measured, with `told`, a warning, if it was not kept; None without one.
+def promise(
+    policies: Sequence[PolicyRecord], best: int, measured: Mapping[str, Any], unit: Unit
+) -> dict[str, Any] | None:
+    """Return what was promised beside what was measured, with a `warning` if it was not kept; None without one.
 
     A promise is broken where it lies above the upper end of the real 95 % interval by more than `ROOM`. Where the
     baseline is returned, the promise is the greatest of the search, and the policy that gives more was not found.
 
     Args:
-        found: The policies that were evaluated, the baseline first.
+        policies: Those that were evaluated, the baseline first.
         best: Index of the one that is returned.
         measured: The summary of its fresh episodes: its value and interval.
         unit: Of what people are shown.
     """
-    promising = [found[best]] if best else found[1:]
-    values = {one.name: one.value_sim for one in promising if one.value_sim is not None}
+    promising = [policies[best]] if best else policies[1:]
+    values = {record.name: record.value_sim for record in promising if record.value_sim is not None}
     if not values:
         return None
     policy = max(values, key=lambda name: values[name])
     value, upper = values[policy], measured["interval"][1]
     room = ROOM * abs(value)
     broken = upper is not None and math.isfinite(upper) and value > upper + room
-    returned = policy if best else found[0].name
+    returned = policy if best else policies[0].name
     given = f"{returned} gives {unit.shown(measured['value'])} in real, {unit.shown(upper)} at most (95 %)"
-    told = f"the search promised {unit.shown(value)} ({policy}), but {given}" if broken else ""
-    return {"policy": policy, "value_sim": value, "value": measured["value"], "upper": upper, "told": told}
+    warning = f"the search promised {unit.shown(value)} ({policy}), but {given}" if broken else ""
+    return {"policy": policy, "value_sim": value, "value": measured["value"], "upper": upper, "warning": warning}
