@@ -45,7 +45,7 @@ def test_the_warning_has_both_figures() -> None:
     words = (
         "the search promised 30.0 cm/s (generation_01), but generation_01 gives 25.0 cm/s in real, 26.0 cm/s at most"
     )
-    assert about is not None and about["warning"] == f"the search {words} (95 %)"
+    assert about is not None and about["warning"] == f"{words} (95 %)"
 
 
 def test_where_pi0_is_returned_it_is_the_greatest_promise_that_was_not_kept() -> None:

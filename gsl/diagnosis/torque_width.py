@@ -38,6 +38,7 @@ from gsl.worlds.held import Held, Windows
 DRAWS = 8  # of white noise: with dozens of windows its answer is known to a few percent
 PASSES = 2  # the second one measures the answers at the widths of the first: friction answers small loads less
 FIRST = (0.3, 0.05)  # shares of a torque limit whose answers are measured first: grounding.torque_noise's usual sizes
+MOST = (1.0, 0.3)  # shares up to which answers are measured: under larger loads joints stall and hit their stops
 LEFT = 0.1  # share of the roughness' square that is the encoders' at least
 CONFIDENCE = 0.95  # that a width is not chance, one-sided
 SLACK = float(2.0 * np.sqrt(2.0 / ESTIMATE))  # by which a residual may exceed a floor that comes from roughness
@@ -147,7 +148,7 @@ def torque_widths(
         for name, mask in groups.items():
             motors = mask[plant.robot.drive]
             for row, value in enumerate(widths[name]):
-                sizes[row, motors] = value or sizes[row, motors]
+                sizes[row, motors] = np.minimum(value or sizes[row, motors], MOST[row] * limit[motors])
     return widths
 
 
