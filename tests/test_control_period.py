@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from gsl.core.plant import nominal
+from gsl.effects.effect import applied, built
 from gsl.robots.nao import nao
 from gsl.worlds.bullet_c import NO_HANDLE, client_handle
 from gsl.worlds.engine import Engine, Physics
 from gsl.worlds.start import resting
 
 
-def moved(engine: Engine, handle: int) -> np.ndarray:
-    """Sensor values of some control periods with random targets."""
+def moved(engine: Engine, handle: int, *, loaded: bool = False) -> np.ndarray:
+    """Sensor values of some control periods with random targets, and random loads on the joints."""
     robot, rng = engine.robot, np.random.default_rng(0)
     stance = np.array([robot.stance.get(name, 0.0) for name in robot.motors])
     start = resting(robot, stance, stance, floating=engine.physics.floating)
@@ -21,7 +22,8 @@ def moved(engine: Engine, handle: int) -> np.ndarray:
     engine.load(start.reading, start.commands)
     seen = []
     for _ in range(40):
-        engine.run(stance + 0.1 * rng.standard_normal(len(stance)))
+        targets = stance + 0.1 * rng.standard_normal(len(stance))
+        engine.run(targets, 0.3 * rng.standard_normal((10, len(stance))) if loaded else None)
         reading = engine.read()
         seen.append(np.r_[reading.motion.ravel(), reading.place, reading.quaternion, reading.velocity, reading.gyro])
     return np.array(seen)
@@ -36,6 +38,20 @@ def test_compiled_and_python_agree_to_the_bit(floating: bool) -> None:
     in_python = moved(engine, NO_HANDLE)
     engine.close()
     np.testing.assert_array_equal(compiled, in_python)
+
+
+@pytest.mark.parametrize("floating", [True, False])
+def test_torque_noise_is_the_same_to_the_bit_in_both(floating: bool) -> None:
+    plant = applied(nominal(nao()), built({"torque_noise": {"step": 0.3, "constant": 0.1}}))
+    engine = Engine(plant, Physics(0.002, 50, 0.02, floating=floating))
+    if engine.handle == NO_HANDLE:
+        pytest.skip("this build of pybullet does not tell where its clients are")
+    handle = engine.handle
+    compiled, in_python = moved(engine, handle, loaded=True), moved(engine, NO_HANDLE, loaded=True)
+    quiet = moved(engine, handle)
+    engine.close()
+    np.testing.assert_array_equal(compiled, in_python)
+    assert np.abs(compiled - quiet).max() > 1e-3
 
 
 def test_a_file_that_is_no_library_gives_no_handle(tmp_path: Path) -> None:

@@ -22,9 +22,9 @@ from gsl.worlds.fits import check_plant
 TABLE = (
     "command_latency", "target_smoothing", "deadband", "quantisation", "action_noise", "servo_gain",
     "coulomb_friction", "viscous_friction", "stribeck_friction", "load_friction", "backlash", "joint_compliance",
-    "torque_limit", "supply_sag", "duty_loss", "gain_fade", "armature", "zero_offset", "sensor_bias", "encoder_noise",
-    "sensor_delay", "joint_limit", "link_mass", "centre_of_mass", "gravity_tilt", "external_push", "ground_friction",
-    "ground_compliance", "uneven_ground",
+    "torque_limit", "supply_sag", "duty_loss", "gain_fade", "torque_noise", "armature", "zero_offset", "sensor_bias",
+    "encoder_noise", "sensor_delay", "joint_limit", "link_mass", "centre_of_mass", "gravity_tilt", "external_push",
+    "ground_friction", "ground_compliance", "uneven_ground",
 )  # the design's, in order  # fmt: skip
 CHOSEN: dict[str, dict[str, Any]] = {
     "link_mass": {"link": "LHand"},
@@ -157,7 +157,7 @@ def document() -> str:
     return (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")
 
 
-FACTORS, SQUARES = {"kp", "kd", "limit", "friction"}, {"encoder_noise", "noise"}
+FACTORS, SQUARES = {"kp", "kd", "limit", "friction"}, {"encoder_noise", "noise", "torque_noise"}
 WORST = {"quantum", "lower_stop", "upper_stop", "stribeck_velocity", "roughness", "friction"}
 
 
@@ -180,6 +180,7 @@ def test_two_entries_add_but_factors_multiply_noises_add_in_square_and_of_some_t
 def strengths(plant: Plant) -> dict[str, np.ndarray]:
     """Whatever an effect can change, as arrays."""
     parts = {**vars(plant.servo), **vars(plant.sensors), "noise": plant.action_noise}
+    parts["torque_noise"] = plant.torque_noise
     parts["pushes"] = sum((push.force for push in plant.pushes), np.zeros(3))
     parts["mass"], parts["com"] = plant.robot.links["LHand"].mass, plant.robot.links["LHand"].com
     parts["roughness"], parts["friction"] = plant.contact.roughness, plant.contact.ground_friction

@@ -109,6 +109,18 @@ def test_action_noise_grows_and_encoder_noise_does_not() -> None:
     assert abs(np.mean(told[..., :-1] * told[..., 1:])) < 0.05 * told.var()
 
 
+def test_torque_noise_is_constant_in_an_episode_and_gives_way_to_gain() -> None:
+    def ends(effects: dict) -> np.ndarray:
+        return np.array([seen(held, effects, np.tile(LEVEL, (60, 1)), seed=seed)[[-20, -1]] for seed in range(4)])
+
+    soft, stiff = ({"servo_gain": {"kp": kp}} for kp in (0.5, 1.0))
+    noise = {"torque_noise": {"constant": 0.1}}
+    moved = [ends({**gain, **noise}) - ends(gain) for gain in (soft, stiff)]
+    np.testing.assert_allclose(moved[1][:, 0], moved[1][:, 1], atol=1e-5)
+    assert moved[0].std() / moved[1].std() == pytest.approx(2.0, rel=0.05)
+    assert repeats({"torque_noise": {"step": 0.3}})[..., 1:].std() > 1e-5
+
+
 # servo
 
 

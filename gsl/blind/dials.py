@@ -14,7 +14,8 @@ from gsl.core.plant import Plant
 from gsl.core.setting import Setting, settings_of
 from gsl.effects.effect import documented, effect_class, names
 
-UNSEEN = ("encoder_noise", "action_noise", "external_push")  # besides effects of contact: not for a log in the air
+# Besides effects of contact: not for a log in the air.
+UNSEEN = ("encoder_noise", "action_noise", "torque_noise", "external_push")
 RANDOM = ("uneven_ground",)  # new in every episode: no replay repeats it
 FRICTION, COMPLIANCE = "ground_friction", "ground_compliance"
 CALIBRATED = ("servo_gain", "coulomb_friction", "zero_offset", "sensor_bias")  # a calibration hides them: no abstention

@@ -143,6 +143,8 @@ class Plant:
         gravity: In world axes [m/s²], shape (3,).
         pushes: Forces from outside.
         action_noise: Standard deviation of the noise on each motor's target [rad], shape (n_motors,).
+        torque_noise: Standard deviations of the noise on each motor's torque [N·m]: drawn at every physics step, drawn
+            once an episode; shape (2, n_motors).
         law: What the servos do beyond their parameters, if that was learned.
         hook: A user's own joint torque: (motion (2, n_motors), time since the episode began [s]) -> (n_motors,) [N·m].
     """
@@ -153,6 +155,7 @@ class Plant:
     sensors: Sensors
     gravity: np.ndarray
     action_noise: np.ndarray
+    torque_noise: np.ndarray
     pushes: tuple[Push, ...] = ()
     law: ServoLaw | None = None
     hook: Hook | None = None
@@ -197,4 +200,12 @@ def nominal(robot: Robot) -> Plant:
         motor_encoder=zero + (robot.encoder_side == "motor"),
     )
     sensors = Sensors(encoder_noise=zero, bias=zero)
-    return Plant(robot, servo, Contact(), sensors, gravity=np.array([0.0, 0.0, -GRAVITY]), action_noise=zero)
+    return Plant(
+        robot,
+        servo,
+        Contact(),
+        sensors,
+        gravity=np.array([0.0, 0.0, -GRAVITY]),
+        action_noise=zero,
+        torque_noise=np.zeros((2, len(joints))),
+    )

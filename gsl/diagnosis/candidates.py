@@ -26,6 +26,7 @@ SHAPES = (0.0, 0.3, 1.0)
 WIDE = 10.0  # ends of a range of shapes that are further apart, as a factor, are stepped in logarithms
 PROBE = 0.1  # share of the range at which an effect that acts in proportion is probed
 SLACK = 0.1  # share of a documented range by which a fit of a value near its end may miss it
+NEVER_REPLAYED = ("torque_noise",)  # drawn anew in every episode: a replay has none
 BEYOND = 1.5  # how far past its documented range a strength is fitted; there it loses its claim to the name
 
 
@@ -140,7 +141,7 @@ def library(
     return tuple(
         made.beginning_at((starts or {}).get(name))
         for name in names()
-        if name not in without
+        if name not in (*without, *NEVER_REPLAYED)
         for made in _of(name, robot, (moving, pushed), (known or {}).get(name, {}), shares)
     )
 

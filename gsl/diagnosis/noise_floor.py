@@ -68,7 +68,7 @@ def noise_floor(
         usual = np.inf if least.ndim else float(np.median(sd))
         unsteady = sd > UNSTEADY * usual
         return NoiseFloor(np.where(unsteady, usual, sd), np.sqrt(slow), unsteady, "repeats", pairs, resolution, samples)
-    sd = np.maximum(_roughness(found), least)
+    sd = np.maximum(roughness(found), least)
     return NoiseFloor(sd, np.zeros(len(sd)), np.zeros(len(sd), dtype=bool), "estimated", 0, resolution, ESTIMATE)
 
 
@@ -93,11 +93,19 @@ def _repeats(found: Sequence[Record], held: Sequence[int]) -> list[list[Record]]
     return list(groups.values())
 
 
-def _roughness(found: Sequence[Record]) -> np.ndarray:
-    """Return the size of third differences where the motion is slow: that of white noise is sqrt(20) times its own."""
+def third_differences(positions: np.ndarray) -> np.ndarray:
+    """Return the squares of third differences along the last but one axis, such that white noise has its variance."""
+    return np.asarray(np.diff(positions, 3, axis=-2) ** 2 / 20.0)
+
+
+def roughness(found: Sequence[Record]) -> np.ndarray:
+    """Return what encoder noise alone looks like [rad], shape (n_joints,): nothing of it differs between repeats.
+
+    It is the size of third differences where the motion is slow: that of white noise is sqrt(20) times its own.
+    """
     rough, speed = [], []
     for one in found:
-        rough.append(np.diff(one.measured, 3, axis=0) ** 2 / 20.0)
+        rough.append(third_differences(one.measured))
         speed.append(np.abs(np.gradient(one.measured, axis=0)[2:-1]))
     all_rough, all_speed = np.vstack(rough), np.vstack(speed)
     slow = all_speed <= np.quantile(all_speed, QUIET, axis=0)

@@ -158,6 +158,7 @@ def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     below = [
         *([metrics["diagnosis"]["told"]] if metrics.get("diagnosis") else []),
         metrics["verdict"],
+        *(f"warning: {line}" for line in metrics.get("broken_promises", [])),
         f"real data: {air}{learned} episodes to learn from, {measured} to measure, {spent} in all{more}",
         f"plots: {folder.as_posix()}/ ({plots})",
     ]

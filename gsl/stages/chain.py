@@ -14,6 +14,7 @@ from gsl.grounding.gat import ActionTransformation, check_known
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import RandomisedEffects
+from gsl.grounding.torque_noise import TorqueNoise, torque_limits
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.optimizer import Learner
@@ -25,6 +26,7 @@ from gsl.stages.evaluate import Evaluate, check_tolerated
 from gsl.stages.headline import several
 from gsl.stages.link import built
 from gsl.stages.needed_model import as_needed, extra_ticks, looking_ahead
+from gsl.stages.objective import Objective, Quantile
 from gsl.stages.optimize import BEST, Optimize
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import Method, TrainInverse
@@ -100,6 +102,8 @@ class Chain:
     workers: int
     aggregate: bool
     earlier: tuple[str, ...] = ()  # real trajectories from which f learns as well
+    objective: Objective = "mean"
+    quantile: Quantile = 0.25
     shared: Mapping[str, Path] = field(default_factory=dict)  # by role, where groundings keep what they have in common
 
     def after(self, place: Path) -> Chain:
@@ -116,6 +120,8 @@ class Chain:
         if isinstance(grounding, DiagnosedEffects | RandomisedEffects):
             having_effects(self.sim)
         inner = innermost(grounding)
+        if isinstance(inner, TorqueNoise):
+            torque_limits(self.sim)
         if not isinstance(inner, ActionTransformation):
             return
         self._check_joints(inner)
@@ -255,6 +261,8 @@ class Chain:
             grounding=grounding,
             optimizer=self.optimizer,
             rollouts=self.budget.rollouts,
+            objective=self.objective,
+            quantile=self.quantile,
             initial=previous,
             accept=self.accept,
             workers=self.workers,

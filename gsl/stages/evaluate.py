@@ -17,8 +17,10 @@ from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.policy import Policy, sized
 from gsl.stages.choices import FILE, policies, records, vector
+from gsl.stages.headline import Unit
 from gsl.stages.measured import falls, gain, mean, row, summary
 from gsl.stages.population import Episode, Job, Workers, episodes
+from gsl.stages.promise import promise
 from gsl.stages.real_robot import Errand, Order, answer_parents, asked
 from gsl.stages.rollout import Scenario
 from gsl.stages.uncharged import warn_uncharged
@@ -94,10 +96,14 @@ class Evaluate:
         write_json(folder / TABLE, {"policies": rows, "check": again[0], "confirmation": again[1]})
         write_policies(folder / FILE, policies(self.policy, self.task, [found[best]]))
         stable = [done for done in tried[1:] if self._stable(done)]
+        promised = promise(found, best, summary(fresh[best]), Unit.of(self.task))
+        if promised and promised["warning"]:
+            console.status(f"warning: {promised['warning']}")
         return {
             "best": found[best].name,
             "best_generation": found[best].generation or 0,
             "returned_value_sim": found[best].value_sim,
+            "promise": promised,
             "baseline": summary(fresh[0]),
             "returned": summary(fresh[best]),
             "last": summary(tried[-1]),

@@ -11,11 +11,19 @@ FILE = "generations.jsonl"
 
 
 class Generation(NamedTuple):
-    """Values and falls of all candidates of a generation, in the order in which they were asked for."""
+    """Values and falls of all candidates of a generation, in the order in which they were asked for.
+
+    Attributes:
+        number: Of the generation, from 0.
+        values: What the search maximises.
+        falls: How often each fell.
+        means: Mean values of the episodes, where the search maximises something else.
+    """
 
     number: int
     values: list[float]
     falls: list[int]
+    means: list[float] | None = None
 
 
 class GenerationLog:
@@ -36,7 +44,7 @@ class GenerationLog:
         """Add the next generation, on disk before anything goes on."""
         assert generation.number == len(self._done), "generations come in order"
         with self._path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(generation._asdict()) + "\n")
+            file.write(json.dumps({k: v for k, v in generation._asdict().items() if v is not None}) + "\n")
             file.flush()
             os.fsync(file.fileno())
         self._done.append(generation)

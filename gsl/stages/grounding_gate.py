@@ -17,6 +17,7 @@ from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.random_choice import exploration
 from gsl.grounding.randomised import RandomisedEffects, randomised
+from gsl.grounding.torque_noise import TorqueNoise
 from gsl.report.grounding_errors import grounding_errors
 from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.effects_check import check_effects
@@ -64,6 +65,8 @@ def settled(scenario: Scenario, found: Mapping[str, Any]) -> Scenario:
     if isinstance(grounding, RandomisedEffects):
         world = randomised(scenario.world, grounding, found["width"])
         return replace(scenario, world=world, grounding=NoGrounding())
+    if isinstance(grounding, TorqueNoise):
+        return replace(scenario, world=grounding.switched_on(scenario.world), grounding=NoGrounding())
     return scenario
 
 
@@ -97,6 +100,8 @@ class Gate:
             return self._transformed(scenario, scenario.grounding)
         if isinstance(scenario.grounding, RandomisedEffects):
             return self._randomised(scenario, scenario.grounding)
+        if isinstance(scenario.grounding, TorqueNoise):
+            return self._shaken(scenario, scenario.grounding)
         self._charged(scenario)
         return scenario, {}
 
@@ -112,6 +117,16 @@ class Gate:
         write_json(self.folder / REPORT, {"width": width, "acceptable": not problems, "problems": problems})
         self._judge(problems, "Lower grounding.width")
         return worlds[width], {"width": width, "grounding_acceptable": not problems}
+
+    def _shaken(self, scenario: Scenario, settings: TorqueNoise) -> tuple[Scenario, Mapping[str, Any]]:
+        """Switch torque noise on; all that can be checked of it is whether π0 keeps its feet."""
+        ready = replace(scenario, world=settings.switched_on(scenario.world), grounding=NoGrounding())
+        fell = sum(fell for _, fell in pi0_in(ready, self.parameters, derived_seed(self.seed, "check")))
+        self.console.status(settings.description)
+        problems = [f"π0 falls in {fell} of {EPISODES} episodes with {settings.description}"] if fell else []
+        write_json(self.folder / REPORT, {"acceptable": not problems, "problems": problems})
+        self._judge(problems, "Lower grounding.step or grounding.constant")
+        return ready, {"grounding_acceptable": not problems}
 
     def _diagnosed(self, scenario: Scenario, settings: DiagnosedEffects) -> tuple[Scenario, Mapping[str, Any]]:
         """Switch effects on; an inner grounding that learns is checked in the world that they make."""

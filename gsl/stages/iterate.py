@@ -25,6 +25,7 @@ from gsl.stages.choices import FILE, policies, record
 from gsl.stages.diagnosis_plan import DiagnosisPlan, flown
 from gsl.stages.grounding_gate import settled
 from gsl.stages.iteration_report import Rounds, write_curve, write_table, write_trace
+from gsl.stages.objective import Objective, Quantile, check_objective
 from gsl.stages.population import Workers
 from gsl.stages.rollout import Scenario
 from gsl.stages.train_forward import HELDOUT
@@ -65,6 +66,8 @@ class Iterate:
     optimizer: Annotated[CmaEs | Learner, setting("what improves the parameters")]
     budget: Annotated[Budget, setting("episodes of each part")]
     diagnosis: Annotated[DiagnosisPlan, setting("how grounding=effects finds the effects")]
+    objective: Objective = "mean"
+    quantile: Quantile = 0.25
     iterations: Annotated[int, setting("most iterations", ge=1)] = 1
     pretrained: Annotated[bool, setting("improve π0 in the plain simulator before the first iteration")] = False
     beside: Annotated[bool, setting("show the result without grounding beside it")] = False
@@ -77,6 +80,7 @@ class Iterate:
         """Tell the policy its world; refuse two worlds that no policy could act in both of."""
         if isinstance(self.sim, ExternalRobot):
             raise ConfigError("sim", "is a real robot, which cannot play the simulator's part")
+        check_objective(self.objective, self.optimizer)
         object.__setattr__(self, "policy", sized(self.policy, self.sim))
         layout = self.sim.layout
         check_alike(layout, self.real.layout)
@@ -154,6 +158,8 @@ class Iterate:
             accept=self.accept,
             workers=self.workers,
             aggregate=self.aggregate,
+            objective=self.objective,
+            quantile=self.quantile,
         )
 
     @property

@@ -135,6 +135,7 @@ class Rounds:
             **self._of_the_flight(),
             "stopped_by_itself": not self.rising or bool(self._refusal),
             "verdict": self.verdict,
+            "broken_promises": self.broken_promises,
             "ungrounded": None if self._beside is None else self._beside.metrics,
         }
 
@@ -142,6 +143,12 @@ class Rounds:
     def diagnosis(self) -> list[str]:
         """What was diagnosed and what was done with it, in a line; none if nothing was."""
         return [self._flight.told] if self._flight else []
+
+    @property
+    def broken_promises(self) -> list[str]:
+        """What searches promised and the real world did not give, a line each."""
+        promises = {k: evaluation.metrics.get("promise") for k, evaluation in enumerate(self._done, 1)}
+        return [f"Iteration {k}: {kept['warning']}." for k, kept in promises.items() if kept and kept["warning"]]
 
     def _of_the_flight(self) -> Mapping[str, Any]:
         if self._flight is None:
@@ -184,8 +191,10 @@ class Rounds:
 
 
 def write_table(folder: Path, rounds: Rounds) -> None:
-    """Write the table, the diagnosis if there was one, and the verdict as markdown."""
-    told = "\n\n".join([table(rounds.columns, rounds.rows).rstrip(), *rounds.diagnosis, rounds.verdict])
+    """Write the table, the diagnosis if there was one, the verdict, and broken promises as markdown."""
+    told = "\n\n".join(
+        [table(rounds.columns, rounds.rows).rstrip(), *rounds.diagnosis, rounds.verdict, *rounds.broken_promises]
+    )
     (folder / MARKDOWN).write_text(f"{told}\n", encoding="utf-8")
 
 

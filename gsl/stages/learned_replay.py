@@ -223,6 +223,7 @@ class Simulated:
 
 
 def noiseless(plant: Plant) -> Plant:
-    """Return a plant without the noise of encoders and actions."""
+    """Return a plant without the noise of encoders, actions and torques."""
     sensors = replace(plant.sensors, encoder_noise=np.zeros_like(plant.sensors.encoder_noise))
-    return replace(plant, sensors=sensors, action_noise=np.zeros_like(plant.action_noise))
+    still = {name: np.zeros_like(getattr(plant, name)) for name in ("action_noise", "torque_noise")}
+    return replace(plant, sensors=sensors, **still)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from gsl.stages.drift import drifts, read_region
 from gsl.stages.generations import FILE as PROGRESS
 from gsl.stages.generations import Generation, GenerationLog
 from gsl.stages.grounding_gate import Gate, grounding_parents
+from gsl.stages.objective import CVAR, Objective, Quantile, check_objective, objective_values
 from gsl.stages.population import Job, Workers, episodes
 from gsl.stages.rollout import Scenario
 from gsl.stages.simulator import GroundedSimulator
@@ -32,9 +33,19 @@ from gsl.worlds.world import World
 BEST = "best_in_simulation.json"
 
 
+class Winner(NamedTuple):
+    """The best candidate of a generation, whose `value_sim` is a mean, and what the search maximises of it."""
+
+    policy: PolicyRecord
+    worth: float
+
+
 @component
 class Optimize:
     """Candidates are judged by the mean value of `rollouts` episodes each; a killed search goes on where it was.
+
+    With objective=cvar they are judged by the mean of their worst episodes (`quantile`). What is reported as a value in
+    simulation is the mean of all episodes in any case, so that searches can be compared.
 
     Of equally good generations the last one's is the best: its distribution has left the edge of what does as well.
     """
@@ -48,13 +59,16 @@ class Optimize:
     grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
     optimizer: Annotated[CmaEs | Learner, setting("what improves the parameters")]
     rollouts: Annotated[int, setting("episodes of each candidate", ge=1)]
+    objective: Objective = "mean"
+    quantile: Quantile = 0.25
     initial: Annotated[str | None, setting("policies file or artifact to start from; none for the start values")] = None
     accept: Annotated[bool, setting("go on with a grounding that fails its check")] = False
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def __post_init__(self) -> None:
-        """Tell the policy its world."""
+        """Tell the policy its world; refuse an objective that the optimiser does not know."""
+        check_objective(self.objective, self.optimizer)
         object.__setattr__(self, "policy", sized(self.policy, self.world))
 
     def parents(self) -> Mapping[str, Path]:
@@ -68,22 +82,24 @@ class Optimize:
         scenario, checked = Gate(first, folder, console, self.accept, self.seed).passed(bare)
         found = [record(self.policy, "pi0" if self.initial is None else "start", first)]
         if isinstance(self.optimizer, CmaEs):
-            found += self._searched(self.optimizer, scenario, first, GenerationLog(folder), console)
+            winners = [*self._searched(self.optimizer, scenario, first, GenerationLog(folder), console)]
         else:
-            found += self._learned(self.optimizer, scenario, first, console)
+            winners = [*self._learned(self.optimizer, scenario, first, console)]
+        found += [winner.policy for winner in winners]
         write_policies(folder / FILE, policies(self.policy, self.task, found))
-        best = max(reversed(found[1:]), key=lambda one: -np.inf if one.value_sim is None else one.value_sim)
+        best, worth = max(reversed(winners), key=lambda winner: winner.worth)
         write_policies(folder / BEST, policies(self.policy, self.task, [best]))
         return {
             "generations": len(found) - 1,
             "best_value_sim": best.value_sim,
+            **({"best_cvar_sim": worth} if self.objective == CVAR else {}),
             **checked,
             **self._drift(scenario, found, console),
         }
 
     def _searched(
         self, optimizer: CmaEs, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Any
-    ) -> Iterator[PolicyRecord]:
+    ) -> Iterator[Winner]:
         """Yield the best candidate of each generation of a search."""
         search = optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
         total = optimizer.generations * optimizer.candidates * self.rollouts
@@ -98,11 +114,10 @@ class Optimize:
                     progress.advance(len(candidates) * self.rollouts)
                 search.tell(generation.values)
                 best = int(np.argmax(generation.values))
-                yield self._record(index, candidates[best], generation.values[best])
+                means = generation.means or generation.values
+                yield Winner(self._record(index, candidates[best], means[best]), generation.values[best])
 
-    def _learned(
-        self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Any
-    ) -> Iterator[PolicyRecord]:
+    def _learned(self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Any) -> Iterator[Winner]:
         """Yield what a learner has come to after each generation."""
         seed, simulator = derived_seed(self.seed, self.kind), GroundedSimulator(scenario, first)
         total = optimizer.taken + optimizer.generations * self.rollouts
@@ -111,9 +126,9 @@ class Optimize:
             steps = optimizer.learn(simulator, self.policy, first, seed, bold=bold, advance=progress.advance)
             for index, parameters in enumerate(steps):
                 value = self._evaluated(scenario, [parameters], index, progress).values[0]
-                yield self._record(index, parameters, value)
+                yield Winner(self._record(index, parameters, value), value)
 
-    def _drift(self, scenario: Scenario, found: Sequence[PolicyRecord], console: Any) -> Mapping[str, Any]:
+    def _drift(self, scenario: Scenario, found: Iterable[PolicyRecord], console: Any) -> Mapping[str, Any]:
         """Return and tell how far the policies have moved from what a learned grounding has seen."""
         inner = innermost(self.grounding)
         if not (isinstance(inner, ActionTransformation) and isinstance(scenario.grounding, LoadedTransformation)):
@@ -133,9 +148,11 @@ class Optimize:
         ]
         done = episodes(scenario, jobs, workers=self.workers, progress=progress)
         shape = (len(candidates), self.rollouts)
-        values = np.array([episode.value for episode in done]).reshape(shape).mean(axis=1)
+        values = np.array([episode.value for episode in done]).reshape(shape)
         falls = np.array([episode.fell for episode in done]).reshape(shape).sum(axis=1)
-        return Generation(index, values.tolist(), falls.tolist())
+        means = values.mean(axis=1).tolist() if self.objective == CVAR else None
+        judged = objective_values(values, self.objective, self.quantile)
+        return Generation(index, judged.tolist(), falls.tolist(), means)
 
-    def _record(self, index: int, parameters: np.ndarray, value: float) -> Any:
+    def _record(self, index: int, parameters: np.ndarray, value: float) -> PolicyRecord:
         return record(self.policy, f"generation_{index + 1:02d}", parameters, generation=index + 1, value_sim=value)

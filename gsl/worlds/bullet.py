@@ -25,6 +25,7 @@ from gsl.worlds.engine import Engine, Physics, Reading
 from gsl.worlds.fits import check_base, check_periods, check_plant
 from gsl.worlds.ground import REACH, random_heights
 from gsl.worlds.start import Start, resting
+from gsl.worlds.torque_noise import TorqueNoise
 
 FALLEN_TILT = 0.5  # cosine of the tilt beyond which the robot has fallen
 
@@ -93,6 +94,7 @@ class BulletEnv(gymnasium.Env):
         self._neutral = np.clip(np.zeros(self._n), low, high)
         self._engine: Engine | None = None
         self._middle: np.ndarray | None = None  # of an uneven ground [m], shape (2,)
+        self._noise: TorqueNoise | None = None  # of this episode's torques
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -100,7 +102,7 @@ class BulletEnv(gymnasium.Env):
         """Start anew: at rest in a posture, or in a measured state.
 
         Args:
-            seed: Of the start noise, of an uneven ground and of every sensor noise.
+            seed: Of the start noise, of an uneven ground and of every noise.
             options: `posture`, desired joint positions at the start [rad], shape (n_joints,), by default all zero;
                 or `start`, a `Start` to take up as it is, without noise or settling.
         """
@@ -115,8 +117,9 @@ class BulletEnv(gymnasium.Env):
         self._middle = None if surface is None else start.reading.place[:2]
         self._engine.load(start.reading, start.commands, -before * self.world.period, surface)
         reading = self._engine.read()
+        self._noise = self._torque_noise()
         for _ in range(before):
-            self._engine.run(start.commands[0])
+            self._run(start.commands[0])
             reading = self._engine.read()
         return self._observe(reading), {"fell": False}
 
@@ -131,7 +134,7 @@ class BulletEnv(gymnasium.Env):
         targets, noise = self._checked(action)[self._drive], self._plant.action_noise
         if noise.any():
             targets = targets + noise * self.np_random.standard_normal(len(noise))
-        self._engine.run(targets)
+        self._run(targets)
         reading = self._engine.read()
         if self._middle is not None and np.abs(reading.place[:2] - self._middle).max() > REACH:
             raise GslError(f"the robot has come to the edge of the uneven ground ({REACH} m): shorten task.duration")
@@ -174,6 +177,17 @@ class BulletEnv(gymnasium.Env):
         if not self.world.floating or self._plant.contact.roughness == 0.0:
             return None
         return random_heights(self._plant.contact, self.np_random.spawn(1)[0])
+
+    def _torque_noise(self) -> TorqueNoise | None:
+        """Draw an episode's torque noise; it has randomness of its own, as an uneven ground has."""
+        sd = self._plant.torque_noise
+        if not sd.any():
+            return None
+        return TorqueNoise(sd, round(self.world.period / self.world.step), self.np_random.spawn(1)[0])
+
+    def _run(self, targets: np.ndarray) -> None:
+        assert self._engine is not None
+        self._engine.run(targets, None if self._noise is None else self._noise.draw())
 
     def _at_rest(self, posture: np.ndarray) -> Start:
         targets = posture[self._drive]

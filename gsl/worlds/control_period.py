@@ -50,6 +50,8 @@ class Memory(NamedTuple):
         rotor: Memory of the compensation, shape (6, 3 + n).
         motion: Joint positions [rad] and velocities [rad/s] at this physics step, shape (2, n).
         spin: Angular velocity of the base in world axes, then in base axes [rad/s], shape (2, 3).
+        load: What the motors bear besides their servos at each physics step of the control period [N·m], shape
+            (substeps, n), or (0, n) if they never do.
         torque: Of the motors [N·m], shape (n,).
         push: Torque on the base in its inertial axes [N·m], shape (3,).
         work: Scratch, shape (n, 18).
@@ -59,19 +61,21 @@ class Memory(NamedTuple):
     rotor: np.ndarray
     motion: np.ndarray
     spin: np.ndarray
+    load: np.ndarray
     torque: np.ndarray
     push: np.ndarray
     work: np.ndarray
 
 
-def first_memory(servo: ServoState) -> Memory:
-    """Return the memory at the start, given that of the servos."""
+def first_memory(servo: ServoState, loads: int = 0) -> Memory:
+    """Return the memory at the start, given that of the servos and how many physics steps have loads of their own."""
     n = servo.memory.shape[1]
     return Memory(
         servo,
         rotor=np.zeros((6, 3 + n)),
         motion=np.zeros((2, n)),
         spin=np.zeros((2, 3)),
+        load=np.zeros((loads, n)),
         torque=np.zeros(n),
         push=np.zeros(3),
         work=np.zeros((n, 18)),
@@ -79,18 +83,21 @@ def first_memory(servo: ServoState) -> Memory:
 
 
 @compiled
-def torques(drive: Drive, memory: Memory, turn: np.ndarray, elapsed: float, step: float, period: float) -> None:
+def torques(drive: Drive, memory: Memory, turn: np.ndarray, k: int, step: float, period: float) -> None:
     """Fill in the torques of one physics step, given motion and spin (world axes).
 
     Args:
         drive: Parameters.
         memory: Moved on by one step.
         turn: From base to world axes, shape (3, 3); within a control period the base hardly turns.
-        elapsed: Time since the newest command was issued [s].
+        k: Number of physics steps since the newest command was issued.
         step: Physics period [s].
         period: Control period [s].
     """
-    servo_torque(drive.servo, memory.servo, memory.motion, elapsed, step, period, memory.torque)
+    servo_torque(drive.servo, memory.servo, memory.motion, k * step, step, period, memory.torque)
+    if len(memory.load) > 0:
+        for i in range(len(memory.torque)):
+            memory.torque[i] += memory.load[k, i]
     world, base = memory.spin[0], memory.spin[1]
     for k in range(3):
         base[k] = world[0] * turn[0, k] + world[1] * turn[1, k] + world[2] * turn[2, k]
@@ -124,7 +131,7 @@ def in_c(
     """
     for k in range(substeps):
         read_joints(handle, body, places, memory.motion, memory.spin[0])
-        torques(drive, memory, turn, k * step, step, period)
+        torques(drive, memory, turn, k, step, period)
         command = c.joint_control(handle, body, c.TORQUE_CONTROL)
         for i in range(places.shape[1]):
             c.set_torque(command, places[1, i], memory.torque[i])
@@ -184,7 +191,7 @@ def in_python(
         memory.motion[0], memory.motion[1], _, _ = zip(*bullet.getJointStates(body, joints, client), strict=True)
         if floating:
             memory.spin[0] = bullet.getBaseVelocity(body, client)[1]
-        torques(drive, memory, turn, k * step, step, period)
+        torques(drive, memory, turn, k, step, period)
         more = 0.0 if outside is None else outside(memory.motion, memory.servo.clock[0] + k * step)
         forces = (memory.torque + more).tolist()
         bullet.setJointMotorControlArray(body, joints, bullet.TORQUE_CONTROL, forces=forces, physicsClientId=client)

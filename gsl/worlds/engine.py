@@ -170,11 +170,19 @@ class Engine:
         plane = f"{self._folder.name}/ground.urdf"
         self._ground = lay(b, client, plane, self.plant.contact, heights, x, y) if physics.floating else ()
 
-    def run(self, targets: np.ndarray) -> None:
-        """Hold motor `targets` [rad], shape (n_motors,), for one control period."""
+    def run(self, targets: np.ndarray, load: np.ndarray | None = None) -> None:
+        """Hold motor `targets` [rad], shape (n_motors,), for one control period.
+
+        Args:
+            targets: Of the motors.
+            load: What they bear besides their servos [N·m], shape (substeps, n_motors), where the plant's torques are
+                noisy.
+        """
         physics, memory = self.physics, self._memory
         memory.servo.commands[1:] = memory.servo.commands[:-1]
         memory.servo.commands[0] = targets
+        if load is not None:
+            memory.load[:] = load
         rest = (physics.floating, physics.substeps, physics.step, physics.period, self._drive, memory, self._base_turn)
         if self.plant.pushes or self.plant.hook:
             in_python(self.bullet, self.client, self.body, self.joints, *rest, self._outside)
@@ -252,7 +260,8 @@ class Engine:
         self.bullet.setJointMotorControlArray(
             self.body, self.joints, self.bullet.VELOCITY_CONTROL, forces=[0.0] * n, physicsClientId=self.client
         )
-        self._memory = first_memory(first_state(commands, self.read().motion, self.physics.step, clock))
+        loads = self.physics.substeps if self.plant.torque_noise.any() else 0
+        self._memory = first_memory(first_state(commands, self.read().motion, self.physics.step, clock), loads)
 
 
 def _heavier(robot: Robot, extra: Mapping[str, np.ndarray]) -> Robot:

@@ -85,10 +85,16 @@ class Held:
         tree = chain(plant, plant.servo.armature - servo.rows[ROTOR])
         return cls(servo, tree, np.array(pushes).reshape(-1, 9), plant.sensors.bias, step, period)
 
-    def replay(self, windows: Windows) -> np.ndarray:
-        """Return what the encoders tell after each control period [rad], shape (W, T, n_motors); NaN if it diverges."""
+    def replay(self, windows: Windows, load: np.ndarray | None = None) -> np.ndarray:
+        """Return what the encoders tell after each control period [rad], shape (W, T, n_motors); NaN if it diverges.
+
+        Args:
+            windows: To replay.
+            load: What the motors bear besides their servos [N·m], shape (T · substeps, n_motors), in every window.
+        """
         told = np.full((len(windows.clock), windows.length, len(self.bias)), np.nan)
-        _replay(self.servo, self.tree, self.pushes, windows, self.step, round(self.period / self.step), told)
+        load = np.zeros((0, len(self.bias))) if load is None else load
+        _replay(self.servo, self.tree, self.pushes, load, windows, self.step, round(self.period / self.step), told)
         return told + self.bias
 
     def play(self, paths: Sequence[np.ndarray], starts: Sequence[np.ndarray], settle: int) -> list[np.ndarray]:
@@ -121,22 +127,17 @@ def _aimed(push: Push, robot: Robot) -> list[tuple[float, ...]]:
 
 @compiled
 def _replay(
-    servo: ServoParameters,
-    tree: Chain,
-    pushes: np.ndarray,
-    windows: Windows,
-    step: float,
-    substeps: int,
+    servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, step: float, substeps: int,
     told: np.ndarray,
-) -> None:
+) -> None:  # fmt: skip
     for first in range(0, told.shape[0], LANES):
-        _side_by_side(servo, tree, pushes, windows, first, step, substeps, told)
+        _side_by_side(servo, tree, pushes, load, windows, first, step, substeps, told)
 
 
 @compiled
 def _side_by_side(
-    servo: ServoParameters, tree: Chain, pushes: np.ndarray, windows: Windows, first: int, step: float, substeps: int,
-    told: np.ndarray,
+    servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, first: int, step: float,
+    substeps: int, told: np.ndarray,
 ) -> None:  # fmt: skip
     """Replay as many windows as there are lanes, from the first one on."""
     periods, n = told.shape[1], told.shape[2]
@@ -157,6 +158,9 @@ def _side_by_side(
         )
         for k in range(substeps):
             servo_torque(servo, state, motion, k * step, step, substeps * step, torque)
+            if len(load) > 0:
+                for i in range(n):
+                    torque[i] += load[t * substeps + k, i]
             _push(pushes, state.clock[0] + k * step, step, pushed.force)
             accelerate(tree, motion, pushed, torque, work, matrix)
             for i in range(n):
