@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -183,9 +183,9 @@ class Rounds:
         return self._unit.bare(summary["value"]), self._unit.interval(summary["interval"]), ended(summary, self._unit)
 
 
-def write_table(folder: Path, rounds: Rounds) -> None:
-    """Write the table, the diagnosis if there was one, and the verdict as markdown."""
-    told = "\n\n".join([table(rounds.columns, rounds.rows).rstrip(), *rounds.diagnosis, rounds.verdict])
+def write_table(folder: Path, rounds: Rounds, remarks: Sequence[str] = ()) -> None:
+    """Write the table, the diagnosis if there was one, the verdict and further remarks as markdown."""
+    told = "\n\n".join([table(rounds.columns, rounds.rows).rstrip(), *rounds.diagnosis, rounds.verdict, *remarks])
     (folder / MARKDOWN).write_text(f"{told}\n", encoding="utf-8")
 
 
