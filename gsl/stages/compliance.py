@@ -74,8 +74,10 @@ class Compliance:
     def of(cls, document: Mapping[str, Any]) -> Compliance:
         """Return what a document holds; what was not finite is NaN."""
         arrays = {name: np.array(document[name], dtype=float) for name in ("stiffness", "damping", "noise", "torque")}
+        motors = tuple(document["motors"])
         groups = {name: tuple(members) for name, members in document["groups"].items()}
-        return cls(tuple(document["motors"]), groups, **arrays)
+        in_order = sorted(groups, key=lambda name: motors.index(groups[name][0]))  # a document's keys are by letter
+        return cls(motors, {name: groups[name] for name in in_order}, **arrays)
 
 
 def measure(world: Any, grounding: Grounding, seed: int) -> Compliance:
