@@ -235,7 +235,8 @@ def grouped(robot: Robot) -> Mapping[str, tuple[str, ...]]:
     groups = {name: tuple(one for one in robot.motors if one in members) for name, members in robot.groups.items()}
     inside = {one for members in groups.values() for one in members}
     rest = tuple(one for one in robot.motors if one not in inside)
-    return {**groups, **({"others" if groups else "all": rest} if rest else {})}
+    every = {**groups, ("others" if groups else "all"): rest}
+    return {name: members for name, members in every.items() if members}
 
 
 def _both(load: Swing | Ramp, own: Hook | None) -> Hook:
