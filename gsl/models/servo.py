@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, NOBODY, ServoLaw
+from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, ServoLaw
 
 FACTORS = ("kp", "kd", "limit")  # numbers that are multiplied
 SUMS = ("delay", "coulomb", "viscous", "deadband", "armature", "offset")  # and those that are added to

@@ -22,8 +22,9 @@ from gsl.report.markdown import in_unit
 from gsl.report.render import walk_strip
 from gsl.stages.chain import Budget, Chain, round_seed
 from gsl.stages.choices import FILE, policies, record
+from gsl.stages.compliance_report import SECTION, with_real
 from gsl.stages.diagnosis_plan import DiagnosisPlan, flown
-from gsl.stages.grounding_gate import settled
+from gsl.stages.grounding_gate import REPORT, settled
 from gsl.stages.iteration_report import Rounds, write_curve, write_table, write_trace
 from gsl.stages.objective import Objective, Quantile, check_objective
 from gsl.stages.population import Workers
@@ -130,11 +131,14 @@ class Iterate:
             )
         else:
             (folder / FILE).write_bytes(returned.read_bytes())
-        write_table(folder, rounds)
+        yielding = with_real(home / FIRST / "optimize" / REPORT, self.real, self.seed)
+        write_table(folder, rounds, [yielding.told] if yielding else [])
         write_curve(folder, rounds)
         if self.learned:
             self._trace(folder, home, first)
-        return rounds.metrics()
+        if yielding:
+            console.status(yielding.told)
+        return {**rounds.metrics(), SECTION: yielding.metrics() if yielding else None}
 
     @property
     def learned(self) -> bool:

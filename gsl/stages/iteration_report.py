@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -190,11 +190,12 @@ class Rounds:
         return self._unit.bare(summary["value"]), self._unit.interval(summary["interval"]), ended(summary, self._unit)
 
 
-def write_table(folder: Path, rounds: Rounds) -> None:
-    """Write the table, the diagnosis if there was one, the verdict, and broken promises as markdown."""
-    told = "\n\n".join(
-        [table(rounds.columns, rounds.rows).rstrip(), *rounds.diagnosis, rounds.verdict, *rounds.broken_promises]
-    )
+def write_table(folder: Path, rounds: Rounds, remarks: Sequence[str] = ()) -> None:
+    """Write the table, the diagnosis if there was one, the verdict, broken promises and further remarks as markdown."""
+    below = [*rounds.diagnosis, rounds.verdict, *rounds.broken_promises, *remarks]
+    told = "
+
+".join([table(rounds.columns, rounds.rows).rstrip(), *below])
     (folder / MARKDOWN).write_text(f"{told}\n", encoding="utf-8")
 
 

@@ -17,10 +17,11 @@ from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.optimizer import Learner
 from gsl.policies.policy import Policy, sized
 from gsl.stages.choices import FILE, PolicyChoice, policies, record, vector
+from gsl.stages.compliance_report import report_compliance
 from gsl.stages.drift import drifts, read_region
 from gsl.stages.generations import FILE as PROGRESS
 from gsl.stages.generations import Generation, GenerationLog
-from gsl.stages.grounding_gate import Gate, grounding_parents
+from gsl.stages.grounding_gate import REPORT, Gate, grounding_parents
 from gsl.stages.objective import CVAR, Objective, Quantile, check_objective, objective_values
 from gsl.stages.population import Job, Workers, episodes
 from gsl.stages.rollout import Scenario
@@ -80,6 +81,9 @@ class Optimize:
         first = PolicyChoice(self.policy, self.initial).parameters()
         bare = Scenario(self.world, self.task, self.policy, SIM, self.grounding)
         scenario, checked = Gate(first, folder, console, self.accept, self.seed).passed(bare)
+        yielding = report_compliance(
+            bare.world, scenario.world, scenario.grounding, folder / REPORT, console, self.seed
+        )
         found = [record(self.policy, "pi0" if self.initial is None else "start", first)]
         if isinstance(self.optimizer, CmaEs):
             winners = [*self._searched(self.optimizer, scenario, first, GenerationLog(folder), console)]
@@ -94,6 +98,7 @@ class Optimize:
             "best_value_sim": best.value_sim,
             **({"best_cvar_sim": worth} if self.objective == CVAR else {}),
             **checked,
+            **yielding,
             **self._drift(scenario, found, console),
         }
 

@@ -127,8 +127,8 @@ def _aimed(push: Push, robot: Robot) -> list[tuple[float, ...]]:
 
 @compiled
 def _replay(
-    servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, step: float, substeps: int,
-    told: np.ndarray,
+    servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, step: float,
+    substeps: int, told: np.ndarray,
 ) -> None:  # fmt: skip
     for first in range(0, told.shape[0], LANES):
         _side_by_side(servo, tree, pushes, load, windows, first, step, substeps, told)
@@ -136,8 +136,8 @@ def _replay(
 
 @compiled
 def _side_by_side(
-    servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, first: int, step: float,
-    substeps: int, told: np.ndarray,
+    servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, first: int,
+    step: float, substeps: int, told: np.ndarray,
 ) -> None:  # fmt: skip
     """Replay as many windows as there are lanes, from the first one on."""
     periods, n = told.shape[1], told.shape[2]
