@@ -9,13 +9,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gsl.core.lanes import LANES
 from gsl.core.plant import Plant
 from gsl.diagnosis.nuisance import calibrated
 from gsl.diagnosis.records import Pieces
 from gsl.diagnosis.residual import Comparison
 from gsl.effects.effect import applied, built
-from gsl.worlds.held import Held, Windows
+from gsl.worlds.held import Held, Windows, shares
 
 Effects = Mapping[str, Any]
 
@@ -54,18 +53,12 @@ class InTheAir:
 
     def _replayed(self, plant: Plant, windows: Any) -> np.ndarray:
         held = Held.of(plant, self.step, self.period)
-        shares = _shares(len(windows.clock), self.threads)
-        parts = [Windows(*(part[share] for part in windows)) for share in shares]
+        slices = shares(len(windows.clock), self.threads)
+        parts = [Windows(*(part[share] for part in windows)) for share in slices]
         result = np.empty((len(windows.clock), windows.length, len(plant.robot.motors)))
-        for share, told in zip(shares, self._pool.map(held.replay, parts), strict=True):
+        for share, told in zip(slices, self._pool.map(held.replay, parts), strict=True):
             result[share] = told
         return result
-
-
-def _shares(windows: int, threads: int) -> list[slice]:
-    """Return windows in a share for each thread, whole lanes in all but the last."""
-    size = -(-windows // (LANES * threads)) * LANES
-    return [slice(start, start + size) for start in range(0, windows, size)]
 
 
 class Simulator(Protocol):

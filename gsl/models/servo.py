@@ -66,7 +66,8 @@ def units(plant: Plant) -> dict[str, np.ndarray]:
     each, servo = np.ones(len(plant.servo.kp)), plant.servo
     return {
         "kp": 0.2 * each, "kd": 0.3 * each, "limit": 0.1 * each, "delay": 0.01 * each, "coulomb": 0.05 * servo.limit,
-        "viscous": 0.1 * servo.kd, "deadband": 0.003 * each, "armature": 0.3 * (servo.armature + 1e-3 * servo.kd), "offset": 0.005 * each,
+        "viscous": 0.1 * servo.kd, "deadband": 0.003 * each, "armature": 0.3 * (servo.armature + 1e-3 * servo.kd),
+        "offset": 0.005 * each,
     }  # fmt: skip
 
 
@@ -95,3 +96,11 @@ def neutral(plant: Plant, rng: np.random.Generator) -> ServoModel:
     return ServoModel(
         robot.name, motors, names, {name: np.zeros(n) for name in NUMBERS}, group, np.zeros((n, LAGS)), arrays
     )
+
+
+def without_group(model: ServoModel, name: str) -> ServoModel:
+    """Return the model with the joints of a group as they were."""
+    own = model.group == model.groups.index(name)
+    numbers = {key: np.where(own, 0.0, values) for key, values in model.numbers.items()}
+    lag, group = np.where(own[:, None], 0.0, model.lag), np.where(own, NOBODY, model.group)
+    return replace(model, numbers=numbers, lag=lag, group=group)

@@ -193,9 +193,7 @@ class Rounds:
 def write_table(folder: Path, rounds: Rounds, remarks: Sequence[str] = ()) -> None:
     """Write the table, the diagnosis if there was one, the verdict, broken promises and further remarks as markdown."""
     below = [*rounds.diagnosis, rounds.verdict, *rounds.broken_promises, *remarks]
-    told = "
-
-".join([table(rounds.columns, rounds.rows).rstrip(), *below])
+    told = "\n\n".join([table(rounds.columns, rounds.rows).rstrip(), *below])
     (folder / MARKDOWN).write_text(f"{told}\n", encoding="utf-8")
 
 

@@ -113,6 +113,12 @@ class Held:
         return [one[settle - 1 : settle + len(path)] for one, path in zip(told, paths, strict=True)]
 
 
+def shares(windows: int, threads: int) -> list[slice]:
+    """Return windows in a share for each thread, whole lanes in all but the last."""
+    size = -(-windows // (LANES * threads)) * LANES
+    return [slice(start, start + size) for start in range(0, windows, size)]
+
+
 def _around(path: np.ndarray, before: int, after: int) -> np.ndarray:
     """Return a path with its first row repeated before it and its last one after it."""
     return np.concatenate([np.repeat(path[:1], before, axis=0), path, np.repeat(path[-1:], after, axis=0)])
