@@ -99,6 +99,7 @@ def _run(
 stage("collect", "Record trajectories of a policy in a world.")
 stage("train-forward", "Learn from real trajectories how the robot moves: the forward model.")
 stage("train-inverse", "Learn from simulated trajectories which action makes a motion: the inverse model.")
+stage("train-servo", "Learn from motions in the air what the robot's servos do: a law for the simulator's torques.")
 stage("optimize", "Improve a policy in the simulator, grounded or not.")
 stage("diagnose", "Say where the simulator is wrong, which effect is missing, and how far the gap shrinks.")
 stage("identify", "Fit every parameter of the effect library at once: system identification, no verdict.")

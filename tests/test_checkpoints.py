@@ -8,7 +8,8 @@ import pytest
 from safetensors.numpy import save_file
 
 from gsl.errors import ArtifactError
-from gsl.storage.checkpoints import read_checkpoint, write_checkpoint
+from gsl.core.checkpoint import read_checkpoint
+from gsl.storage.checkpoints import write_checkpoint
 
 ARRAYS = {
     "weights.0": np.random.default_rng(0).normal(size=(4, 3)),

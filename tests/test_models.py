@@ -15,7 +15,8 @@ from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Regression, Solver
 from gsl.models.linear import fit_linear
 from gsl.models.network import Network
-from gsl.storage.checkpoints import read_checkpoint, write_checkpoint
+from gsl.core.checkpoint import read_checkpoint
+from gsl.storage.checkpoints import write_checkpoint
 from gsl.storage.models import FILES, read_forward_model, read_inverse_model, write_model
 
 RNG = np.random.default_rng(0)

@@ -31,7 +31,7 @@ from gsl.errors import ConfigError, InputError
 
 REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
 WHOLE = ("iterate", "compare", "reproduce")  # commands that make what a grounding refers to
-MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis)")
+MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis|servo)")
 
 
 @dataclass(frozen=True)

@@ -134,6 +134,13 @@ def innermost(grounding: Grounding) -> Grounding:
     return grounding
 
 
+def with_innermost(grounding: Grounding, inner: Grounding) -> Grounding:
+    """Return a grounding with another one in the place of what transforms the actions."""
+    if isinstance(grounding, DiagnosedEffects):
+        return replace(grounding, inner=with_innermost(grounding.inner, inner))
+    return inner
+
+
 def learned(grounding: Grounding) -> bool:
     """Whether a grounding has models that learn from real trajectories."""
     return isinstance(innermost(grounding), ActionTransformation)

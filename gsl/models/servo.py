@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, ServoLaw
+from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, NOBODY, ServoLaw
+from gsl.errors import ConfigError
 
 FACTORS = ("kp", "kd", "limit")  # numbers that are multiplied
 SUMS = ("delay", "coulomb", "viscous", "deadband", "armature", "offset")  # and those that are added to
@@ -28,7 +29,8 @@ class ServoModel:
         numbers: Logarithms of FACTORS [-] and SUMS [s, N·m, N·m·s/rad, rad, kg·m², rad], by name, shape (n,) each.
         lag: See `ServoLaw`, shape (n, LAGS).
         group: Of each motor, shape (n,).
-        network: The other fields of `ServoLaw` by name; None where no network was kept.
+        network: The other fields of `ServoLaw` by name.
+        noise: Torque noise that explains what held-out motions leave: at every step and constant [N·m], shape (G, 2).
     """
 
     kind: ClassVar[str] = "servo_model"
@@ -40,6 +42,7 @@ class ServoModel:
     group: np.ndarray
     lag: np.ndarray
     network: Mapping[str, np.ndarray]
+    noise: np.ndarray
 
     def on(self, plant: Plant) -> Plant:
         """Return a plant of the same robot whose servos are the learned ones."""
@@ -51,6 +54,36 @@ class ServoModel:
         fields |= {"offset": servo.offset + change["offset"]}
         law = ServoLaw(self.group, servo.kp / servo.limit, servo.limit, self.lag, **self.network)
         return replace(plant.with_servo(**fields), law=law)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return what a checkpoint holds, by name."""
+        numbers = {f"numbers.{name}": values for name, values in self.numbers.items()}
+        network = {f"network.{name}": values for name, values in self.network.items()}
+        return {**numbers, **network, "group": self.group, "lag": self.lag, "noise": self.noise}
+
+    def description(self) -> dict[str, Any]:
+        """Return what a checkpoint says about it."""
+        return {"kind": self.kind, "robot": self.robot, "joints": list(self.joints), "groups": list(self.groups)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray], about: Mapping[str, Any]) -> ServoModel:
+        """Return the model of a checkpoint.
+
+        Raises:
+            KeyError: An array or a part of the description is missing.
+            ValueError: An array has another shape.
+        """
+        joints, groups = tuple(about["joints"]), tuple(about["groups"])
+        numbers = {name: arrays[f"numbers.{name}"] for name in NUMBERS}
+        network = {name: arrays[f"network.{name}"] for name in NETWORK}
+        wanted = {**{f"numbers.{name}": (len(joints),) for name in NUMBERS}, "lag": (len(joints), LAGS)}
+        wanted |= {"group": (len(joints),), "noise": (len(groups), 2)} | {
+            f"network.{k}": v for k, v in shapes(len(groups)).items()
+        }
+        for name, shape in wanted.items():
+            if arrays[name].shape != shape:
+                raise ValueError(f"{name} has the shape {arrays[name].shape}, not {shape}")
+        return cls(about["robot"], joints, groups, numbers, arrays["group"], arrays["lag"], network, arrays["noise"])
 
     def moved(self, plant: Plant, change: np.ndarray) -> ServoModel:
         """Return the model with numbers changed, in `units`, shape (NUMBERS, n_joints); coupled motors follow."""
@@ -94,7 +127,14 @@ def neutral(plant: Plant, rng: np.random.Generator) -> ServoModel:
         for name, shape in shapes(len(names)).items()
     }
     return ServoModel(
-        robot.name, motors, names, {name: np.zeros(n) for name in NUMBERS}, group, np.zeros((n, LAGS)), arrays
+        robot.name,
+        motors,
+        names,
+        {name: np.zeros(n) for name in NUMBERS},
+        group,
+        np.zeros((n, LAGS)),
+        arrays,
+        np.zeros((len(names), 2)),
     )
 
 
@@ -104,3 +144,21 @@ def without_group(model: ServoModel, name: str) -> ServoModel:
     numbers = {key: np.where(own, 0.0, values) for key, values in model.numbers.items()}
     lag, group = np.where(own[:, None], 0.0, model.lag), np.where(own, NOBODY, model.group)
     return replace(model, numbers=numbers, lag=lag, group=group)
+
+
+def having_servo(plant: Plant, model: ServoModel, name: str) -> Plant:
+    """Return a plant with a learned servo.
+
+    Args:
+        plant: The robot with its effects.
+        model: The servo.
+        name: What the user calls it.
+
+    Raises:
+        ConfigError: It is of another robot, or would be the second one.
+    """
+    robot = plant.robot
+    if (model.robot, model.joints) != (robot.name, robot.motors):
+        theirs = f"the {model.robot}" if model.robot != robot.name else "other joints"
+        raise ConfigError("servo", f"was learned for {theirs}, the world has the {robot.name}", given=name)
+    return model.on(plant)

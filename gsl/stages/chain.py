@@ -9,11 +9,12 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects, having_effects, innermost, switched_on
+from gsl.grounding.effects import DiagnosedEffects, having_effects, innermost, switched_on, with_innermost
 from gsl.grounding.gat import ActionTransformation, check_known
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import RandomisedEffects
+from gsl.grounding.servo import LearnedServo
 from gsl.grounding.torque_noise import TorqueNoise, torque_limits
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
@@ -122,6 +123,8 @@ class Chain:
         inner = innermost(grounding)
         if isinstance(inner, TorqueNoise):
             torque_limits(self.sim)
+        if isinstance(inner, LearnedServo):
+            inner.check(self.sim)
         if not isinstance(inner, ActionTransformation):
             return
         self._check_joints(inner)
@@ -181,13 +184,17 @@ class Chain:
         return str(self.search(place, NoGrounding(), None, seed, console).folder / BEST)
 
     def diagnosed(self, home: Path, grounding: Grounding, seed: int, console: Any) -> Grounding:
-        """Return a grounding that has its diagnosis, made below `home` if it wants one of its own."""
-        if not isinstance(grounding, DiagnosedEffects) or grounding.effects:
-            return grounding
-        made = self.diagnosis.carried_out(
-            self.real, self.sim, grounding.method, home, workers=self.workers, seed=seed, console=console
-        )
-        return replace(grounding, diagnosis=str(made.folder))
+        """Return a grounding that has its diagnosis and its learned servo, made below `home` if it wants its own."""
+        common: dict[str, Any] = {"workers": self.workers, "seed": seed, "console": console}
+        if isinstance(grounding, DiagnosedEffects) and not grounding.effects:
+            made = self.diagnosis.carried_out(self.real, self.sim, grounding.method, home, **common)
+            grounding = replace(grounding, diagnosis=str(made.folder))
+        inner = innermost(grounding)
+        if isinstance(inner, LearnedServo):
+            effects = grounding.load(read_diagnosis) if isinstance(grounding, DiagnosedEffects) else None
+            made = self.diagnosis.servo(self.real, self.sim, effects, home, **common)
+            grounding = with_innermost(grounding, replace(inner, servo=str(made.folder)))
+        return grounding
 
     def ready(self, home: Path, grounding: Grounding, previous: str | None, seed: int, console: Any) -> Grounding:
         """Return a grounding that has its models, trained below `home`; those inside of effects know their world."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects, Diagnosis
+from gsl.grounding.effects import DiagnosedEffects, Diagnosis, innermost, switched_on
 from gsl.grounding.grounding import Grounding
+from gsl.grounding.servo import LearnedServo
 from gsl.policies.excitation import Excitation
 from gsl.stages.collect import Collect
 from gsl.stages.diagnose import Diagnose
@@ -17,6 +19,7 @@ from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.diagnosis_settings import Without
 from gsl.stages.identify import Identify
 from gsl.stages.link import built
+from gsl.stages.train_servo import TrainServo
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.tasks.excite import Excite
@@ -26,6 +29,7 @@ from gsl.worlds.external import ExternalRobot, asking
 from gsl.worlds.world import World
 
 EXCITATION = "collect_excitation"
+ROBOTS_ONLY = "only robots in Bullet worlds are excited in the air; take another grounding"
 
 
 @component
@@ -47,18 +51,9 @@ class DiagnosisPlan:
         Raises:
             ConfigError: One of the two worlds is not of a kind that is diagnosed.
         """
-        if not isinstance(real, BulletWorld | ExternalRobot) or not isinstance(sim, BulletWorld):
-            raise ConfigError("grounding", "only robots in Bullet worlds are diagnosed; take another grounding")
-        played = Collect(
-            world=asking(replace(real, floating=False), home / EXCITATION),
-            task=Excite(duration=self.excitation.duration),
-            policy=self.excitation,
-            role=REAL,
-            episodes=1,
-            workers=workers,
-            seed=seed,
-        )
-        log = built(played, home / EXCITATION, console)
+        if not isinstance(sim, BulletWorld):
+            raise ConfigError("grounding", ROBOTS_ONLY)
+        log = self.flown(real, home, workers=workers, seed=seed, console=console)
         stage: Diagnose | Identify = Identify(
             str(log.folder), sim, without=self.without, evaluations=self.evaluations, workers=workers, seed=seed
         )
@@ -76,24 +71,82 @@ class DiagnosisPlan:
             )
         return built(stage, home / method, console)
 
+    def servo(
+        self, real: World, sim: World, effects: Diagnosis | None, home: Path, *, workers: int, seed: int, console: Any
+    ) -> Artifact:
+        """Return the servo learned from an excitation of the real robot, on top of effects if there are any.
+
+        Raises:
+            ConfigError: One of the two worlds has no servos.
+        """
+        if not isinstance(sim, BulletWorld):
+            raise ConfigError("grounding", ROBOTS_ONLY)
+        log = self.flown(real, home, workers=workers, seed=seed, console=console)
+        below = sim if effects is None else switched_on(sim, effects)
+        assert isinstance(below, BulletWorld), "effects leave a world what it is"
+        stage = TrainServo(real=str(log.folder), sim=below, workers=workers, seed=seed)
+        return built(stage, home / (stage.kind if effects is None else f"{stage.kind}_on_effects"), console)
+
+    def flown(self, real: World, home: Path, *, workers: int, seed: int, console: Any) -> Artifact:
+        """Return the log of an excitation of the real robot in the air, built below `home`.
+
+        Raises:
+            ConfigError: The real world is not a robot.
+        """
+        if not isinstance(real, BulletWorld | ExternalRobot):
+            raise ConfigError("grounding", ROBOTS_ONLY)
+        played = Collect(
+            world=asking(replace(real, floating=False), home / EXCITATION),
+            task=Excite(duration=self.excitation.duration),
+            policy=self.excitation,
+            role=REAL,
+            episodes=1,
+            workers=workers,
+            seed=seed,
+        )
+        return built(played, home / EXCITATION, console)
+
 
 class Flight(NamedTuple):
-    """What a diagnosis cost, and what came of it."""
+    """What an excitation in the air cost, and what came of it: a diagnosis, a learned servo, or both.
+
+    Attributes:
+        episodes: Motions.
+        seconds: Their duration.
+        diagnosis: What was found, None where nothing was diagnosed.
+        servo: Metrics of the learned servo, None where none was learned.
+    """
 
     episodes: int
     seconds: float
-    diagnosis: Diagnosis
+    diagnosis: Diagnosis | None = None
+    servo: Mapping[str, Any] | None = None
 
     @property
     def told(self) -> str:
-        """Verdict, what it says, and what is done with it."""
-        found = self.diagnosis
-        return f"Diagnosis: {found.verdict.replace('_', ' ')}. {found.summary} {found.told}"
+        """What was found, and what is done with it."""
+        lines = []
+        if self.diagnosis is not None:
+            verdict = self.diagnosis.verdict.replace("_", " ")
+            lines.append(f"Diagnosis: {verdict}. {self.diagnosis.summary} {self.diagnosis.told}")
+        if self.servo is not None:
+            before, after = self.servo["floors_before"], self.servo["floors_after"]
+            gap = f"on held-out motions the gap fell from {before:.1f} to {after:.2f} noise floors"
+            lines.append(f"Learned servo: {gap}. It acts on every joint's torque in the simulator.")
+        return " ".join(lines)
 
 
 def flown(home: Path, asked: Grounding, ready: Grounding) -> Flight | None:
     """Return what lies below `home` of a plan that was carried out, None if a grounding needed none to be ready."""
-    if ready is asked or not isinstance(ready, DiagnosedEffects):
+    if ready is asked:
+        return None
+    inner = innermost(ready)
+    if not isinstance(ready, DiagnosedEffects) and not isinstance(inner, LearnedServo):
         return None
     spent = Artifact(home / EXCITATION, manifest.read(home / EXCITATION)).metrics
-    return Flight(spent["real_episodes"], spent["seconds"], read_diagnosis(str(home / ready.method), ready.method))
+    diagnosis = servo = None
+    if isinstance(ready, DiagnosedEffects) and not ready.effects:
+        diagnosis = read_diagnosis(str(home / ready.method), ready.method)
+    if isinstance(inner, LearnedServo):
+        servo = Artifact(Path(inner.servo), manifest.read(Path(inner.servo))).metrics
+    return Flight(spent["real_episodes"], spent["seconds"], diagnosis, servo)

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from gsl.core.checkpoint import read_checkpoint
 from gsl.core.region import Region
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import transitions, usable
 from gsl.grounding.gat import LoadedTransformation
 from gsl.stages.rollout import Scenario, rollout
-from gsl.storage.checkpoints import read_checkpoint, write_checkpoint
+from gsl.storage.checkpoints import write_checkpoint
 
 FILE, KIND = "region.safetensors", "region"
 

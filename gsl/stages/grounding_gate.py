@@ -17,7 +17,9 @@ from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.random_choice import exploration
 from gsl.grounding.randomised import RandomisedEffects, randomised
+from gsl.grounding.servo import LearnedServo
 from gsl.grounding.torque_noise import TorqueNoise
+from gsl.models.servo_file import MAKER
 from gsl.report.grounding_errors import grounding_errors
 from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.effects_check import check_effects
@@ -28,6 +30,7 @@ from gsl.stages.grounding_report import TITLES
 from gsl.stages.grounding_states import TITLES as VALUE_TITLES
 from gsl.stages.grounding_states import value_report
 from gsl.stages.rollout import Scenario
+from gsl.stages.servo_check import check_servo
 from gsl.stages.train_forward import HELDOUT, VALIDATION
 from gsl.stages.training import of_policy
 from gsl.stages.uncharged import warn_uncharged
@@ -45,6 +48,8 @@ def grounding_parents(grounding: Any, path: str = "grounding") -> Mapping[str, P
     if isinstance(grounding, DiagnosedEffects):
         own = {} if grounding.effects else {f"{path}.diagnosis": resolve(grounding.diagnosis, kind=grounding.method)}
         return {**own, **grounding_parents(grounding.inner, f"{path}.inner")}
+    if isinstance(grounding, LearnedServo):
+        return {f"{path}.servo": resolve(grounding.servo, kind=MAKER)}
     if not isinstance(grounding, ActionTransformation):
         return {}
     return {
@@ -65,6 +70,8 @@ def settled(scenario: Scenario, found: Mapping[str, Any]) -> Scenario:
     if isinstance(grounding, RandomisedEffects):
         world = randomised(scenario.world, grounding, found["width"])
         return replace(scenario, world=world, grounding=NoGrounding())
+    if isinstance(grounding, LearnedServo):
+        return replace(scenario, world=grounding.switched_on(scenario.world), grounding=grounding.actions)
     if isinstance(grounding, TorqueNoise):
         return replace(scenario, world=grounding.switched_on(scenario.world), grounding=NoGrounding())
     return scenario
@@ -100,6 +107,8 @@ class Gate:
             return self._transformed(scenario, scenario.grounding)
         if isinstance(scenario.grounding, RandomisedEffects):
             return self._randomised(scenario, scenario.grounding)
+        if isinstance(scenario.grounding, LearnedServo):
+            return self._having_servo(scenario, scenario.grounding)
         if isinstance(scenario.grounding, TorqueNoise):
             return self._shaken(scenario, scenario.grounding)
         self._charged(scenario)
@@ -128,6 +137,17 @@ class Gate:
         self._judge(problems, "Lower grounding.step or grounding.constant")
         return ready, {"grounding_acceptable": not problems}
 
+    def _having_servo(self, scenario: Scenario, settings: LearnedServo) -> tuple[Scenario, Mapping[str, Any]]:
+        """Switch a learned servo on, if it is near enough to the log that it was learned from."""
+        ready = replace(scenario, world=settings.switched_on(scenario.world), grounding=settings.actions)
+        report = check_servo(settings.servo, ready, self.parameters, derived_seed(self.seed, "check"))
+        write_json(self.folder / REPORT, report)
+        for line in report["remarks"]:
+            self.console.status(f"warning: {line}")
+        self._judge(report["problems"], "Log more motions, or learn on top of a diagnosis (grounding=effects_servo)")
+        floors = {"floors_before": report["floors_before"], "floors_after": report["floors_after"]}
+        return ready, {"servo": floors, "grounding_acceptable": report["acceptable"]}
+
     def _diagnosed(self, scenario: Scenario, settings: DiagnosedEffects) -> tuple[Scenario, Mapping[str, Any]]:
         """Switch effects on; an inner grounding that learns is checked in the world that they make."""
         found = settings.load(read_diagnosis)
@@ -135,7 +155,7 @@ class Gate:
         inside = replace(scenario, world=switched_on(scenario.world, found), grounding=settings.inner)
         about = {"effects": list(found.causes), "diagnosis": found.verdict}
         ready, checked = self.passed(inside)
-        if not isinstance(settings.inner, ActionTransformation):
+        if not isinstance(settings.inner, ActionTransformation | LearnedServo):
             report = check_effects(found, ready, self.parameters, derived_seed(self.seed, "check"))
             write_json(self.folder / REPORT, report)
             passed = report["acceptable"] and checked.get("grounding_acceptable", True)

@@ -141,6 +141,10 @@ def _of_states(metrics: Metrics) -> str:
     return f"{metrics['family']}, held out: {told}"
 
 
+def _train_servo(metrics: Metrics, unit: Unit) -> str:
+    return f"held out, {metrics['floors_before']:.1f} noise floors became {metrics['floors_after']:.2f}"
+
+
 def _train_inverse(metrics: Metrics, unit: Unit) -> str:
     if metrics.get("space"):
         return _of_states(metrics)
@@ -197,6 +201,7 @@ _TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
     "identify": _identify,
     "train_forward": _train_forward,
     "train_inverse": _train_inverse,
+    "train_servo": _train_servo,
     "optimize": _optimize,
     "evaluate": _evaluate,
     "iterate": _iterate,

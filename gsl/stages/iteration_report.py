@@ -152,11 +152,16 @@ class Rounds:
 
     def _of_the_flight(self) -> Mapping[str, Any]:
         if self._flight is None:
-            return {"excitation": None, "diagnosis": None}
-        found = self._flight.diagnosis
+            return {"excitation": None, "diagnosis": None, "servo": None}
+        found, servo = self._flight.diagnosis, self._flight.servo
+        told = None
+        if found is not None:
+            told = {"verdict": found.verdict, "causes": list(found.causes), "told": self._flight.told}
+        floors = {key: servo[key] for key in ("floors_before", "floors_after")} if servo else None
         return {
             "excitation": {"episodes": self._flight.episodes, "real_seconds": self._flight.seconds},
-            "diagnosis": {"verdict": found.verdict, "causes": list(found.causes), "told": self._flight.told},
+            "diagnosis": told,
+            "servo": floors,
         }
 
     def searches(self) -> list[Search]:

@@ -4,26 +4,31 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gsl.core.checkpoint import read_checkpoint
 from gsl.errors import ArtifactError
 from gsl.models.counts import Counts
 from gsl.models.ensemble import Forward, forward_from
 from gsl.models.forward import ForwardModel
 from gsl.models.inverse import KIND as INVERSE
 from gsl.models.inverse import InverseModel, inverse_from
+from gsl.models.servo import ServoModel
+from gsl.models.servo_file import FILE as SERVO_FILE
+from gsl.models.servo_file import MAKER
 from gsl.models.states import NearestChoice, StateForward, StateInverse, state_inverse_from
-from gsl.storage.checkpoints import read_checkpoint, write_checkpoint
+from gsl.storage.checkpoints import write_checkpoint
 from gsl.storage.references import resolve
 
 FORWARD = ForwardModel.kind
-FILES = {FORWARD: "forward_model.safetensors", INVERSE: "inverse_model.safetensors"}
-MAKERS = {FORWARD: "train_forward", INVERSE: "train_inverse"}
+SERVO = ServoModel.kind
+FILES = {FORWARD: "forward_model.safetensors", INVERSE: "inverse_model.safetensors", SERVO: SERVO_FILE}
+MAKERS = {FORWARD: "train_forward", INVERSE: "train_inverse", SERVO: MAKER}
 
 
 AnyForward = Forward | StateForward | Counts
 AnyInverse = InverseModel | StateInverse | NearestChoice | Counts
 
 
-def write_model(folder: Path, model: AnyForward | AnyInverse) -> Path:
+def write_model(folder: Path, model: AnyForward | AnyInverse | ServoModel) -> Path:
     """Write a model into a folder under the name of its kind and return the file."""
     about = model.description()
     path = folder / FILES[about["kind"]]

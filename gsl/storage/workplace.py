@@ -83,6 +83,14 @@ def workplace(out: Path, key: str, *, progress: str) -> Iterator[Path]:
             shutil.rmtree(folder, ignore_errors=True)
 
 
+def destination(folder: Path) -> Path:
+    """Return where the artifact that is being built in a workplace will lie; any other folder is its own."""
+    name = folder.name
+    if not name.startswith("."):
+        return folder
+    return folder.with_name(name[1:].removesuffix(".partial").partition(".tmp-")[0])
+
+
 def _begun(progress: Path) -> bool:
     return progress.is_file() and progress.stat().st_size > 0
 

@@ -1,4 +1,4 @@
-"""Learning a servo from a log in the air: numbers first, then lags and network, judged and tested on held-out motions."""
+"""Learning a servo from a log in the air: numbers, then lags and network, judged and tested on held-out motions."""
 
 from __future__ import annotations
 
@@ -69,10 +69,8 @@ def split(exp: Experiment, *, labelled: bool) -> Split:
     part = exp.train if labelled else exp.held_out
     names = np.unique(exp.pieces.record[part])
     every = 4 if labelled else 2
-    if len(names) >= every:
-        judge = part[np.isin(exp.pieces.record[part], names[::every])]
-    else:
-        judge = part[::every]
+    chosen = np.isin(exp.pieces.record[part], names[::every])
+    judge = part[chosen] if len(names) >= every else part[::every]
     rest = np.setdiff1d(part, judge)
     return Split(rest, judge, exp.held_out) if labelled else Split(exp.train, judge, rest)
 
@@ -117,8 +115,8 @@ def learn_servo(exp: Experiment, plant: Plant, step: float, *, labelled: bool, s
             model = without_group(model, name)
         after = residuals(model, parts.test)
     sizes = len(fitted), len(parts.judge), len(parts.test)
-    levels = (_by_group(z, exp.comparison, model) for z in (before, after))
-    return LearnedServo(model, *levels, worse, tuple(way), sizes)
+    gaps = [_by_group(z, exp.comparison, model) for z in (before, after)]
+    return LearnedServo(model, gaps[0], gaps[1], worse, tuple(way), sizes)
 
 
 def _fitted_windows(exp: Experiment, parts: Split) -> Pieces:

@@ -1,4 +1,4 @@
-"""The second step of learning a servo: numbers joint by joint, lags and network, by L-BFGS with the adjoint's gradient."""
+"""The second step of learning a servo: numbers of joints, lags and network, by L-BFGS with the adjoint's gradient."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def fit_numbers(plant: Plant, model: ServoModel, residual: Callable[[Plant], np.
 
 
 def _columns(group: np.ndarray) -> np.ndarray:
-    """Return what each free number moves, shape (n_free, NUMBERS, n_joints): a group's joints, or one joint's offset."""
+    """Return what each free number moves, (n_free, NUMBERS, n_joints): joints of a group, or one's offset."""
     rows = []
     for kind, name in enumerate(NUMBERS):
         masks = np.eye(len(group)) if name == "offset" else [group == g for g in np.unique(group)]

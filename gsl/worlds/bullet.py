@@ -20,6 +20,8 @@ from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
 from gsl.effects.effect import applied, built
 from gsl.errors import GslError
+from gsl.models.servo import having_servo
+from gsl.models.servo_file import read_servo, servo_file
 from gsl.robots.catalogue import read_files, robot
 from gsl.worlds.engine import Engine, Physics, Reading
 from gsl.worlds.fits import check_base, check_periods, check_plant
@@ -42,6 +44,7 @@ class BulletWorld:
     period: Annotated[float, setting("control period", unit="s", gt=0, le=0.1)] = 0.02
     start_noise: Annotated[float, setting("standard deviation of the joints at the start", unit="rad", ge=0)] = 0.03
     settle: Annotated[float, setting("time the start posture is held before the episode", unit="s", ge=0)] = 0.5
+    servo: Annotated[str | None, setting("learned servo that acts on top: a path or run of train-servo")] = None
 
     def __post_init__(self) -> None:
         """Refuse periods that do not fit, and effects that do not exist or do not fit them."""
@@ -52,12 +55,13 @@ class BulletWorld:
     @property
     def read_files(self) -> Mapping[str, Path]:
         """What it is read from, by the setting that names it."""
-        return read_files(self.robot)
+        return read_files(self.robot) | ({} if self.servo is None else {"servo": servo_file(self.servo)})
 
     @cached_property
     def plant(self) -> Plant:
-        """The robot with its effects."""
-        return applied(nominal(robot(self.robot)), built(self.effects))
+        """The robot with its effects and its learned servo."""
+        plant = applied(nominal(robot(self.robot)), built(self.effects))
+        return plant if self.servo is None else having_servo(plant, read_servo(self.servo), self.servo)
 
     @property
     def layout(self) -> Layout:

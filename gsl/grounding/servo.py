@@ -1,0 +1,82 @@
+"""A learned servo: the simulator whose joints are as strong, as late and as soft as those of the robot.
+
+The world changes, the actions do not, but for noise that is asked for: the law acts on the torque of every joint at
+every physics step (gsl/core/servo_law.py), where a grounded action acts once a tick on where the joint shall go.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from gsl.core.layout import Layout
+from gsl.core.servo_law import NOBODY
+from gsl.core.setting import component, setting
+from gsl.errors import ConfigError
+from gsl.grounding.ane import ActionNoise
+from gsl.grounding.grounding import Grounding, GroundingRun
+from gsl.grounding.none import NoGrounding
+from gsl.grounding.torque_noise import with_torque_noise
+from gsl.models.servo_file import read_servo
+from gsl.worlds.bullet import BulletWorld
+
+
+@component
+class LearnedServo:
+    """Which servo to take, and what noise to add; a chain learns one of its own."""
+
+    servo: Annotated[str, setting("path or run of train-servo")] = ""
+    torque_noise: Annotated[
+        float, setting("torque noise on top, in units of what held-out motions leave unexplained", ge=0)
+    ] = 0.0
+    noise: Annotated[float, setting("action noise on top", unit="rad", ge=0)] = 0.0
+
+    def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
+        """Refuse to start: the world has to be changed first.
+
+        Raises:
+            ConfigError: Always; `switched_on` gives the world.
+        """
+        raise ConfigError("grounding", "its servo is not switched on; a stage that uses it has to do that")
+
+    def switched_on(self, world: Any) -> BulletWorld:
+        """Return the world with the learned servo.
+
+        Raises:
+            ConfigError: There is no servo, or the world cannot have one.
+        """
+        checked = self.check(world)
+        if not self.servo:
+            raise ConfigError("grounding.servo", "is missing; name a run of gsl train-servo")
+        return self.shaken(replace(checked, servo=self.servo))
+
+    def shaken(self, world: BulletWorld) -> BulletWorld:
+        """Return a world with its learned servo and the torque noise that was asked for."""
+        if not self.torque_noise:
+            return world
+        model = read_servo(self.servo)
+        widths = self.torque_noise * np.where(
+            model.group[:, None] == NOBODY, 0.0, model.noise[model.group]
+        )  # (n_motors, 2)
+        step, constant = (dict(zip(model.joints, column.tolist(), strict=True)) for column in widths.T)
+        noisy: BulletWorld = with_torque_noise(world, step, constant)
+        return noisy
+
+    def check(self, world: Any) -> BulletWorld:
+        """Refuse a world without servos, or with a learned one already.
+
+        Raises:
+            ConfigError: It is one of these.
+        """
+        if not isinstance(world, BulletWorld):
+            raise ConfigError("grounding", "only robots in Bullet worlds have servos to learn; take another grounding")
+        if world.servo is not None:
+            raise ConfigError("grounding", "the simulator has a learned servo already; say grounding=none")
+        return world
+
+    @property
+    def actions(self) -> Grounding:
+        """What stands between the agent's actions and the changed world."""
+        return ActionNoise(self.noise) if self.noise else NoGrounding()

@@ -1,0 +1,100 @@
+"""What a learned servo has learned, to look at: how joints answer a step, and what motion costs at constant speed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gsl.core.plant import Plant
+from gsl.models.servo import ServoModel
+from gsl.report.style import GROUNDED, SIMULATION, figure, headline, look, save
+from gsl.worlds.held import Held
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+STEP, SECONDS = 0.1, 0.5  # of the answer to a step [rad], [s]
+SETTLE = 50  # control periods at rest before it
+SLOPE = 1.0  # of the ramps whose following error tells friction, at most this share of the fastest speed
+
+
+def servo_curves(path: Path, plant: Plant, model: ServoModel, step: float, period: float) -> None:
+    """Write the curves of a learned servo as a PNG file, one column a group of joints.
+
+    Args:
+        path: Of the file.
+        plant: The servo that it stands on.
+        model: What was learned.
+        step: Physics period [s].
+        period: Control period [s].
+    """
+    save(servo_curves_figure(plant, model, step, period), path)
+
+
+def servo_curves_figure(plant: Plant, model: ServoModel, step: float, period: float) -> Figure:
+    """Return the figure; arguments as those of `servo_curves`."""
+    groups = [g for g in range(len(model.groups)) if (_members(model, plant) == g).any()]
+    plants = (("simulator", plant, SIMULATION), ("learned servo", model.on(plant), GROUNDED))
+    with look():
+        whole = figure(5.2)
+        axes = whole.subplots(2, len(groups), squeeze=False)
+        for column, g in enumerate(groups):
+            joint = int(np.argmax(_members(model, plant) == g))
+            for label, one, colour in plants:
+                time, answer = step_response(one, joint, step, period)
+                axes[0, column].plot(time, np.degrees(answer), color=colour, label=label, linewidth=1.8)
+                speed, torque = motion_cost(one, joint, step, period)
+                axes[1, column].plot(speed, torque, color=colour, label=label, linewidth=1.8)
+            axes[0, column].set_title(f"{model.groups[g]}: {model.joints[joint]}", loc="left")
+            axes[0, column].set_xlabel("time after a step [s]")
+            axes[1, column].set_xlabel("speed [rad/s]")
+        axes[0, 0].set_ylabel("answer [°]")
+        axes[1, 0].set_ylabel("following error × kp [N·m]")
+        axes[0, 0].legend(frameon=False)
+        headline(whole, "What the servo has learned: how a joint answers a step, and what constant speed costs")
+    return whole
+
+
+def _members(model: ServoModel, plant: Plant) -> np.ndarray:
+    return model.group[: len(plant.robot.controlled)]
+
+
+def step_response(plant: Plant, joint: int, step: float, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return time [s] and the joint's position from where it was [rad] after its target jumps, shape (T,) each."""
+    rest = _stance(plant)
+    target = np.repeat(rest[None], round(SECONDS / period), axis=0)
+    target[:, joint] += STEP * _room(plant, joint, rest)
+    before = np.repeat(rest[None], 2, axis=0)
+    played = Held.of(plant, step, period).play([np.vstack([before, target])], [rest], SETTLE)[0]
+    answer = played[len(before) :, joint] - played[len(before), joint]
+    return period * np.arange(len(answer)), answer
+
+
+def motion_cost(plant: Plant, joint: int, step: float, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return speeds [rad/s] and kp times the following error at each [N·m]: friction, damping and lag together."""
+    rest, speeds, found = _stance(plant), np.linspace(0.1, 2.0, 8), []
+    toward = _room(plant, joint, rest)
+    for speed in speeds:
+        ticks = round(0.3 / speed / period) + 4
+        path = np.repeat(rest[None], ticks, axis=0)
+        path[:, joint] += toward * np.minimum(speed * period * np.arange(ticks), 0.3)
+        played = Held.of(plant, step, period).play([path], [rest], SETTLE)[0]
+        middle = slice(ticks // 2, ticks - 3)
+        found.append(float(np.mean(toward * (path[middle, joint] - played[1:][middle, joint]))))
+    return speeds, plant.servo.kp[joint] * np.array(found)
+
+
+def _stance(plant: Plant) -> np.ndarray:
+    robot = plant.robot
+    neutral = [
+        np.clip(robot.stance.get(name, 0.0), robot.joint(name).lower, robot.joint(name).upper) for name in robot.motors
+    ]
+    return np.array(neutral)
+
+
+def _room(plant: Plant, joint: int, rest: np.ndarray) -> float:
+    """Return the direction in which the joint has more room, +1 or -1."""
+    limits = plant.robot.joint(plant.robot.motors[joint])
+    return 1.0 if limits.upper - rest[joint] >= rest[joint] - limits.lower else -1.0

@@ -1,0 +1,124 @@
+"""Train the servo: learn from a log in the air what the robot's servos do that the simulator's do not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import yaml
+
+from gsl.core.body import lumped
+from gsl.core.described import described
+from gsl.core.setting import component, setting
+from gsl.diagnosis.experiment import Experiment, experiment
+from gsl.diagnosis.torque_width import TorqueWidth, held_out_widths
+from gsl.errors import ConfigError, InputError
+from gsl.models.servo import ServoModel
+from gsl.models.servo_file import FILE
+from gsl.report.servo_curves import servo_curves
+from gsl.stages.diagnosis_settings import Tolerance
+from gsl.stages.logs import check_log, log_parents, on_ground, read_logs
+from gsl.stages.population import Workers, threads
+from gsl.storage import documents
+from gsl.storage.models import write_model
+from gsl.storage.workplace import destination
+from gsl.training.learn_servo import LearnedServo, document, learn_servo
+from gsl.worlds.bullet import BulletWorld
+
+WORLD, CURVES = "world/learned.yaml", "servo.png"
+NEAR, FARTHEST = 1.0, 3.0  # noise floors: up to the first it is as good as the log can tell, beyond the second useless
+
+
+@component
+class TrainServo:
+    """Fits a servo law to a log of joint motion alone, on top of the servos that the simulator has.
+
+    Every second motion is held out: half of these say when to stop, the others are for the figures.
+    """
+
+    kind: ClassVar[str] = "train_servo"
+
+    real: Annotated[str, setting("trajectories in the air: a run, a parquet file or a folder of them", min_length=1)]
+    sim: Annotated[BulletWorld, setting("the simulator whose servos are to become the robot's")]
+    tolerance: Tolerance = 0.0
+    held_out: Annotated[
+        Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
+    ] = field(default_factory=dict)
+    workers: Workers = -1
+    seed: Annotated[int, setting("of the first weights", ge=0)] = 1
+
+    def __post_init__(self) -> None:
+        """Refuse to stand on another learned servo."""
+        if self.sim.servo is not None:
+            raise ConfigError("sim.servo", "is a learned servo already; learn on top of the world without it")
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the files that are read."""
+        return log_parents(real=self.real)
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write the checkpoint, the world that it makes and what it has learned as curves."""
+        robot, batch = lumped(self.sim.plant.robot), read_logs(self.real)
+        check_log(batch, robot, self.real)
+        if on_ground(batch):
+            raise InputError(f"{self.real}: a servo is learned from motions in the air; see `gsl collect task=excite`")
+        exp = experiment(batch, robot, held_out=self.held_out)
+        if not len(exp.train) or len(exp.held_out) < 2:
+            raise InputError(f"{self.real}: too little to fit and to check: two motions of some seconds are the least")
+        exp = exp.with_model_error(np.full(len(exp.joints), self.tolerance))
+        console.status(f"learning the servo from {len(exp.records)} motions; a minute for a humanoid")
+        count = threads(self.workers)
+        labelled = bool(self.held_out)
+        learned = learn_servo(exp, self.sim.plant, self.sim.step, labelled=labelled, seed=self.seed, threads=count)
+        model = replace(learned.model, noise=self._unexplained(exp, learned.model))
+        write_model(folder, model)
+        self._write_world(folder, learned)
+        servo_curves(folder / CURVES, self.sim.plant, model, self.sim.step, exp.period)
+        told = document(learned)
+        for line in remarks(told):
+            console.status(f"warning: {line}")
+        noise = {name: row.tolist() for name, row in zip(model.groups, model.noise, strict=True)}
+        return {**told, "torque_noise": noise, "problems": problems(told)}
+
+    def _unexplained(self, exp: Experiment, model: ServoModel) -> np.ndarray:
+        """Return the torque noise that held-out motions leave unexplained [N·m], at every step and constant, (G, 2)."""
+        widths = held_out_widths(exp, model.on(self.sim.plant), step=self.sim.step, seed=self.seed)
+        return np.array([widths.get(name, TorqueWidth(0.0, 0.0)) for name in model.groups])
+
+    def _write_world(self, folder: Path, learned: LearnedServo) -> None:
+        place = destination(folder) / FILE
+        text = yaml.safe_dump(
+            documents.plain(described(replace(self.sim)) | {"servo": place.as_posix()}),
+            sort_keys=False,
+            allow_unicode=True,
+        )
+        gap = f"held out, {learned.before['all']:.2f} noise floors became {learned.after['all']:.2f}"
+        (folder / WORLD).parent.mkdir()
+        (folder / WORLD).write_text(f"# The simulator with a learned servo: {gap}.\n{text}", encoding="utf-8")
+
+
+def problems(metrics: Mapping[str, Any]) -> list[str]:
+    """Return why nothing should be searched with a learned servo, if there is a reason.
+
+    Args:
+        metrics: Of its artifact.
+    """
+    after, before = metrics["floors_after"], metrics["floors_before"]
+    if after > FARTHEST:
+        return [f"held out, the learned servo is {after:.1f} noise floors from the log, more than {FARTHEST:g}"]
+    return [f"held out, the gap is {after:.2f} noise floors, {before:.2f} without"] if after > before else []
+
+
+def remarks(metrics: Mapping[str, Any]) -> list[str]:
+    """Return what a user should know of a learned servo: how near it is, and which groups kept their old servo."""
+    after, groups = metrics["floors_after"], metrics["groups"]
+    told = (
+        [] if after <= NEAR else [f"held out, the learned servo is {after:.1f} noise floors from the log, not within 1"]
+    )
+    for name, group in groups.items():
+        if not group["kept"]:
+            told.append(f"{name} keep their servo: what was learned made held-out motions worse")
+    return told
