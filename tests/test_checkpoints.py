@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
-from gsl.errors import ArtifactError
 from gsl.core.checkpoint import read_checkpoint
+from gsl.errors import ArtifactError
 from gsl.storage.checkpoints import write_checkpoint
 
 ARRAYS = {

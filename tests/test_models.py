@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gsl.core.checkpoint import read_checkpoint
 from gsl.core.history import History
 from gsl.errors import ArtifactError
 from gsl.models.choice import best, fit_network
@@ -15,7 +16,6 @@ from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Regression, Solver
 from gsl.models.linear import fit_linear
 from gsl.models.network import Network
-from gsl.core.checkpoint import read_checkpoint
 from gsl.storage.checkpoints import write_checkpoint
 from gsl.storage.models import FILES, read_forward_model, read_inverse_model, write_model
 

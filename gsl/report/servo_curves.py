@@ -51,7 +51,7 @@ def servo_curves_figure(plant: Plant, model: ServoModel, step: float, period: fl
             axes[0, column].set_xlabel("time after a step [s]")
             axes[1, column].set_xlabel("speed [rad/s]")
         axes[0, 0].set_ylabel("answer [°]")
-        axes[1, 0].set_ylabel("following error × kp [N·m]")
+        axes[1, 0].set_ylabel("torque at that speed [N·m]")
         axes[0, 0].legend(frameon=False)
         headline(whole, "What the servo has learned: how a joint answers a step, and what constant speed costs")
     return whole
@@ -73,7 +73,10 @@ def step_response(plant: Plant, joint: int, step: float, period: float) -> tuple
 
 
 def motion_cost(plant: Plant, joint: int, step: float, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return speeds [rad/s] and kp times the following error at each [N·m]: friction, damping and lag together."""
+    """Return speeds [rad/s] and the torque that keeps each of them [N·m]: friction and damping.
+
+    That is kp times the following error, the part of it left out that a delayed command makes.
+    """
     rest, speeds, found = _stance(plant), np.linspace(0.1, 2.0, 8), []
     toward = _room(plant, joint, rest)
     for speed in speeds:
@@ -82,7 +85,8 @@ def motion_cost(plant: Plant, joint: int, step: float, period: float) -> tuple[n
         path[:, joint] += toward * np.minimum(speed * period * np.arange(ticks), 0.3)
         played = Held.of(plant, step, period).play([path], [rest], SETTLE)[0]
         middle = slice(ticks // 2, ticks - 3)
-        found.append(float(np.mean(toward * (path[middle, joint] - played[1:][middle, joint]))))
+        behind = float(np.mean(toward * (path[middle, joint] - played[1:][middle, joint])))
+        found.append(behind - speed * plant.servo.delay[joint])
     return speeds, plant.servo.kp[joint] * np.array(found)
 
 

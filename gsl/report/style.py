@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 REAL, SIMULATION, GROUNDED = "#d55e00", "#0072b2", "#009e73"  # Okabe and Ito 2008
 COMMAND, QUIET, INK = "#8c8c8c", "#d0d0d0", "#222222"
+SERVO = "#cc79a7"
 UNINFORMED, GAT, SGAT, EFFECTS = COMMAND, SIMULATION, GROUNDED, REAL  # the first know nothing of the real robot
 WIDTH, DPI = 10.0, 160  # [in], [1/in]: 1600 pixels
 
@@ -41,7 +42,9 @@ _SETTINGS: Any = {
 
 def method_colour(name: str) -> str:
     """Return the colour of a method by the first word of its name, the same in all figures."""
-    return {"gat": GAT, "sgat": SGAT, "effects": EFFECTS, "ane": QUIET}.get(re.split("[ _]", name)[0], UNINFORMED)
+    return {"gat": GAT, "sgat": SGAT, "effects": EFFECTS, "ane": QUIET, "servo": SERVO}.get(
+        re.split("[ _]", name)[0], UNINFORMED
+    )
 
 
 @contextmanager

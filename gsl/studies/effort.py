@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import time
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects, learned
+from gsl.grounding.effects import DiagnosedEffects, innermost, learned
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.servo import LearnedServo
 from gsl.optimizers.cma_es import CmaEs
 from gsl.stages.iterate import Iterate
 from gsl.stages.population import threads
@@ -22,7 +26,12 @@ if TYPE_CHECKING:
 TRIED = 2  # rollouts of π0 in each world, after one that compiles
 LEARNED = 1.4  # how much longer a rollout takes with a learned grounding
 APART = 25.0  # of a learned grounding: fits and checks [s]
-DIAGNOSED = {"diagnose": 7.5, "identify": 2.0}  # of a second of motion in the air, on two cores [s]
+FLOWN = {  # a second of motion in the air, on two cores [s]
+    "diagnose": 7.5,
+    "identify": 2.0,
+    "servo": 1.0,
+    "servo_on_effects": 1.0,
+}
 
 
 def check_search(iterate: Iterate, where: str) -> None:
@@ -52,9 +61,7 @@ def seconds(study: Compare, *, search: bool = True) -> float:
     sim = sum(_rollout(iterate, world, SIM) for world in sims.values()) / len(sims)
     collected = sum(budget.real), sum(budget.sim)
     rounds, worlds = iterate.iterations * len(study.worlds), len(study.worlds)
-    flights = {
-        name: one.method for name, one in study.methods.items() if isinstance(one, DiagnosedEffects) and not one.effects
-    }
+    flights = {name: parts for name, method in study.methods.items() if (parts := _flown(method))}
     rolled = fitted = 0.0
     for name, method in study.methods.items():
         apart = learned(method) or name in flights
@@ -68,8 +75,16 @@ def seconds(study: Compare, *, search: bool = True) -> float:
     if any(map(learned, study.methods.values())):
         rolled += worlds * collected[0] * real + collected[1] * sim
     flown = len(iterate.diagnosis.excitation.motions) * iterate.diagnosis.excitation.duration if flights else 0.0
-    fitted += worlds * flown * sum(DIAGNOSED[method] for method in set(flights.values()))
+    fitted += worlds * flown * sum(FLOWN[part] for part in set(chain(*flights.values())))
     return (rolled / workers + fitted) * study.trials * len(sims)
+
+
+def _flown(method: Grounding | ActionTransformation) -> tuple[str, ...]:
+    """Return what a method makes of motions in the air."""
+    diagnosed = (method.method,) if isinstance(method, DiagnosedEffects) and not method.effects else ()
+    if not isinstance(innermost(method), LearnedServo):
+        return diagnosed
+    return (*diagnosed, "servo_on_effects" if isinstance(method, DiagnosedEffects) else "servo")
 
 
 def seconds_of_models(iterate: Iterate) -> float:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from gsl.grounding.effects import DiagnosedEffects
+from gsl.grounding.effects import DiagnosedEffects, innermost
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
-from gsl.report.style import EFFECTS, GAT, SGAT, UNINFORMED
+from gsl.grounding.servo import LearnedServo
+from gsl.report.style import EFFECTS, GAT, SERVO, SGAT, UNINFORMED
 
 
 def method_colour(grounding: Grounding | ActionTransformation) -> str:
     """Return it, as the style's figures have it."""
+    if isinstance(innermost(grounding), LearnedServo):
+        return SERVO
     if isinstance(grounding, DiagnosedEffects):
         return EFFECTS
     if not isinstance(grounding, ActionTransformation):

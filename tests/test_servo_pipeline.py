@@ -1,0 +1,157 @@
+"""A learned servo used: train-servo, its world, iterate and compare with it, and what is refused; on toy sizes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from commands import SMALL, Said, done, refused
+
+from gsl.core.checkpoint import read_checkpoint
+from gsl.models.servo import ServoModel
+from gsl.models.servo_file import FILE, read_servo
+from gsl.stages.train_servo import problems, remarks
+from gsl.storage.checkpoints import write_checkpoint
+from gsl.worlds.bullet import BulletWorld
+
+SOFT = ("real=nao_ideal", "real.effects.servo_gain.kp=0.6", "real.effects.command_latency.delay=0.02")
+LINE = ("iterate", *SMALL, *SOFT, "name=air", "accept=true", "grounding=servo")
+FIRST = "runs/air/iteration_01"
+TRAIN = ("train-servo", f"real={FIRST}/collect_excitation", "workers=1")
+
+
+@pytest.fixture(scope="module")
+def air(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Said]:
+    """One iteration with a learned servo, against a robot that is softer and later."""
+    folder = tmp_path_factory.mktemp("air")
+    return folder, done(*LINE, folder=folder)
+
+
+def loaded(path: Path) -> Any:
+    return json.loads(path.read_text()) if path.suffix == ".json" else yaml.safe_load(path.read_text())
+
+
+def test_iterate_learns_the_servo_by_itself_and_reports_the_gap(air: tuple[Path, Said]) -> None:
+    folder, said = air
+    metrics = loaded(folder / "runs/air/iterate/metrics.json")
+    servo = loaded(folder / FIRST / "train_servo/metrics.json")
+    assert metrics["servo"] == {key: servo[key] for key in ("floors_before", "floors_after")}
+    assert servo["floors_after"] < 0.1 * servo["floors_before"]
+    assert metrics["excitation"]["episodes"] == 5
+    told = f"from {servo['floors_before']:.1f} to {servo['floors_after']:.2f} noise floors"
+    assert told in said.out and told in (folder / "runs/air/iterate/table.md").read_text()
+    parents = loaded(folder / FIRST / "optimize/manifest.json")["parents"]
+    assert [parent["role"] for parent in parents] == ["grounding.servo"]
+
+
+def test_nothing_is_done_twice(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    assert "(unchanged)" in done(*LINE, folder=folder).out.splitlines()[-1]
+    assert "unchanged" in done(*TRAIN, f"out={FIRST}/train_servo", folder=folder).out
+
+
+def test_the_numbers_are_those_of_the_robot(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    model = read_servo(str(folder / FIRST / "train_servo"))
+    legs = model.group == model.groups.index("legs")
+    np.testing.assert_allclose(np.exp(model.numbers["kp"][legs]).mean(), 0.6, rtol=0.1)
+    np.testing.assert_allclose(model.numbers["delay"][legs].mean(), 0.02, atol=0.004)
+
+
+def test_the_grounding_hands_over_stiffness_as_no_action_can(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    share = loaded(folder / "runs/air/iterate/metrics.json")["compliance"]["legs"]["stiffness"]["handed_over"]
+    assert 0.8 < share < 1.2
+
+
+def test_its_world_works_in_every_command_as_a_diagnosed_one_does(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    place = f"{FIRST}/train_servo"
+    learned = loaded(folder / place / "world/learned.yaml")
+    assert learned["servo"] == f"{place}/{FILE}"
+    of_folder = ("--config-dir", place, "world=learned")
+    of_run = ("world=learned", f"world.servo={place}")
+    logs = []
+    for name, choice in {"file": of_folder, "run": of_run}.items():
+        done("collect", *choice, "role=sim", *SMALL, "episodes=1", "neighbours=0", f"name={name}", folder=folder)
+        logs.append((folder / f"runs/{name}/collect_sim/trajectories.parquet").read_bytes())
+        manifest = loaded(folder / f"runs/{name}/collect_sim/manifest.json")
+        assert "world.servo" in [parent["role"] for parent in manifest["parents"]]
+    assert len(logs[0]) == len(logs[1])
+
+
+def test_a_servo_stands_on_what_is_switched_on(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    world = BulletWorld("nao", {"servo_gain": {"kp": 0.5}}, servo=str(folder / FIRST / "train_servo"))
+    bare = BulletWorld("nao", {"servo_gain": {"kp": 0.5}})
+    model = read_servo(str(folder / FIRST / "train_servo"))
+    np.testing.assert_allclose(world.plant.servo.kp, bare.plant.servo.kp * np.exp(model.numbers["kp"]))
+    assert world.plant.law is not None and bare.plant.law is None
+
+
+def test_compare_and_effects_servo_share_the_flight(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    line = ("compare", *SMALL[:1], "trials=1", "name=both", "iterate.task.duration=1.6", "iterate.workers=1")
+    worlds = [f"~worlds.{name}" for name in ("nao_weak",)]
+    methods = [f"~methods.{name}" for name in ("none", "ane_01", "ane_02", "gat", "gat_005", "effects_gat")]
+    added = ("+grounding@methods.servo=servo", "+grounding@methods.effects_servo=effects_servo")
+    said = done(*line, *worlds, *methods, *added, folder=folder)
+    found = loaded(folder / "runs/both/compare/metrics.json")
+    assert {one["method"] for one in found["summaries"]} == {"effects", "servo", "effects_servo"}
+    below = next((folder / "runs/both").rglob("diagnosis")) / "trial_01"
+    assert {"collect_excitation", "diagnose", "train_servo", "train_servo_on_effects"} <= {
+        path.name for path in below.iterdir()
+    }
+    on_effects = loaded(below / "train_servo_on_effects/config.yaml")["sim"]["effects"]
+    assert on_effects == loaded(below / "diagnose/world/diagnosed.yaml")["effects"]
+    assert "servo" in said.out
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        (("real=nowhere",), "nowhere"),
+        (("sim.servo=nowhere",), "learned servo already"),
+        (("real=ground",), "motions in the air"),
+        (("sim=so101",), "another robot?"),
+        (("tolerance=-1",), "tolerance"),
+    ],
+)
+def test_bad_input_gets_one_line(air: tuple[Path, Said], changes: tuple[str, ...], told: str) -> None:
+    folder, _ = air
+    if not (folder / "runs/ground").exists():
+        done("collect", "role=real", *SMALL, "episodes=1", "neighbours=0", "name=ground", folder=folder)
+    changed = {change.partition("=")[0] for change in changes}
+    line = [word for word in TRAIN if word.partition("=")[0] not in changed]
+    assert told in refused(*line, *changes, "name=refused", folder=folder)
+
+
+def test_a_servo_of_another_robot_or_version_is_refused(air: tuple[Path, Said], tmp_path: Path) -> None:
+    folder, _ = air
+    arrays, about = read_checkpoint(folder / FIRST / "train_servo" / FILE, kind=ServoModel.kind)
+    other = tmp_path / "other" / FILE
+    other.parent.mkdir()
+    write_checkpoint(other, arrays, {**about, "robot": "so101"})
+    line = ("collect", "role=sim", "world=learned", *SMALL, "name=refused")
+    assert "was learned for the so101" in refused(*line, f"world.servo={other}", folder=folder)
+    write_checkpoint(other, {**arrays, "lag": arrays["lag"][:, :3]}, about)
+    assert "train it again" in refused(*line, f"world.servo={other}", folder=folder)
+    other.write_bytes(other.read_bytes()[:100])
+    assert "truncated or damaged" in refused(*line, f"world.servo={other}", folder=folder)
+    assert "no learned servo" in refused(*line, f"world.servo={tmp_path}", folder=folder)
+
+
+def test_a_servo_far_from_its_log_or_worse_than_none_is_a_problem(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    metrics = loaded(folder / FIRST / "train_servo/metrics.json")
+    assert problems(metrics) == []
+    assert "more than 3" in problems({**metrics, "floors_after": 4.2})[0]
+    assert "1.20 noise floors, 1.00 without" in problems({**metrics, "floors_before": 1.0, "floors_after": 1.2})[0]
+    assert any("not within 1" in line for line in remarks({**metrics, "floors_after": 2.0}))
+    assert remarks({**metrics, "floors_after": 0.9, "groups": {"legs": {"kept": False}}}) == [
+        "legs keep their servo: what was learned made held-out motions worse"
+    ]
