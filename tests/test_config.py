@@ -78,7 +78,7 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
             "no world called wrn; did you mean worn? There is cliff_walking, cliff_walking_noisy, go2_in_air, "
             "gymnasium, half_cheetah, half_cheetah_noisy, hopper, hopper_heavy, ideal, inverted_pendulum, "
             "inverted_pendulum_heavy, inverted_pendulum_noisy, nao_drawn_a, nao_drawn_b, nao_harsh, nao_ideal, "
-            "nao_uneven, nao_weak, nao_weak_uneven, nao_worn, plain, robot, so101, so101_menagerie, urdf, walker2d, "
+            "nao_motors, nao_motors_late, nao_uneven, nao_weak, nao_weak_uneven, nao_worn, plain, robot, so101, so101_menagerie, urdf, walker2d, "
             "walker2d_heavy, worn, xl330_pendulum",
         ),
         (

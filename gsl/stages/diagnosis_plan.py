@@ -23,6 +23,7 @@ from gsl.tasks.excite import Excite
 from gsl.tasks.task import REAL
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot, asking
+from gsl.worlds.velocity_motors import check_servos
 from gsl.worlds.world import World
 
 EXCITATION = "collect_excitation"
@@ -49,6 +50,7 @@ class DiagnosisPlan:
         """
         if not isinstance(real, BulletWorld | ExternalRobot) or not isinstance(sim, BulletWorld):
             raise ConfigError("grounding", "only robots in Bullet worlds are diagnosed; take another grounding")
+        check_servos(sim.motors)
         played = Collect(
             world=asking(replace(real, floating=False), home / EXCITATION),
             task=Excite(duration=self.excitation.duration),
