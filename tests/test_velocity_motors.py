@@ -77,20 +77,19 @@ def test_smoothing_makes_a_ramp_late_by_the_sampled_filters_lag() -> None:
     np.testing.assert_allclose(path[30:], actions[30:, SHOULDER] + SPEED * lag, atol=SOLVED)
 
 
-@pytest.mark.parametrize(
-    ("effect", "shift"),
-    [
-        ({"zero_offset": {"offset": 0.02}}, 0.02),
-        ({"deadband": {"width": 0.01}}, 0.0),
-        ({"quantisation": {"step": 0.05}}, None),
-    ],
-)
-def test_other_effects_of_the_command_act(effect: dict[str, Any], shift: float | None) -> None:
+def test_a_zero_offset_shifts_a_joint_and_a_deadband_leaves_it_short_of_its_target() -> None:
     actions = np.tile(STANCE, (20, 1))
-    expected = STANCE + shift if shift is not None else 0.05 * np.rint(STANCE / 0.05)
-    np.testing.assert_allclose(played(actions, effect)[-1], expected, atol=0.01 + SOLVED)
-    if shift is None:
-        np.testing.assert_allclose(played(actions, effect)[-1], expected, atol=SOLVED)
+    actions[5:, SHOULDER] -= 0.02
+    shifted = played(actions, {"zero_offset": {"offset": 0.01}})[-1]
+    np.testing.assert_allclose(shifted, actions[-1] + 0.01, atol=SOLVED)
+    assert played(actions, {"deadband": {"width": 0.01}})[-1, SHOULDER] == pytest.approx(
+        actions[-1, SHOULDER] + 0.01, abs=SOLVED
+    )
+
+
+def test_a_target_is_rounded() -> None:
+    last = played(np.tile(STANCE, (20, 1)), {"quantisation": {"step": 0.05}})[-1]
+    np.testing.assert_allclose(last, 0.05 * np.rint(STANCE / 0.05), atol=SOLVED)
 
 
 def arm_under(newton: float, effects: Mapping[str, Any] | None = None) -> float:
