@@ -113,6 +113,7 @@ stage("reproduce table2", "Groundings against each other on the walk, beside the
 stage("reproduce table2-paper", "The same by the paper's recipe to the letter.")
 stage("reproduce worlds", "The best groundings in worlds that took no part in their choice.")
 stage("reproduce servo", "A learned servo against noise, effects and no grounding, in five worlds.")
+stage("reproduce motion", "Groundings where the real joints lag and are as stiff as the simulated ones.")
 stage("reproduce table3", "Three iterations with either of two simulators, beside the paper's table 3.")
 stage("reproduce table4", "Uneven ground, two grounding steps, beside the paper's table 4.")
 stage("reproduce linear-walk", "A linear policy learns to walk, beside the paper's section 6.3.")

@@ -78,8 +78,8 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
             "no world called wrn; did you mean worn? There is cliff_walking, cliff_walking_noisy, go2_in_air, "
             "gymnasium, half_cheetah, half_cheetah_noisy, hopper, hopper_heavy, ideal, inverted_pendulum, "
             "inverted_pendulum_heavy, inverted_pendulum_noisy, nao_drawn_a, nao_drawn_b, nao_harsh, nao_ideal, "
-            "nao_uneven, nao_weak, nao_weak_uneven, nao_worn, plain, robot, so101, so101_menagerie, urdf, walker2d, "
-            "walker2d_heavy, worn, xl330_pendulum",
+            "nao_motors, nao_motors_late, nao_uneven, nao_weak, nao_weak_uneven, nao_worn, plain, robot, so101, "
+            "so101_menagerie, urdf, walker2d, walker2d_heavy, worn, xl330_pendulum",
         ),
         (
             ["experiment=lng"],
@@ -210,6 +210,7 @@ OF_ENVIRONMENTS = {  # what is for gymnasium environments, and goes with no robo
 }
 HELD = ("go2_in_air", "so101", "so101_menagerie", "urdf", "xl330_pendulum")  # robots without feet
 EXAMPLE = Path(__file__).parents[1] / "examples/arm.urdf"
+REPLAYING = ("diagnose", "identify", "cross_validate", "blind_make")  # logs, with servos
 NEEDED = {  # what has no default
     "diagnose": ("real=logs",),
     "identify": ("real=logs",),
@@ -275,6 +276,8 @@ def _typed(group: str, conf: Path, command: str) -> list[str]:
         return [f"{role}=excitation"]
     if command in ("reproduce_fig11", "reproduce_fig12", "reproduce_fig13", "reproduce_garat"):
         return [f"{folder}={name}" for name in ("toy", "study")] if folder == "preset" else []
+    if command in REPLAYING:
+        found = (name for name in found if not name.startswith("nao_motors"))
     mine = (name for name in found if name not in OF_ENVIRONMENTS.get(folder, ()))
     robots = (name for name in mine if folder != "world" or name.startswith("nao"))
     return [f"{role or folder}={name}" for name in robots if name != "excite" or command == "collect"]

@@ -40,6 +40,7 @@ KEPT = {
     "linear-walk": ("none", "gat", "gat_residual"),
     "fig5": ("none", "gat", "gat_005"),
     "worlds": ("none", "gat_residual_01", "effects"),
+    "motion": ("none", "gat"),
 }
 ALL = (
     *("none", "ane_005", "ane_01", "ane_02", "ane_04", "randomised", "gat", "gat_005", "gat_residual"),
@@ -54,6 +55,7 @@ OFFERED = {
     "linear-walk": ("none", "ane_02", "gat", "gat_residual", "effects"),
     "fig5": ("none", "ane_02", "gat", "gat_005", "sgat", "effects"),
     "worlds": ("none", "ane_02", "gat_residual_01", "effects"),
+    "motion": ("none", "ane_02", "gat", "gat_005", "gat_residual_01", "sgat"),
 }
 FEW = ("preset=toy", "iterate.workers=1", "iterate.optimizer.candidates=4")
 SHORT = ("iterate.budget.episodes=2", "iterate.optimizer.generations=1", "iterate.task.duration=1.2")
@@ -79,7 +81,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path, monkeypatch: pytest.M
     assert len((folder / "trials.md").read_text().splitlines()) == 2 + len(trials)
     assert what != "table2-paper" or {one["alpha"] for one in trials if one["method"] == "gat_alpha_1"} == {1.0}
     assert {one["simulator"] for one in trials} == ({"nao_ideal", "nao_weak"} if what == "table3" else {""})
-    assert all((one["rank"] is not None) == (what in ("table2", "worlds")) for one in trials)
+    assert all((one["rank"] is not None) == (what in ("table2", "worlds", "motion")) for one in trials)
     for one in trials:
         assert [policy[0] for policy in one["tried"]] == list(range(one["winners"] + 1))
         if what != "table4":  # where falls are tolerated

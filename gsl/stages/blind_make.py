@@ -23,6 +23,7 @@ from gsl.stages.blind_files import CASES, LABELS, SEALS, SECRET, write_case
 from gsl.stages.population import Workers, in_parallel
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.velocity_motors import check_servos
 
 
 class _Order(NamedTuple):
@@ -55,7 +56,8 @@ class BlindMake:
     seed: Annotated[int, setting("of all randomness, together with the secret", ge=0)] = 1
 
     def __post_init__(self) -> None:
-        """Refuse a benchmark without a case."""
+        """Refuse a benchmark without a case, or of a simulator that logs cannot be replayed in."""
+        check_servos(self.sim.motors)
         if not self.cases + self.mix.walk:
             raise ValueError("needs at least one case, in the air or on the ground")
 

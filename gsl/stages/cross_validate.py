@@ -32,6 +32,7 @@ from gsl.stages.logs import check_log, log_parents, on_ground, other_clocks, rea
 from gsl.stages.population import Workers, threads
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.velocity_motors import check_servos
 
 TABLE, DATA = "table.md", "folds.json"
 SINGLE = (str, int, float, bool)
@@ -76,7 +77,8 @@ class CrossValidate:
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be fitted to all joints, or is to be left out."""
+        """Refuse what cannot be fitted to all joints, or is to be left out, or replayed."""
+        check_servos(self.sim.motors)
         if not self.usual:
             raise ConfigError("usual", "names at least one effect to compare with")
         everywhere = {one.effect for one in library(lumped(self.sim.plant.robot)) if one.on_joints}

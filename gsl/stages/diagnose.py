@@ -32,6 +32,7 @@ from gsl.stages.population import Workers, threads
 from gsl.stages.real_returns import RealReturns, measured_parents, real_returns
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.velocity_motors import check_servos
 
 DEFAULT_ROBOT = "nao"  # that commands mean which name none
 
@@ -64,6 +65,10 @@ class Diagnose:
     ] = field(default_factory=dict)
     trust: Annotated[bool, setting("let the policies' files name classes that are not gsl's")] = False
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
+
+    def __post_init__(self) -> None:
+        """Refuse a simulator that logs cannot be replayed in."""
+        check_servos(self.sim.motors)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""

@@ -26,6 +26,7 @@ from gsl.tasks.excite import Excite
 from gsl.tasks.task import REAL
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot, asking
+from gsl.worlds.velocity_motors import check_servos
 from gsl.worlds.world import World
 
 EXCITATION = "collect_excitation"
@@ -53,6 +54,7 @@ class DiagnosisPlan:
         """
         if not isinstance(sim, BulletWorld):
             raise ConfigError("grounding", ROBOTS_ONLY)
+        check_servos(sim.motors)
         log = self.flown(real, home, workers=workers, seed=seed, console=console)
         stage: Diagnose | Identify = Identify(
             str(log.folder), sim, without=self.without, evaluations=self.evaluations, workers=workers, seed=seed
@@ -82,6 +84,7 @@ class DiagnosisPlan:
         if not isinstance(sim, BulletWorld):
             raise ConfigError("grounding", ROBOTS_ONLY)
         log = self.flown(real, home, workers=workers, seed=seed, console=console)
+        check_servos(sim.motors)
         below = sim if effects is None else switched_on(sim, effects)
         assert isinstance(below, BulletWorld), "effects leave a world what it is"
         stage = TrainServo(real=str(log.folder), sim=below, workers=workers, seed=seed)

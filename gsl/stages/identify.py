@@ -28,6 +28,7 @@ from gsl.stages.logs import check_log, log_parents, on_ground, read_logs
 from gsl.stages.population import Workers, threads
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.velocity_motors import check_servos
 
 WORLD = "world/identified.yaml"
 
@@ -47,6 +48,10 @@ class Identify:
     evaluations: Annotated[int, setting("replays of the log that the fit may take", ge=16)] = 4800
     workers: Workers = -1
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
+
+    def __post_init__(self) -> None:
+        """Refuse a simulator that logs cannot be replayed in."""
+        check_servos(self.sim.motors)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""

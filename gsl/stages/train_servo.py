@@ -27,6 +27,7 @@ from gsl.storage.models import write_model
 from gsl.storage.workplace import destination
 from gsl.training.learn_servo import LearnedServo, document, learn_servo
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.velocity_motors import check_servos
 
 WORLD, CURVES = "world/learned.yaml", "servo.png"
 NEAR, FARTHEST = 1.0, 3.0  # noise floors: up to the first it is as good as the log can tell, beyond the second useless
@@ -51,7 +52,8 @@ class TrainServo:
     seed: Annotated[int, setting("of the first weights", ge=0)] = 1
 
     def __post_init__(self) -> None:
-        """Refuse to stand on another learned servo."""
+        """Refuse to stand on another learned servo, and joints that have none."""
+        check_servos(self.sim.motors)
         if self.sim.servo is not None:
             raise ConfigError("sim.servo", "is a learned servo already; learn on top of the world without it")
 

@@ -19,7 +19,7 @@ from gsl.core.layout import Layout
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
 from gsl.effects.effect import applied, built
-from gsl.errors import GslError
+from gsl.errors import ConfigError, GslError
 from gsl.models.servo import having_servo
 from gsl.models.servo_file import read_servo, servo_file
 from gsl.robots.catalogue import read_files, robot
@@ -28,6 +28,7 @@ from gsl.worlds.fits import check_base, check_periods, check_plant
 from gsl.worlds.ground import REACH, random_heights
 from gsl.worlds.start import Start, resting
 from gsl.worlds.torque_noise import TorqueNoise
+from gsl.worlds.velocity_motors import Motors, check_motors
 
 FALLEN_TILT = 0.5  # cosine of the tilt beyond which the robot has fallen
 
@@ -45,12 +46,19 @@ class BulletWorld:
     start_noise: Annotated[float, setting("standard deviation of the joints at the start", unit="rad", ge=0)] = 0.03
     settle: Annotated[float, setting("time the start posture is held before the episode", unit="s", ge=0)] = 0.5
     servo: Annotated[str | None, setting("learned servo that acts on top: a path or run of train-servo")] = None
+    motors: Annotated[
+        Motors, setting("what turns the joints: our servo by torque, or the engine's velocity motors")
+    ] = "servo"
 
     def __post_init__(self) -> None:
         """Refuse periods that do not fit, and effects that do not exist or do not fit them."""
         check_periods(self.step, self.period)
         check_plant(self.plant, self.step, self.period)
         check_base(self.plant.robot, floating=self.floating)
+        if self.motors != "servo":
+            check_motors(nominal(robot(self.robot)), built(self.effects))
+            if self.servo is not None:
+                raise ConfigError("servo", "acts on torques; velocity motors have none", given=self.servo)
 
     @property
     def read_files(self) -> Mapping[str, Path]:
@@ -114,7 +122,9 @@ class BulletEnv(gymnasium.Env):
         options = options or {}
         start = options.get("start") or self._at_rest(np.asarray(options.get("posture", self._neutral), dtype=float))
         if self._engine is None:
-            physics = Physics(self.world.step, self.world.iterations, self.world.period, self.world.floating)
+            physics = Physics(
+                self.world.step, self.world.iterations, self.world.period, self.world.floating, self.world.motors
+            )
             self._engine = Engine(self._plant, physics)
         before = 0 if options.get("start") else round(self.world.settle / self.world.period)
         surface = self._surface()

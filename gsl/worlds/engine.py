@@ -23,6 +23,7 @@ from gsl.worlds.ground import PLANE, lay
 from gsl.worlds.pushes import aimed, apply_push, overlap
 from gsl.worlds.rotor import carried_inertia, rotors
 from gsl.worlds.servo import ROTOR, encoder_motion, first_state, packed
+from gsl.worlds.velocity_motors import Motors, VelocityMotors
 
 NOTHING = -1  # Bullet's number of a robot that is not loaded yet
 
@@ -36,12 +37,14 @@ class Physics:
         iterations: Of the constraint solver.
         period: Control period [s], a multiple of `step`.
         floating: Whether the base moves freely above a plane; else it is held in the air.
+        motors: What turns the joints; see velocity_motors.py.
     """
 
     step: float
     iterations: int
     period: float
     floating: bool
+    motors: Motors = "servo"
 
     @property
     def substeps(self) -> int:
@@ -103,8 +106,10 @@ class Engine:
         self.plant, self.physics, self.robot = plant, physics, lumped(plant.robot)
         self.handle = client_handle(pybullet.__file__, self.client)
         servo = packed(plant.servo, plant.robot.supply_voltage, plant.law)
-        apart = servo.rows[ROTOR]
-        rotor = rotors(self.robot, plant.servo.armature - apart, floating=physics.floating, apart=apart)
+        apart, moved = servo.rows[ROTOR], physics.motors == "servo"
+        armature = plant.servo.armature - apart if moved else np.zeros(len(apart))
+        self._motors = None if moved else VelocityMotors.of(plant, servo.rows)
+        rotor = rotors(self.robot, armature, floating=physics.floating, apart=apart)
         self._loaded = _heavier(self.robot, carried_inertia(self.robot, rotor.carried))
         self._inertia = {name: principal_axes(link.inertia)[0].tolist() for name, link in self._loaded.links.items()}
         base = self._loaded.links[self.robot.base]
@@ -184,7 +189,10 @@ class Engine:
         if load is not None:
             memory.load[:] = load
         rest = (physics.floating, physics.substeps, physics.step, physics.period, self._drive, memory, self._base_turn)
-        if self.plant.pushes or self.plant.hook:
+        if self._motors is not None:
+            outside, steps = self._outside if self.plant.pushes else None, (physics.substeps, physics.step)
+            self._motors.run(self.bullet, self.client, self.body, self.joints, *steps, memory.servo, outside)
+        elif self.plant.pushes or self.plant.hook:
             in_python(self.bullet, self.client, self.body, self.joints, *rest, self._outside)
         elif self.handle == NO_HANDLE:
             in_python(self.bullet, self.client, self.body, self.joints, *rest)
