@@ -102,6 +102,17 @@ def _train_inverse(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told
     return Told(title, ("action error [°]", "worst joint"), [row])
 
 
+def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    groups = {"all": metrics, **metrics["groups"]}
+    rows = [
+        (name, f"{one['floors_before']:.2f}", f"{one['floors_after']:.2f}", "yes" if one.get("kept", True) else "no")
+        for name, one in groups.items()
+    ]
+    titles = ("joints", "simulator", "with the learned servo", "kept")
+    below = f"what it has learned: {folder.as_posix()}/servo.png"
+    return Told("distance from held-out motions [noise floors]", titles, rows, below)
+
+
 def _optimize(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     document = json.loads((folder / "policies.json").read_text(encoding="utf-8"))
     rows = [
@@ -150,13 +161,14 @@ def returned(metrics: Mapping[str, Any], unit: Unit) -> str:
 def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     titles, rows = _markdown(folder / "table.md")
     spent, learned, flight = metrics["real_episodes"], metrics["learned_from"], metrics.get("excitation")
-    air = f"{flight['episodes']} motions in the air ({flight['real_seconds']:.0f} s) to diagnose, " if flight else ""
+    why = "to diagnose" if metrics.get("diagnosis") else "to learn the servo from"
+    air = f"{flight['episodes']} motions in the air ({flight['real_seconds']:.0f} s) {why}, " if flight else ""
     measured = spent - learned - (flight["episodes"] if flight else 0)
     beside = metrics.get("ungrounded")
     more = f"; {beside['real_episodes']} more to measure the search without grounding" if beside else ""
     plots = ", ".join(sorted(path.name for path in folder.glob("*.png")))
     below = [
-        *([metrics["diagnosis"]["told"]] if metrics.get("diagnosis") else []),
+        *(metrics[key]["told"] for key in ("diagnosis", "servo") if metrics.get(key)),
         metrics["verdict"],
         *(f"warning: {line}" for line in metrics.get("broken_promises", [])),
         f"real data: {air}{learned} episodes to learn from, {measured} to measure, {spent} in all{more}",
@@ -243,6 +255,7 @@ _TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told | list[Tol
     "diagnose": _diagnose,
     "train_forward": _train_forward,
     "train_inverse": _train_inverse,
+    "train_servo": _train_servo,
     "optimize": _optimize,
     "evaluate": _evaluate,
     "iterate": _iterate,

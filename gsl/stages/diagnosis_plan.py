@@ -126,17 +126,26 @@ class Flight(NamedTuple):
     servo: Mapping[str, Any] | None = None
 
     @property
-    def told(self) -> str:
-        """What was found, and what is done with it."""
-        lines = []
-        if self.diagnosis is not None:
-            verdict = self.diagnosis.verdict.replace("_", " ")
-            lines.append(f"Diagnosis: {verdict}. {self.diagnosis.summary} {self.diagnosis.told}")
-        if self.servo is not None:
-            before, after = self.servo["floors_before"], self.servo["floors_after"]
-            gap = f"on held-out motions the gap fell from {before:.1f} to {after:.2f} noise floors"
-            lines.append(f"Learned servo: {gap}. It acts on every joint's torque in the simulator.")
-        return " ".join(lines)
+    def findings(self) -> tuple[str, ...]:
+        """What was found, and what is done with it: of the diagnosis, then of the servo."""
+        return tuple(filter(None, (self.verdict, self.gap)))
+
+    @property
+    def verdict(self) -> str:
+        """What a diagnosis says, nothing where there is none."""
+        if self.diagnosis is None:
+            return ""
+        verdict = self.diagnosis.verdict.replace("_", " ")
+        return f"Diagnosis: {verdict}. {self.diagnosis.summary} {self.diagnosis.told}"
+
+    @property
+    def gap(self) -> str:
+        """How near a learned servo is, nothing where none was learned."""
+        if self.servo is None:
+            return ""
+        before, after = self.servo["floors_before"], self.servo["floors_after"]
+        fell = f"on held-out motions the gap fell from {before:.1f} to {after:.2f} noise floors"
+        return f"Learned servo: {fell}. It acts on every joint's torque in the simulator."
 
 
 def flown(home: Path, asked: Grounding, ready: Grounding) -> Flight | None:

@@ -175,7 +175,8 @@ class Iterate:
         grounding = self.chain.diagnosed(home / FIRST, self.grounding, self.seed, console)
         if flight := flown(home / FIRST, self.grounding, grounding):
             rounds.diagnosed(flight)
-            console.status(flight.told)
+            for finding in flight.findings:
+                console.status(finding)
         return grounding
 
     def _ungrounded(self, home: Path, start: str | None, console: Any) -> Artifact:

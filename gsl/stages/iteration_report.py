@@ -142,7 +142,7 @@ class Rounds:
     @property
     def diagnosis(self) -> list[str]:
         """What was diagnosed and what was done with it, in a line; none if nothing was."""
-        return [self._flight.told] if self._flight else []
+        return list(self._flight.findings) if self._flight else []
 
     @property
     def broken_promises(self) -> list[str]:
@@ -153,16 +153,15 @@ class Rounds:
     def _of_the_flight(self) -> Mapping[str, Any]:
         if self._flight is None:
             return {"excitation": None, "diagnosis": None, "servo": None}
-        found, servo = self._flight.diagnosis, self._flight.servo
-        told = None
+        flight = self._flight
+        found, servo = flight.diagnosis, flight.servo
+        diagnosis = gap = None
         if found is not None:
-            told = {"verdict": found.verdict, "causes": list(found.causes), "told": self._flight.told}
-        floors = {key: servo[key] for key in ("floors_before", "floors_after")} if servo else None
-        return {
-            "excitation": {"episodes": self._flight.episodes, "real_seconds": self._flight.seconds},
-            "diagnosis": told,
-            "servo": floors,
-        }
+            diagnosis = {"verdict": found.verdict, "causes": list(found.causes), "told": flight.verdict}
+        if servo is not None:
+            gap = {"floors_before": servo["floors_before"], "floors_after": servo["floors_after"], "told": flight.gap}
+        excitation = {"episodes": flight.episodes, "real_seconds": flight.seconds}
+        return {"excitation": excitation, "diagnosis": diagnosis, "servo": gap}
 
     def searches(self) -> list[Search]:
         """Return the panels of the learning curve."""
