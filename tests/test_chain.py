@@ -13,7 +13,8 @@ from gsl.robots.nao import nao
 from gsl.worlds.chain import COLUMNS, Pushed, accelerate, chain, nothing
 from gsl.worlds.engine import Engine, Physics
 from gsl.worlds.held import Held, Windows
-from gsl.worlds.servo import COMMANDS, encoder_motion, first_state, servo_torque
+from gsl.worlds.servo import encoder_motion, servo_torque
+from gsl.worlds.servo_state import COMMANDS, first_state
 from gsl.worlds.start import resting
 
 PERIOD, STEP = 0.02, 0.002

@@ -14,9 +14,10 @@ from gsl.core.lanes import LANES
 from gsl.core.plant import Plant
 from gsl.core.servo_law import LAGS
 from gsl.models.servo import NETWORK, NUMBERS, ServoModel, shapes, units
-from gsl.training.adjoint import Frozen, Gradient, cost_and_gradient
-from gsl.training.frozen import heavier
-from gsl.worlds.servo import packed
+from gsl.training.adjoint import cost_and_gradient
+from gsl.training.frozen import Frozen, heavier
+from gsl.training.gradient import Gradient
+from gsl.worlds.servo_state import packed
 
 ROBUST = 3.0  # residual beyond which one counts less and less [floors]
 RIDGE_LAG, RIDGE_WEIGHT = 1e-2, 1e-4  # of squares, in mean squares of a residual
