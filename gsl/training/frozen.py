@@ -82,7 +82,10 @@ def _rigid_body(tree: Chain, position: np.ndarray, speed: np.ndarray, mobility: 
 
 
 def heavier(data: Frozen, inertia: np.ndarray) -> Frozen:
-    """Return the windows with more rotor inertia [kg·m²], shape (n,): (M + E)⁻¹ = (1 + M⁻¹ E)⁻¹ M⁻¹."""
+    """Return the windows with more inertia E that moves with the outputs [kg·m²], shape (n,).
+
+    (M + E)⁻¹ = (1 + M⁻¹ E)⁻¹ M⁻¹; of a rotor beyond play or a spring only a share moves with the output.
+    """
     if not inertia.any():
         return data
     factor = np.linalg.inv(np.eye(len(inertia)) + data.mobility * inertia)
