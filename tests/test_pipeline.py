@@ -139,7 +139,8 @@ def test_a_grounding_that_fails_its_check_is_refused_with_the_reason(chain: Path
 def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Said]:
     """One iteration as a process."""
     folder = tmp_path_factory.mktemp("whole")
-    with started("iterate", *SMALL, "grounding=gat", "name=whole", "accept=true", "beside=true", folder=folder) as process:
+    line = ("iterate", *SMALL, "grounding=gat", "name=whole", "accept=true", "beside=true")
+    with started(*line, folder=folder) as process:
         out, err = process.communicate(timeout=200)
     assert process.returncode == 0, err
     return folder, Said(0, out, err)

@@ -15,17 +15,8 @@ from gsl.effects.effect import applied, built
 from gsl.worlds.chain import COLUMNS, Chain, accelerate, nothing
 from gsl.worlds.encoder import first_history
 from gsl.worlds.held import Held
-from gsl.worlds.servo import (
-    COMMANDS,
-    DRIVE,
-    MEMORY,
-    SMOOTHED,
-    SPEED,
-    ServoParameters,
-    ServoState,
-    encoder_motion,
-    servo_torque,
-)
+from gsl.worlds.servo import encoder_motion, servo_torque
+from gsl.worlds.servo_state import COMMANDS, DRIVE, MEMORY, SMOOTHED, SPEED, ServoParameters, ServoState
 
 STEP = 0.001  # physics period [s]
 SETTLE = 25  # control periods for which the first command is held before a motion begins

@@ -14,9 +14,10 @@ from gsl.core.lanes import LANES
 from gsl.core.plant import Plant
 from gsl.core.servo_law import LAGS
 from gsl.models.servo import NETWORK, NUMBERS, ServoModel, shapes, units
-from gsl.training.adjoint import Frozen, Gradient, cost_and_gradient
-from gsl.training.frozen import heavier
-from gsl.worlds.servo import packed
+from gsl.training.adjoint import cost_and_gradient
+from gsl.training.frozen import Frozen, heavier
+from gsl.training.gradient import Gradient
+from gsl.worlds.servo_state import OUTPUT_ARMATURE, packed
 
 ROBUST = 3.0  # residual beyond which one counts less and less [floors]
 RIDGE_LAG, RIDGE_WEIGHT = 1e-2, 1e-4  # of squares, in mean squares of a residual
@@ -98,6 +99,7 @@ def fit_network(
     best, way, costs = [(judge(model), model)], list[Progress](), [0.0]
     size = -(-len(some) // (LANES * threads)) * LANES
     blocks = [some[k : k + size] for k in range(0, len(some), size)]
+    carried = packed(plant.servo, plant.robot.supply_voltage).rows[OUTPUT_ARMATURE]
 
     with ThreadPoolExecutor(threads) as pool:
 
@@ -105,7 +107,7 @@ def fit_network(
             now = free.model_at(theta)
             changed = now.on(plant)
             servos = packed(changed.servo, changed.robot.supply_voltage, changed.law)
-            here = heavier(data, changed.servo.armature - plant.servo.armature)
+            here = heavier(data, servos.rows[OUTPUT_ARMATURE] - carried)
 
             def of(block: np.ndarray) -> tuple[float, np.ndarray]:
                 to = Gradient(

@@ -22,7 +22,8 @@ from gsl.worlds.control_period import Drive, first_memory, in_c, in_python, read
 from gsl.worlds.ground import PLANE, lay
 from gsl.worlds.pushes import aimed, apply_push, overlap
 from gsl.worlds.rotor import carried_inertia, rotors
-from gsl.worlds.servo import ROTOR, encoder_motion, first_state, packed
+from gsl.worlds.servo import encoder_motion
+from gsl.worlds.servo_state import ROTOR, first_state, packed
 from gsl.worlds.velocity_motors import Motors, VelocityMotors
 
 NOTHING = -1  # Bullet's number of a robot that is not loaded yet
