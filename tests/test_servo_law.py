@@ -8,7 +8,7 @@ from bodies import held, walked, world
 from learned_servos import EVERYTHING, NAO, PERIOD, STEP, law, lawful, log, some_law, with_fields
 
 from gsl.core.plant import Plant, nominal
-from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, NOBODY, SPEED_UNIT, act, correction, no_law
+from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, LAYERS, NOBODY, SPEED_UNIT, act, network, no_law, weights
 from gsl.worlds.bullet import BulletEnv
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo import servo_torque
@@ -78,17 +78,16 @@ def test_a_law_matters_and_only_where_its_group_is() -> None:
 
 def test_the_layers_are_those_of_numpy() -> None:
     plant, rng = with_fields(NAO, {}), np.random.default_rng(0)
-    some = law(plant, lag=0.3, weights=0.7, last=0.5)
-    for i in range(N):
-        layers, x = np.zeros((3, HIDDEN)), rng.normal(size=INPUTS)
+    some = law(plant, weights=0.7, last=0.5)
+    for g in (0, 1):
+        layers, x = np.zeros((LAYERS, HIDDEN)), rng.normal(size=INPUTS)
         layers[0, :INPUTS] = x
-        drive, output = correction(some, i, layers)
-        g = some.group[i]
+        got = network(weights(some), g, layers)
         inner = some.first_bias[g] + x @ some.first[g]
         outer = some.second_bias[g] + activated(inner) @ some.second[g]
-        out = some.last_bias[g] + activated(outer) @ some.last[g] + [some.lag[i] @ x[:LAGS], 0.0]
-        np.testing.assert_allclose([drive, output], some.torque[i] * out, rtol=1e-12)
-        np.testing.assert_allclose(layers[1:3], [inner, outer], rtol=1e-12)
+        np.testing.assert_allclose(got, some.last_bias[g] + activated(outer) @ some.last[g], rtol=1e-12)
+        hidden = [inner, outer, activated(inner), activated(outer)]
+        np.testing.assert_allclose(layers[1:], hidden, rtol=1e-12, atol=1e-15)
 
 
 def activated(z: np.ndarray) -> np.ndarray:
@@ -107,18 +106,18 @@ def test_the_activation_is_nearly_tanh_odd_and_saturates() -> None:
 @pytest.mark.parametrize(("lag", "delay"), [(2, 0.02), (3, 0.03), (7, 0.07)])
 def test_weights_on_an_older_target_are_a_latency(lag: int, delay: float, windows: Windows) -> None:
     plant = with_fields(NAO, {"offset": 0.02})
-    weights = np.zeros((N, LAGS))
-    weights[:, 0], weights[:, lag] = -1.0, 1.0
-    learned = lawful(plant, law(plant)._replace(lag=weights))
+    shares = np.zeros((N, LAGS))
+    shares[:, 0], shares[:, lag] = -1.0, 1.0
+    learned = lawful(plant, law(plant)._replace(lag=shares))
     named = plant.with_servo(delay=np.full(N, delay))
     np.testing.assert_allclose(replayed(learned, windows), replayed(named, windows), rtol=0.0, atol=1e-11)
     assert np.abs(replayed(plant, windows) - replayed(named, windows)).max() > 1e-3
 
 
 def test_a_share_of_the_gain_is_a_gain(windows: Windows) -> None:
-    plant, weights = with_fields(NAO, {}), np.zeros((N, LAGS))
-    weights[:, 0] = -0.4
-    learned, named = lawful(plant, law(plant)._replace(lag=weights)), plant.with_servo(kp=0.6 * plant.servo.kp)
+    plant, shares = with_fields(NAO, {}), np.zeros((N, LAGS))
+    shares[:, 0] = -0.4
+    learned, named = lawful(plant, law(plant)._replace(lag=shares)), plant.with_servo(kp=0.6 * plant.servo.kp)
     np.testing.assert_allclose(replayed(learned, windows), replayed(named, windows), rtol=0.0, atol=1e-11)
 
 

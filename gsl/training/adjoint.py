@@ -14,7 +14,7 @@ import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
-from gsl.core.servo_law import HIDDEN
+from gsl.core.servo_law import HIDDEN, LAYERS
 from gsl.training.frozen import Frozen
 from gsl.training.gradient import BY_OFFSET, Gradient, add_lanes, sums_in_lanes
 from gsl.training.law_back import law_back
@@ -62,7 +62,8 @@ def _side_by_side(
     steps, loaded = periods * substeps, load(data, some)
     state = ServoState(
         side_by_side(loaded.commands), side_by_side(zeros_in_lanes(MEMORY, n)), side_by_side(cube(REMEMBERED, 2, n)),
-        side_by_side(zeros_in_lanes(1, 1))[0], np.zeros(1, dtype=np.int64), side_by_side(zeros_in_lanes(3, HIDDEN)),
+        side_by_side(zeros_in_lanes(1, 1))[0], np.zeros(1, dtype=np.int64),
+        side_by_side(zeros_in_lanes(LAYERS, HIDDEN)),
     )  # fmt: skip
     told, slopes, sums = cube(periods, 2, n), zeros_in_lanes(periods, m), sums_in_lanes(n, len(to.last_bias))
     path = Path(
@@ -77,7 +78,7 @@ def _side_by_side(
         side_by_side(sums.second), side_by_side(sums.second_bias), side_by_side(sums.last),
         side_by_side(sums.last_bias),
     )  # fmt: skip
-    _back(ServoParameters(servos.rows.copy(), servos.law), path, side_by_side(slopes), step, substeps, by)
+    _back(ServoParameters(servos.rows.copy(), servos.weights), path, side_by_side(slopes), step, substeps, by)
     add_lanes(to, sums, len(some))
     return cost
 

@@ -6,12 +6,21 @@ import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.lanes import where
-from gsl.core.servo_law import HIDDEN, INPUTS, LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, ServoLaw, act
+from gsl.core.servo_law import FIRST, HIDDEN, INPUTS, LAG, LAGS, LAST, NOBODY, SECOND, SIGN, SPEED_UNIT
 from gsl.training.gradient import BY_DELAY, Gradient
 from gsl.training.replay_path import POSITION, Moment
 from gsl.training.servo_back import Adjoint, Work, slope_by_delay
 from gsl.worlds.servo import BRISTLE, wanted_torque
-from gsl.worlds.servo_state import DELAY, LAW_BENT, ServoParameters, ServoState
+from gsl.worlds.servo_state import (
+    DELAY,
+    GROUP,
+    LAG_SHARE,
+    LAW_BENT,
+    STIFFNESS,
+    TORQUE,
+    ServoParameters,
+    ServoState,
+)
 
 
 @compiled
@@ -28,21 +37,24 @@ def law_back(
         work: Scratch.
         to: Added to.
     """
-    rows, law, motion, before = servos.rows, servos.law, now.motion, now.memory
+    rows, motion, before = servos.rows, now.motion, now.memory
     inputs, moved, held, length = work.inputs, adjoint.moved, adjoint.held, now.step / now.period
     for i in range(motion.shape[1]):
-        if law.group[i] == NOBODY:
+        if rows[GROUP, i] == NOBODY:
             continue
         by_u, still = adjoint.wanted[i], 0.0 * adjoint.wanted[i]
         state.memory[LAW_BENT, i] = before[LAW_BENT, i]
         q = now.seen[POSITION, i]
         wanted_torque(servos, state, i, motion, still, q, still, now.elapsed, now.step, now.period)
-        adjoint.error[i] += _network_back(law, i, by_u, adjoint.output[i], state.layers, inputs, work.hidden, to)
+        drive, output, g = rows[TORQUE, i] * by_u, rows[TORQUE, i] * adjoint.output[i], int(rows[GROUP, i])
+        _network_back(servos.weights, g, drive, output, state.layers, inputs, work.hidden, to)
         for k in range(LAGS):
             start = (now.elapsed - rows[DELAY, i] - LAG * k) / now.period
             later = slope_by_delay(state.commands, i, start, length) / now.period
-            share = inputs[k] + law.torque[i] * by_u * law.lag[i, k]
-            to.numbers[BY_DELAY, i] += law.stiffness[i] * share * later
+            share = rows[STIFFNESS, i] * (inputs[k] + drive * rows[LAG_SHARE + k, i])
+            to.lag[i, k] += drive * state.layers[0, k]
+            to.numbers[BY_DELAY, i] += share * later
+            adjoint.error[i] += share
         moved[1, i] += inputs[LAGS] / SPEED_UNIT
         moved[1, i] += inputs[LAGS + 1] * SIGN * slope_of_act(SIGN * motion[1, i])
         bent = before[LAW_BENT, i] + now.step * motion[1, i]
@@ -52,48 +64,42 @@ def law_back(
 
 @compiled
 def _network_back(
-    law: ServoLaw, i: int, by_u: float, by_out: float, layers: np.ndarray, inputs: np.ndarray, hidden: np.ndarray,
-    to: Gradient,
-) -> float:  # fmt: skip
-    """Fill in the adjoints of the inputs, add to the gradient, and return the adjoint of the control error.
+    weights: np.ndarray, g: int, drive: float, output: float, layers: np.ndarray, inputs: np.ndarray,
+    hidden: np.ndarray, to: Gradient,
+) -> None:  # fmt: skip
+    """Fill in the adjoints of group g's inputs and add to the gradient.
 
     Args:
-        law: Of all motors.
-        i: Motor.
-        by_u: Adjoint of its torque before the limit.
-        by_out: Adjoint of its torque behind it.
-        layers: What it saw and its hidden layers before activation, shape (3, HIDDEN).
+        weights: From `servo_law.weights`.
+        g: Group.
+        drive: Adjoint of what the network adds before the limit.
+        output: Adjoint of what it adds behind it.
+        layers: See `servo_law.network`.
         inputs: Result, shape (HIDDEN,).
         hidden: Scratch, shape (2, HIDDEN).
         to: Added to.
     """
-    g, drive, output = law.group[i], law.torque[i] * by_u, law.torque[i] * by_out
     to.last_bias[g, 0] += drive
     to.last_bias[g, 1] += output
     for h in range(HIDDEN):
-        x = act(layers[2, h])
-        to.last[g, h, 0] += drive * x
-        to.last[g, h, 1] += output * x
-        hidden[1, h] = slope_of_act(layers[2, h]) * (law.last[g, h, 0] * drive + law.last[g, h, 1] * output)
+        to.last[g, h, 0] += drive * layers[4, h]
+        to.last[g, h, 1] += output * layers[4, h]
+        back = weights[g, LAST, h] * drive + weights[g, LAST + 1, h] * output
+        hidden[1, h] = slope_of_act(layers[2, h]) * back
         to.second_bias[g, h] += hidden[1, h]
     for k in range(HIDDEN):
-        x, back = act(layers[1, k]), 0.0 * drive
+        x, back = layers[3, k], 0.0 * drive
         for h in range(HIDDEN):
             to.second[g, k, h] += x * hidden[1, h]
-            back += law.second[g, k, h] * hidden[1, h]
+            back += weights[g, SECOND + k, h] * hidden[1, h]
         hidden[0, k] = slope_of_act(layers[1, k]) * back
         to.first_bias[g, k] += hidden[0, k]
-    by_error = 0.0 * drive
     for k in range(INPUTS):
         x, back = layers[0, k], 0.0 * drive
         for h in range(HIDDEN):
             to.first[g, k, h] += x * hidden[0, h]
-            back += law.first[g, k, h] * hidden[0, h]
-        if k < LAGS:
-            to.lag[i, k] += drive * x
-            by_error += law.stiffness[i] * (back + drive * law.lag[i, k])
+            back += weights[g, FIRST + k, h] * hidden[0, h]
         inputs[k] = back
-    return by_error
 
 
 @compiled

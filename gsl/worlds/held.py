@@ -15,7 +15,7 @@ from gsl.core.body import Robot, carrier
 from gsl.core.compiled import compiled
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
 from gsl.core.plant import Plant, Push
-from gsl.core.servo_law import HIDDEN
+from gsl.core.servo_law import HIDDEN, LAYERS
 from gsl.worlds.chain import COLUMNS, Chain, Pushed, accelerate, chain
 from gsl.worlds.encoder import REMEMBERED
 from gsl.worlds.pushes import acting
@@ -140,7 +140,7 @@ def _side_by_side(
     asked, since = zeros_in_lanes(periods + COMMANDS - 1, n), zeros_in_lanes(1, 1)
     _fill(windows, first, numbers, asked, since)
     commands, clock, steps = side_by_side(asked), side_by_side(since)[0], np.zeros(1, dtype=np.int64)
-    memory, layers = side_by_side(zeros_in_lanes(MEMORY, n)), side_by_side(zeros_in_lanes(3, HIDDEN))
+    memory, layers = side_by_side(zeros_in_lanes(MEMORY, n)), side_by_side(zeros_in_lanes(LAYERS, HIDDEN))
     history = side_by_side(zeros_in_lanes(REMEMBERED, 2 * n).reshape((REMEMBERED, 2, n, LANES)))
     settle(memory, history, motion, commands[periods], step)
     pushed = Pushed(pushes[:, 0].astype(np.int64), pushes[:, 6:].copy(), side_by_side(zeros_in_lanes(len(pushes), 3)))

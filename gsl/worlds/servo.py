@@ -22,7 +22,7 @@ import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.lanes import where
-from gsl.core.servo_law import LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, ServoLaw, act, correction
+from gsl.core.servo_law import LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, act, network
 from gsl.worlds.drive_train import limited, through_gear
 from gsl.worlds.encoder import REMEMBERED, seen
 from gsl.worlds.servo_state import (
@@ -36,8 +36,10 @@ from gsl.worlds.servo_state import (
     DUTY_LOSS,
     FADE,
     FRICTION,
+    GROUP,
     KD,
     KP,
+    LAG_SHARE,
     LAW_BENT,
     LIMIT,
     LOAD,
@@ -57,9 +59,11 @@ from gsl.worlds.servo_state import (
     SMOOTHED,
     SMOOTHING,
     SPEED,
+    STIFFNESS,
     STRIBECK,
     STRIBECK_VELOCITY,
     THROUGH,
+    TORQUE,
     UPPER,
     VISCOUS,
     ServoParameters,
@@ -146,29 +150,32 @@ def wanted_torque(
     elapsed: float, step: float, period: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the torque that motor i's servo wants and what a learned law adds at the output [N·m]."""
-    parameters, law = servos.rows, servos.law
+    parameters = servos.rows
     error -= min(parameters[DEADBAND, i], max(-parameters[DEADBAND, i], error))
     u, output = kept_gain(parameters, state, i, elapsed) * error - parameters[KD, i] * v, 0.0 * v
-    if law.group[i] != NOBODY:
+    if parameters[GROUP, i] != NOBODY:
         since = elapsed - parameters[DELAY, i]
         for k in range(LAGS):
             lagged = delayed(state.commands, i, (since - LAG * k) / period, step / period)
-            state.layers[0, k] = law.stiffness[i] * (lagged + parameters[OFFSET, i] - q)
-        drive, output = _learned(law, state.memory, i, motion[1, i], step, state.layers)
+            state.layers[0, k] = parameters[STIFFNESS, i] * (lagged + parameters[OFFSET, i] - q)
+        drive, output = _learned(parameters, servos.weights, state.memory, i, motion[1, i], step, state.layers)
         u += drive
     return u, output
 
 
 @compiled
 def _learned(
-    law: ServoLaw, memory: np.ndarray, i: int, v: float, step: float, layers: np.ndarray
+    parameters: np.ndarray, weights: np.ndarray, memory: np.ndarray, i: int, v: float, step: float, layers: np.ndarray
 ) -> tuple[float, float]:
     """Return what motor i's law adds before the torque limit and behind it [N·m], errors being in `layers` already."""
     memory[LAW_BENT, i] = min(BRISTLE, max(-BRISTLE, memory[LAW_BENT, i] + v * step))
     layers[0, LAGS] = v / SPEED_UNIT
     layers[0, LAGS + 1] = act(SIGN * v)
     layers[0, LAGS + 2] = memory[LAW_BENT, i] / BRISTLE
-    return correction(law, i, layers)
+    drive, output = network(weights, int(parameters[GROUP, i]), layers)
+    for k in range(LAGS):
+        drive += parameters[LAG_SHARE + k, i] * layers[0, k]
+    return parameters[TORQUE, i] * drive, parameters[TORQUE, i] * output
 
 
 @compiled

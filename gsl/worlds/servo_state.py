@@ -8,7 +8,7 @@ import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.plant import Servo
-from gsl.core.servo_law import HIDDEN, ServoLaw, no_law
+from gsl.core.servo_law import HIDDEN, LAYERS, ServoLaw, no_law, weights
 from gsl.worlds.drive_train import ROTOR_SHARE, STIFFEST
 from gsl.worlds.encoder import REMEMBERED, fill_history
 
@@ -17,17 +17,22 @@ COMMANDS = 16  # control periods of targets that are remembered: the longest del
 (
     KP, KD, LIMIT, NO_LOAD, COULOMB, VISCOUS, STRIBECK, STRIBECK_VELOCITY, LOAD, OUTPUT_ARMATURE, DELAY, SMOOTHING,
     QUANTUM, DEADBAND, PLAY, COMPLIANCE, SAG, DUTY_LOSS, FADE, OFFSET, SENSOR_DELAY, LOWER, UPPER, MOTOR_ENCODER,
-    PER_AMPERE, ROTOR,
-) = range(26)  # rows of the parameters  # fmt: skip
+    PER_AMPERE, ROTOR, GROUP, STIFFNESS, TORQUE, LAG_SHARE,
+) = range(30)  # rows of the parameters  # fmt: skip
 BENT, ROTOR_ANGLE, ROTOR_SPEED, SMOOTHED, SPEED, DRIVE, THROUGH, FRICTION, LAW_BENT = range(9)  # rows of the state
 MEMORY = 9  # how many these are
 
 
 class ServoParameters(NamedTuple):
-    """What never changes: rows of numbers, shape (26, n_motors), and the learned law."""
+    """What never changes; in few arrays, for every one that a compiled function passes on takes time.
+
+    Attributes:
+        rows: Of numbers, those of a learned law last: see `ServoLaw`; shape (LAG_SHARE + LAGS, n_motors).
+        weights: Of its networks, from `servo_law.weights`.
+    """
 
     rows: np.ndarray
-    law: ServoLaw
+    weights: np.ndarray
 
 
 class ServoState(NamedTuple):
@@ -41,7 +46,7 @@ class ServoState(NamedTuple):
         history: What the encoders measured at the last physics steps, see `encoder.seen`.
         clock: Time of the newest command since the episode began [s], shape (1,).
         steps: Number of physics steps so far, shape (1,).
-        layers: Scratch of the learned law, shape (3, HIDDEN).
+        layers: Scratch of the learned law, shape (LAYERS, HIDDEN).
     """
 
     commands: np.ndarray
@@ -60,6 +65,7 @@ def packed(servo: Servo, supply_voltage: float, law: ServoLaw | None = None) -> 
         supply_voltage: Of the common supply without load [V].
         law: What they do beyond their parameters.
     """
+    law = no_law(len(servo.kp)) if law is None else law
     two_masses = (servo.play > 0.0) | (servo.compliance >= STIFFEST)
     rotor = np.where(two_masses, ROTOR_SHARE * servo.armature, 0.0)
     rows = (
@@ -67,9 +73,9 @@ def packed(servo: Servo, supply_voltage: float, law: ServoLaw | None = None) -> 
         servo.stribeck_velocity, servo.load_friction, servo.armature - rotor, servo.delay, servo.smoothing,
         servo.quantum, servo.deadband, servo.play, servo.compliance, servo.supply_resistance / supply_voltage,
         servo.duty_loss, servo.fade, servo.offset, servo.sensor_delay, servo.lower_stop, servo.upper_stop,
-        servo.motor_encoder, 1.0 / servo.torque_constant, rotor,
+        servo.motor_encoder, 1.0 / servo.torque_constant, rotor, law.group, law.stiffness, law.torque, *law.lag.T,
     )  # fmt: skip
-    return ServoParameters(np.array(rows), no_law(len(servo.kp)) if law is None else law)
+    return ServoParameters(np.array(rows), weights(law))
 
 
 def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: float = 0.0) -> ServoState:
@@ -90,7 +96,7 @@ def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: fl
         history,
         np.array([clock]),
         np.zeros(1, dtype=np.int64),
-        np.zeros((3, HIDDEN)),
+        np.zeros((LAYERS, HIDDEN)),
     )
 
 
