@@ -34,6 +34,8 @@ class Replays:
     threads: int
     pool: Executor = field(repr=False, compare=False)
     model: ServoModel | None = None
+    calibrates = False
+    spread = 1.0
 
     @property
     def joints(self) -> int:
