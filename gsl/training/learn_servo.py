@@ -15,12 +15,14 @@ from gsl.diagnosis.records import Pieces, pieces
 from gsl.diagnosis.residual import Comparison
 from gsl.models.servo import ServoModel, neutral, without_group
 from gsl.training.frozen import freeze
+from gsl.training.servo_members import ITERATIONS, Member, further
 from gsl.training.servo_network import Progress, fit_network
 from gsl.training.servo_numbers import fit_numbers
 from gsl.worlds.held import Held, Windows, shares
 
 WARM_UP, SCORED = 0.1, 0.4  # of a window to fit [s]: short, so that errors stay small enough to be frozen
 WINDOWS = 160  # that are fitted, at most
+MOST = 300  # iterations of the networks' fit
 SAMPLES = 1000  # of a bootstrap over motions
 
 
@@ -49,6 +51,7 @@ class LearnedServo:
         worse: Groups whose law was dropped because it made held-out replays significantly worse.
         way: Of the optimisation.
         windows: How many were fitted, judged and tested.
+        further: Further members of an ensemble.
     """
 
     model: ServoModel
@@ -57,6 +60,7 @@ class LearnedServo:
     worse: tuple[str, ...]
     way: tuple[Progress, ...]
     windows: tuple[int, int, int]
+    further: tuple[Member, ...] = ()
 
 
 def split(exp: Experiment, *, labelled: bool) -> Split:
@@ -75,7 +79,9 @@ def split(exp: Experiment, *, labelled: bool) -> Split:
     return Split(rest, judge, exp.held_out) if labelled else Split(exp.train, judge, rest)
 
 
-def learn_servo(exp: Experiment, plant: Plant, step: float, *, labelled: bool, seed: int, threads: int) -> LearnedServo:
+def learn_servo(
+    exp: Experiment, plant: Plant, step: float, *, labelled: bool, seed: int, threads: int, members: int = 1
+) -> LearnedServo:
     """Learn the servo of a log on top of a plant.
 
     Args:
@@ -85,6 +91,7 @@ def learn_servo(exp: Experiment, plant: Plant, step: float, *, labelled: bool, s
         labelled: Whether the held-out motions were chosen by labels.
         seed: Of the first weights.
         threads: That replay side by side.
+        members: Of an ensemble, the servo included.
     """
     parts, start = split(exp, labelled=labelled), neutral(plant, np.random.default_rng(seed))
     fitted = _fitted_windows(exp, parts)
@@ -104,19 +111,34 @@ def learn_servo(exp: Experiment, plant: Plant, step: float, *, labelled: bool, s
             return _level(residuals(model, parts.judge), exp.comparison)
 
         plain = Comparison(floor, np.zeros(len(floor), dtype=bool), np.zeros(len(floor)))
-        model = fit_numbers(plant, start, lambda one: plain.residual(replay(one, fitted), fitted))
+        numbers = fit_numbers(plant, start, lambda one: plain.residual(replay(one, fitted), fitted))
         data = freeze(plant, fitted, floor, exp.period)
-        model, way = fit_network(
-            plant, model, data, np.arange(len(fitted)), step, exp.period, judge=level, threads=threads
-        )
+
+        def fit(begun: ServoModel, some: np.ndarray, iterations: int) -> tuple[ServoModel, list[Progress]]:
+            return fit_network(
+                plant, begun, data, some, step, exp.period, judge=level, iterations=iterations, threads=threads
+            )
+
+        model, way = fit(numbers, np.arange(len(fitted)), MOST)
         before = residuals(start, parts.test)
         worse = _worse(exp, parts.test, before, residuals(model, parts.test), model)
         for name in worse:
             model = without_group(model, name)
         after = residuals(model, parts.test)
+        others = further(
+            members - 1,
+            numbers,
+            worse,
+            lambda begun, some: fit(begun, some, ITERATIONS)[0],
+            lambda one: _level(residuals(one, parts.test), exp.comparison),
+            plant=plant,
+            samples=fitted.samples,
+            seed=seed,
+        )
+        more = tuple(others)
     sizes = len(fitted), len(parts.judge), len(parts.test)
     gaps = [_by_group(z, exp.comparison, model) for z in (before, after)]
-    return LearnedServo(model, gaps[0], gaps[1], worse, tuple(way), sizes)
+    return LearnedServo(model, gaps[0], gaps[1], worse, tuple(way), sizes, more)
 
 
 def _fitted_windows(exp: Experiment, parts: Split) -> Pieces:
@@ -172,4 +194,5 @@ def document(learned: LearnedServo) -> dict[str, Any]:
         },
         "windows": {"fitted": fitted, "judged": judged, "tested": tested},
         "iterations": len(learned.way),
+        "members": [learned.after["all"], *(one.floors for one in learned.further)],
     }
