@@ -21,6 +21,7 @@ from gsl.diagnosis.residual import Comparison, loss
 from gsl.errors import InputError
 from gsl.models.servo import ServoModel, neutral, with_group, without_group
 from gsl.training.frozen import freeze
+from gsl.training.servo_members import ITERATIONS, Member, further
 from gsl.training.servo_network import Alike, Progress, fit_network
 from gsl.training.servo_numbers import fit_numbers
 from gsl.training.servo_replays import Replays
@@ -29,6 +30,7 @@ from gsl.worlds.servo_state import COMMANDS
 SHORT = (0.1, 0.4)  # warm-up and scored part of a window for a network [s]: errors stay small enough to be frozen
 LONG = (0.4, 1.6)  # the same for numbers: what a log does not show at first, such as friction's state, is forgotten
 WINDOWS = 160  # that are fitted, at most
+MOST = 200  # iterations of the network's fit
 SAMPLES = 1000  # of a bootstrap over motions
 CHANCE = 0.025  # of a bootstrap, on either side
 WORTH = 0.1  # of the cost that a network has to take: for less it is not let loose on motions that nobody has logged
@@ -61,6 +63,7 @@ class LearnedServo:
         worse: Groups whose law was dropped because it made held-out replays significantly worse.
         way: Of the optimisation.
         windows: How many were fitted, judged and tested.
+        further: Further members of an ensemble.
     """
 
     model: ServoModel
@@ -69,6 +72,7 @@ class LearnedServo:
     worse: tuple[str, ...]
     way: tuple[Progress, ...]
     windows: tuple[int, int, int]
+    further: tuple[Member, ...] = ()
 
 
 def split(exp: Experiment, *, labelled: bool) -> Split:
@@ -87,7 +91,9 @@ def split(exp: Experiment, *, labelled: bool) -> Split:
     return Split(rest, judge, exp.held_out) if labelled else Split(exp.train, judge, rest)
 
 
-def learn_servo(exp: Experiment, plant: Plant, step: float, *, labelled: bool, seed: int, threads: int) -> LearnedServo:
+def learn_servo(
+    exp: Experiment, plant: Plant, step: float, *, labelled: bool, seed: int, threads: int, members: int = 1
+) -> LearnedServo:
     """Learn the servo of a log on top of a plant.
 
     Args:
@@ -97,6 +103,7 @@ def learn_servo(exp: Experiment, plant: Plant, step: float, *, labelled: bool, s
         labelled: Whether the held-out motions were chosen by labels.
         seed: Of the first weights.
         threads: That replay side by side; the result does not depend on them.
+        members: Of an ensemble, the servo included.
 
     Raises:
         InputError: The log shows too little motion to learn from.
@@ -108,14 +115,19 @@ def learn_servo(exp: Experiment, plant: Plant, step: float, *, labelled: bool, s
         held = np.concatenate([parts.judge, parts.test])
         numbers = bench.kept(held, start, bench.numbers(parts.train), 0.5, 0.0)
         some = _windows(exp, parts.train, SHORT)
-        alike = [
-            Alike(known, freeze(known, some.chosen(index), bench.floor, exp.period))
-            for known, index in bench.replays.known(some)
-        ]
-        network, way = fit_network(
-            plant, numbers, alike, step, exp.period, pool,
-            judge=lambda model: bench.level(parts.judge, model), longest=bench.longest,
-        )  # fmt: skip
+
+        def fit(begun: ServoModel, index: np.ndarray, iterations: int) -> tuple[ServoModel, list[Progress]]:
+            chosen = some.chosen(index)
+            alike = [
+                Alike(known, freeze(known, chosen.chosen(part), bench.floor, exp.period))
+                for known, part in bench.replays.known(chosen)
+            ]
+            return fit_network(
+                plant, begun, alike, step, exp.period, pool,
+                judge=lambda model: bench.level(parts.judge, model), longest=bench.longest, iterations=iterations,
+            )  # fmt: skip
+
+        network, way = fit(numbers, np.arange(len(some)), MOST)
         model = bench.kept(held, numbers, network, 1.0 - CHANCE, WORTH)
         change = bench.change(parts.test, start, model)
         worse = tuple(name for name, share in change.items() if np.quantile(share, CHANCE) > 0.0)
@@ -124,9 +136,13 @@ def learn_servo(exp: Experiment, plant: Plant, step: float, *, labelled: bool, s
         levels = [bench.by_group(parts.test, one) for one in (start, model)]
         if not model.network["last"].any():
             model = _refitted(bench, model, worse)
-        return LearnedServo(
-            model, levels[0], levels[1], worse, tuple(way), (len(some), len(parts.judge), len(parts.test))
-        )
+        others = further(
+            members - 1, numbers, worse,
+            lambda begun, index: fit(begun, index, ITERATIONS)[0], lambda one: bench.level(parts.test, one),
+            plant=plant, samples=some.samples, seed=seed,
+        )  # fmt: skip
+        sizes = len(some), len(parts.judge), len(parts.test)
+        return LearnedServo(model, levels[0], levels[1], worse, tuple(way), sizes, tuple(others))
 
 
 def _refitted(bench: _Bench, model: ServoModel, worse: tuple[str, ...]) -> ServoModel:

@@ -85,6 +85,7 @@ class Engine:
     Args:
         plant: What to simulate.
         physics: How.
+        host: Another engine, whose client this one uses in turn with it; see `leave`.
 
     Attributes:
         bullet, client: The pybullet module and our client in it.
@@ -98,11 +99,12 @@ class Engine:
     links: Mapping[str, int]
     joints: Sequence[int]
 
-    def __init__(self, plant: Plant, physics: Physics) -> None:
+    def __init__(self, plant: Plant, physics: Physics, host: Engine | None = None) -> None:
         with quiet():
             import pybullet
 
-            self.bullet, self.client = pybullet, pybullet.connect(pybullet.DIRECT)
+            self.bullet, self.hosted = pybullet, host is not None
+            self.client: int = pybullet.connect(pybullet.DIRECT) if host is None else host.client
         self.body = NOTHING
         self.plant, self.physics, self.robot = plant, physics, lumped(plant.robot)
         self.handle = client_handle(pybullet.__file__, self.client)
@@ -123,9 +125,14 @@ class Engine:
             Path(self._folder.name, f"{name}.urdf").write_text(text)
 
     def close(self) -> None:
-        """Free the client and its files."""
-        self.bullet.disconnect(self.client)
+        """Free the client, if it is its own, and the files."""
+        if not self.hosted:
+            self.bullet.disconnect(self.client)
         self._folder.cleanup()
+
+    def leave(self) -> None:
+        """Leave the client to another engine; the next `load` resets it."""
+        self.body = NOTHING
 
     def load(
         self, reading: Reading, commands: np.ndarray, clock: float = 0.0, heights: np.ndarray | None = None
