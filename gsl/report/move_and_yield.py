@@ -21,7 +21,7 @@ MARKERS = {"stiffness": ("o", -APART), "strength": ("s", APART)}
 
 
 class Shares(NamedTuple):
-    """Compliance transferred in each trial: 0 as the simulator, 1 as the real robot, empty where nobody knows."""
+    """Share of the gap that is closed joint by joint in each trial, 1 at best; empty where nobody knows."""
 
     stiffness: Sequence[float]
     strength: Sequence[float]
@@ -41,7 +41,7 @@ def move_and_yield_figure(
 
     Args:
         moving: Worlds by name, in each the methods by name, from above: replay errors [deg].
-        yielding: The same methods' compliance transferred.
+        yielding: How much of the gap to the real robot's compliance the same methods close.
         group: Of joints, whose compliance it is.
     """
     most = max(len(methods) for methods in moving.values())
@@ -57,7 +57,7 @@ def move_and_yield_figure(
             right.tick_params(axis="y", length=0, labelleft=False)
         left, right = axes[-1]
         left.set_xlabel("joints off the real ones after 0.2 s [°]")
-        right.set_xlabel("compliance transferred (● stiffness, ■ strength)")
+        right.set_xlabel("share of the gap closed, joint by joint (● stiffness, ■ strength)")
         headline(whole, "Joints that move like the robot's need not yield like them; each trial a mark")
     return whole
 

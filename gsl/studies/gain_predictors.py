@@ -120,8 +120,8 @@ def predictors(rows: Sequence[Replay], trials: Sequence[Trial], seed: int) -> st
     count = sum(map(len, worlds.values()))
     about = (
         "Spearman's rank correlation over methods, within each real world; p is two-sided, by permuting the outcomes "
-        f"within worlds, uncorrected. {count} points ({named}), each a mean over trials. Compliance transferred "
-        "is the mean of 1 - |1 - share| over stiffness and strength of the legs, as far as simulator and robot differ."
+        f"within worlds, uncorrected. {count} points ({named}), each a mean over trials. The figure of the legs "
+        "is the mean of what is closed joint by joint in stiffness and in strength, as far as these differ."
     )
     return f"{HEAD}\n\n{table(titles, shown)}\n{about}"
 

@@ -22,6 +22,9 @@ class Replay(NamedTuple):
         stiffness: Compliance transferred by group of joints: 0 as stiff as the simulator, 1 as the real robot, None
             where these two do not differ. None as a whole where nobody measured, as in trials of before.
         strength: The same of the load at which a joint gives way.
+        stiffness_closed: Share of the gap in stiffness and damping that is closed joint by joint: 1 at best, below 0
+            where it grew. Joints that go too far do not make up for others, as they do in `stiffness`.
+        strength_closed: The same of the load at which a joint gives way.
     """
 
     world: str
@@ -36,6 +39,8 @@ class Replay(NamedTuple):
     replays: int
     stiffness: Mapping[str, float | None] | None = None
     strength: Mapping[str, float | None] | None = None
+    stiffness_closed: Mapping[str, float | None] | None = None
+    strength_closed: Mapping[str, float | None] | None = None
 
     @property
     def contradiction(self) -> str:
@@ -46,15 +51,15 @@ class Replay(NamedTuple):
         shares = (self.unreached or 0.0, self.alpha or 0.0)
         if min(errors) < 0.0 or not all(0.0 <= share <= 1.0 for share in shares):
             return f"errors {errors}, unreached {self.unreached}, alpha {self.alpha}"
-        stiff, strong = (None if part is None else set(part) for part in (self.stiffness, self.strength))
-        return "" if stiff == strong else f"stiffness of {self.stiffness}, strength of {self.strength}"
+        parts = self.stiffness, self.strength, self.stiffness_closed, self.strength_closed
+        groups = [None if part is None else set(part) for part in parts]
+        return "" if all(part == groups[0] for part in groups) else f"shares of groups {groups}"
 
     def nearness(self, group: str) -> float | None:
-        """Return how nearly a group yields as the robot's, 1 at best; None where nothing differs or nobody measured.
+        """Return how nearly a group's joints yield as the robot's, 1 at best; None where nobody knows.
 
-        The mean over stiffness and strength, as far as they differ, of 1 - |1 - share|: a joint that yields too much is
-        as wrong as one that yields too little.
+        The mean of what is closed joint by joint in stiffness and strength, as far as simulator and robot differ.
         """
-        parts = [(part or {}).get(group) for part in (self.stiffness, self.strength)]
-        near = [1.0 - abs(1.0 - share) for share in parts if share is not None]
+        parts = [(part or {}).get(group) for part in (self.stiffness_closed, self.strength_closed)]
+        near = [share for share in parts if share is not None]
         return math.fsum(near) / len(near) if near else None

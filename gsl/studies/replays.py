@@ -152,8 +152,7 @@ class Replays:
             unreached=reach.share if reach else None,
             alpha=found.get("alpha"),
             replays=len(after[TICKS]),
-            stiffness=yielding.stiffness,
-            strength=yielding.strength,
+            **yielding._asdict(),
         )
 
     def tell(self, folder: Path, rows: Sequence[Replay], made: str) -> None:
@@ -165,8 +164,8 @@ class Replays:
         robot = self.iterate.sim.plant.robot if isinstance(self.iterate.sim, BulletWorld) else None
         colours = {name: method_colour(method) for name, method in self.methods.items()}
         shown = Shown(rows, tuple(self.worlds), colours, tuple(grouped(robot)) if robot else ())
-        files = [path for role, path in self.parents().items() if role.startswith("gains")]
-        foretold = predictors(rows, searched(files), self.iterate.seed) if files else ""
-        parts = [shown.table(), MEASURED, *shown.about(), sizes, made, *([foretold] if foretold else [])]
+        gains = known_parents(self.gains, TRIALS, "gains").values()
+        foretold = predictors(rows, searched(gains), self.iterate.seed)
+        parts = filter(None, (shown.table(), MEASURED, *shown.about(), sizes, foretold, made))
         (folder / TABLE).write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")
         shown.draw(folder / FIGURE)

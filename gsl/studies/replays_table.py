@@ -26,8 +26,9 @@ MEANS = {"after_a_tick": ".2f", "pitch": ".2f", "forward": ".1f"}
 QUANTITIES = ("stiffness", "strength")
 UNKNOWN, SAME = "-", "no gap"
 ABOUT = (
-    "Stiffness and strength: compliance transferred, 0 as the simulator, 1 as the real robot (least to most of "
-    'trials); "no gap" where these two do not differ, "-" where nobody measured. Stiffness is of a joint whose load '
+    "Stiffness and strength: compliance transferred, 0 as the simulator, 1 as the real robot; in brackets the share of "
+    "the gap that is closed joint by joint (of stiffness with phase), below 0 where it grew. "
+    '"no gap" where simulator and robot do not differ, "-" where nobody measured. Stiffness is of a joint whose load '
     "swings, strength the load at which it gives way, both in the air."
 )
 
@@ -53,7 +54,7 @@ class Shown:
         first, measured = next(iter(self.colours)), self._measured
         yielding = [(name, group) for name in QUANTITIES for group in self.groups if group in measured]
         titles = [*TITLES[:4], f"minus {first} (95 %, paired)", *TITLES[4:]]
-        titles += [f"{name}, {group}" for name, group in yielding]
+        titles += [f"{name}, {group} (joint by joint)" for name, group in yielding]
         return table(titles, [self._line(first, *cell, yielding) for cell in product(self.worlds, self.colours)])
 
     def about(self) -> list[str]:
@@ -89,8 +90,8 @@ class Shown:
         return [row for row in self.rows if (row.world, row.method) == (world, method)]
 
     def _shares(self, world: str, method: str, group: str) -> list[list[float]]:
-        """Return a group's shares of the trials that have them, by quantity."""
-        parts = ([getattr(row, name) for row in self._own(world, method)] for name in QUANTITIES)
+        """Return what is closed joint by joint in the trials that have it, by quantity."""
+        parts = ([getattr(row, f"{name}_closed") for row in self._own(world, method)] for name in QUANTITIES)
         return [[share for part in own if part is not None and (share := part.get(group)) is not None] for own in parts]
 
     def _line(self, first: str, world: str, method: str, yielding: Sequence[tuple[str, str]]) -> list[str]:
@@ -101,19 +102,18 @@ class Shown:
         means = [f"{np.mean([getattr(row, name) for row in own]):{form}}" for name, form in MEANS.items()]
         last = f"{np.mean(reach):.0f}{_few(len(reach), len(own))}" if reach else ""
         than = "" if method == first else told_difference(nearer, fine=True)
-        shares = [_share([getattr(row, name) for row in own], group) for name, group in yielding]
+        shares = [_share(own, name, group) for name, group in yielding]
         return [world, method, f"{joints.mean:.2f}", finely(joints), than, *means, last, *shares]
 
 
-def _share(parts: Sequence[Mapping[str, float | None] | None], group: str) -> str:
-    """Return the mean of a group's shares, and the least and the most."""
-    known = [part.get(group) for part in parts if part is not None]
-    shares = [share for share in known if share is not None]
-    if not shares:
+def _share(rows: Sequence[Replay], name: str, group: str) -> str:
+    """Return the means of a group's share and of what is closed joint by joint."""
+    known = [row for row in rows if getattr(row, name) is not None]
+    parts = [[getattr(row, of)[group] for row in known] for of in (name, f"{name}_closed")]
+    shares, closed = ([share for share in part if share is not None] for part in parts)
+    if not shares or not closed:
         return SAME if known else UNKNOWN
-    ends = [f"{value:.2f}" for value in (min(shares), max(shares))]
-    spread = f" ({ends[0]} to {ends[1]})" if ends[0] != ends[1] else ""
-    return f"{np.mean(shares):.2f}{spread}{_few(len(known), len(parts))}"
+    return f"{np.mean(shares):.2f} ({np.mean(closed):.2f}){_few(len(known), len(rows))}"
 
 
 def _few(some: int, among: int) -> str:

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from gsl.core.impedance import closed
 from gsl.core.seeds import derived_seed
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.stages.compliance import Compliance, measure
-from gsl.stages.compliance_report import SECTION, transferred
+from gsl.stages.compliance_report import RESOLUTION, SECTION, transferred
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.world import World
 
@@ -20,6 +21,15 @@ class Yielding(NamedTuple):
 
     stiffness: Mapping[str, float | None] | None = None
     strength: Mapping[str, float | None] | None = None
+    stiffness_closed: Mapping[str, float | None] | None = None
+    strength_closed: Mapping[str, float | None] | None = None
+
+
+def closed_strength(sim: Compliance, grounded: Compliance, real: Compliance, group: str) -> float | None:
+    """Return the share of a group's gap in strength that is closed joint by joint; None where there is none."""
+    where = sim.where(group)
+    before, after, robot = (place.torque[where] for place in (sim, grounded, real))
+    return closed(before, after, robot, RESOLUTION * before)
 
 
 @dataclass(frozen=True)
@@ -55,6 +65,8 @@ class Loads:
         return Yielding(
             {group: share.stiffness for group, share in shares.items()},
             {group: share.torque for group, share in shares.items()},
+            {group: share.impedance for group, share in shares.items()},
+            {group: closed_strength(sim, grounded, robot, group) for group in shares},
         )
 
     @property
