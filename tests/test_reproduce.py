@@ -301,7 +301,7 @@ def test_a_recipe_is_of_what_a_trial_comes_from(tmp_path: Path) -> None:
     assert first != recipe(world, gat, 2) and first != recipe(replace(world, step=0.001), gat, 1)
     search = CmaEs(candidates=4, generations=2)
     assert recipe(search, world) != recipe(replace(search, sigma=0.1), world)
-    idle = {"workers": 2, "preset_name": "quick", "first": 1, "diagnosis": "one"}
+    idle = {"workers": 2, "preset_name": "quick", "first": 1, "diagnosis": "one", "servo": "one/train_servo"}
     assert recipe({"_target_": "Stage", **idle}) == recipe({"_target_": "Stage"})
     assert all(recipe({"kwargs": {name: value}}) != recipe({"kwargs": {}}) for name, value in idle.items())
     assert recipe(ModelConfig()) != recipe(ModelConfig(covariance="full"))

@@ -113,7 +113,7 @@ def _share(rows: Sequence[Replay], name: str, group: str) -> str:
     shares, closed = ([share for share in part if share is not None] for part in parts)
     if not shares or not closed:
         return SAME if known else UNKNOWN
-    return f"{np.mean(shares):.2f} ({np.mean(closed):.2f}){_few(len(known), len(rows))}"
+    return f"{np.mean(shares):z.2f} ({np.mean(closed):z.2f}){_few(len(known), len(rows))}"
 
 
 def _few(some: int, among: int) -> str:
