@@ -8,7 +8,8 @@ import numpy as np
 from gsl.core.body import Joint, Link, Robot
 from gsl.core.plant import nominal
 from gsl.effects.effect import applied, built
-from gsl.worlds.servo import OUTPUT_ARMATURE, encoder_motion, first_state, packed, servo_torque
+from gsl.worlds.servo import encoder_motion, servo_torque
+from gsl.worlds.servo_state import OUTPUT_ARMATURE, first_state, packed
 
 STEP, PERIOD = 0.002, 0.02
 KP, KD, LIMIT, NO_LOAD, ARMATURE, REACH = 20.0, 1.0, 3.0, 7.0, 0.007, 2.0

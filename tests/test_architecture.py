@@ -10,12 +10,13 @@ import pytest
 
 HOUSE = Path(__file__).parents[1] / "gsl"
 COMPONENTS = ("robots", "worlds", "tasks", "policies", "models", "grounding", "optimizers")
-PARTS = ("core", "effects", *COMPONENTS, "diagnosis", "runner", "storage", "report")
+PARTS = ("core", "effects", *COMPONENTS, "diagnosis", "training", "runner", "storage", "report")
 MAY_IMPORT = {
     "core": (),
     "effects": ("core",),
     **{room: ("core", "effects", *COMPONENTS) for room in COMPONENTS},
     "diagnosis": ("core", "effects", *COMPONENTS),
+    "training": ("core", "effects", *COMPONENTS, "diagnosis"),
     "runner": ("core", "grounding"),
     "storage": ("core", "effects", *COMPONENTS, "runner"),
     "report": ("core", "effects", *COMPONENTS),

@@ -33,7 +33,7 @@ from gsl.policies.excitation import Excitation
 from gsl.robots.nao import nao
 from gsl.stages.blind_answer import BlindAnswer
 from gsl.worlds.held import Held, Windows
-from gsl.worlds.servo import COMMANDS
+from gsl.worlds.servo_state import COMMANDS
 
 PERIOD = 0.02
 TOY = (

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from learned_servos import EVERYTHING, lawful, some_law, with_fields
 
 from gsl.core.body import Robot, lumped
 from gsl.core.dynamics import forward_kinematics, jacobian, mass_matrix
@@ -13,7 +14,8 @@ from gsl.robots.nao import nao
 from gsl.worlds.chain import COLUMNS, Pushed, accelerate, chain, nothing
 from gsl.worlds.engine import Engine, Physics
 from gsl.worlds.held import Held, Windows
-from gsl.worlds.servo import COMMANDS, encoder_motion, first_state, servo_torque
+from gsl.worlds.servo import encoder_motion, servo_torque
+from gsl.worlds.servo_state import COMMANDS, first_state
 from gsl.worlds.start import resting
 
 PERIOD, STEP = 0.02, 0.002
@@ -66,6 +68,13 @@ def test_it_is_pinned_to_bullet(fields: dict[str, float]) -> None:
     plant = nominal(robot).with_servo(**{name: np.full(len(robot.motors), value) for name, value in fields.items()})
     targets = sweep(robot, 150)
     fine = 0.5 * STEP  # at 2 ms rotors that links carry make the nominal damping chatter
+    difference = Held.of(plant, fine, PERIOD).replay(window(targets))[0] - in_bullet(plant, targets, fine)
+    assert np.sqrt(np.mean(difference**2)) < 1e-6 and np.abs(difference).max() < 1e-5
+
+
+def test_a_learned_law_acts_as_in_bullet() -> None:
+    plant, fine = nominal(with_heavy_links(NAO)), 0.5 * STEP
+    plant, targets = lawful(plant, some_law(plant)), sweep(NAO, 150)
     difference = Held.of(plant, fine, PERIOD).replay(window(targets))[0] - in_bullet(plant, targets, fine)
     assert np.sqrt(np.mean(difference**2)) < 1e-6 and np.abs(difference).max() < 1e-5
 
@@ -156,16 +165,14 @@ def test_what_diverges_is_not_a_number_and_disturbs_no_other_window() -> None:
     np.testing.assert_array_equal(told[[0, 2]], np.repeat(held.replay(calm), 2, axis=0))
 
 
+@pytest.mark.parametrize("learned", [False, True])
 @pytest.mark.parametrize("count", [1, 2 * LANES - 3])
-def test_lanes_have_the_bits_of_one_robot_alone(count: int) -> None:
-    """Against the same kernel with floats, with all that a servo can have."""
+def test_lanes_have_the_bits_of_one_robot_alone(count: int, learned: bool) -> None:
+    """Against the same kernel with floats, with all that a servo can have, a law included."""
     rng, n = np.random.default_rng(3), len(NAO.motors)
-    given = {
-        "smoothing": 0.01, "play": 0.01, "compliance": 0.01, "delay": 0.013, "sensor_delay": 0.005, "quantum": 0.001,
-        "coulomb": 0.05, "stribeck": 0.05, "load_friction": 0.05, "duty_loss": 0.1, "fade": 0.1, "deadband": 0.002,
-        "supply_resistance": 0.2, "viscous": 0.01, "lower_stop": -0.3, "upper_stop": 0.3, "motor_encoder": 1.0,
-    }  # fmt: skip
-    plant = nominal(NAO).with_servo(**{name: np.full(n, value) for name, value in given.items()})
+    plant = with_fields(NAO, EVERYTHING)
+    if learned:
+        plant = lawful(plant, some_law(plant))
     many = [window(sweep(NAO, 20) + 0.1 * rng.standard_normal(n)) for _ in range(count)]
     held = Held.of(plant, STEP, PERIOD)
     told = held.replay(Windows(*(np.concatenate(parts) for parts in zip(*many, strict=True))))

@@ -77,9 +77,9 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
             ["world=wrn"],
             "no world called wrn; did you mean worn? There is cliff_walking, cliff_walking_noisy, go2_in_air, "
             "gymnasium, half_cheetah, half_cheetah_noisy, hopper, hopper_heavy, ideal, inverted_pendulum, "
-            "inverted_pendulum_heavy, inverted_pendulum_noisy, nao_drawn_a, nao_drawn_b, nao_harsh, nao_ideal, "
-            "nao_motors, nao_motors_late, nao_uneven, nao_weak, nao_weak_uneven, nao_worn, plain, robot, so101, "
-            "so101_menagerie, urdf, walker2d, walker2d_heavy, worn, xl330_pendulum",
+            "inverted_pendulum_heavy, inverted_pendulum_noisy, learned, nao_drawn_a, nao_drawn_b, nao_harsh, "
+            "nao_ideal, nao_motors, nao_motors_late, nao_uneven, nao_weak, nao_weak_uneven, nao_worn, plain, robot, "
+            "so101, so101_menagerie, urdf, walker2d, walker2d_heavy, worn, xl330_pendulum",
         ),
         (
             ["experiment=lng"],
@@ -214,6 +214,7 @@ REPLAYING = ("diagnose", "identify", "cross_validate", "blind_make")  # logs, wi
 NEEDED = {  # what has no default
     "diagnose": ("real=logs",),
     "identify": ("real=logs",),
+    "train_servo": ("real=logs",),
     "cross_validate": ("real=logs", "by=kp"),
     "rehearse": ("request=asked",),
     "answer": ("request=asked",),
@@ -253,7 +254,7 @@ def _choices() -> Iterator[tuple[str, ...]]:
         mine = (f"robot={EXAMPLE}",) if world == "urdf" else ()
         yield "collect", f"world={world}", *(f"world.{one}" for one in mine), "task=excite"
         yield "diagnose", f"sim={world}", *(f"sim.{one}" for one in mine), "real=logs"
-    others = (one for one in sorted((conf / "world").glob("[!n]*.yaml")) if one.stem not in (*HELD, "robot"))
+    others = (one for one in sorted((conf / "world").glob("[!n]*.yaml")) if one.stem not in (*HELD, "robot", "learned"))
     for world in others:
         place = ("world.env_id=examples.cart:Cart",) if world.stem == "gymnasium" else ()
         policy = "action_table" if world.stem.startswith("cliff") else "mlp"

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from learned_servos import lawful, some_law
 
 from gsl.core.plant import nominal
 from gsl.effects.effect import applied, built
@@ -29,9 +30,11 @@ def moved(engine: Engine, handle: int, *, loaded: bool = False) -> np.ndarray:
     return np.array(seen)
 
 
+@pytest.mark.parametrize("learned", [False, True])
 @pytest.mark.parametrize("floating", [True, False])
-def test_compiled_and_python_agree_to_the_bit(floating: bool) -> None:
-    engine = Engine(nominal(nao()), Physics(0.002, 50, 0.02, floating=floating))
+def test_compiled_and_python_agree_to_the_bit(floating: bool, learned: bool) -> None:
+    plant = nominal(nao())
+    engine = Engine(lawful(plant, some_law(plant)) if learned else plant, Physics(0.002, 50, 0.02, floating=floating))
     if engine.handle == NO_HANDLE:
         pytest.skip("this build of pybullet does not tell where its clients are")
     compiled = moved(engine, engine.handle)

@@ -24,7 +24,7 @@ from gsl.diagnosis.world_file import diagnosed_effects
 from gsl.effects.effect import applied, built
 from gsl.report.diagnosis_text import summary_lines
 from gsl.worlds.held import Held, Windows
-from gsl.worlds.servo import COMMANDS
+from gsl.worlds.servo_state import COMMANDS
 
 PERIOD, NOISE = 0.02, 0.0015
 WIDE = {"servo_gain": {"kp": (0.004, 1.5), "kd": (0.03, 1.5)}}

@@ -20,7 +20,7 @@ from gsl.storage.trajectories import read, write
 from gsl.worlds.external import ExternalRobot
 
 STEADY = (*SMALL, "accept=true", "recipe.spread=0.02")  # no neighbour falls
-LOOP = ("iterate", *STEADY, "real=robot")
+LOOP = ("iterate", *STEADY, "grounding=gat", "real=robot")
 FIRST = "runs/loop/iteration_01"
 
 
@@ -44,7 +44,7 @@ def _rehearsed(*words: str, folder: Path, tape: bool = False) -> list[str]:
 @pytest.fixture(scope="module")
 def direct(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("direct")
-    done("iterate", *STEADY, "real=nao_worn", "name=loop", folder=folder)
+    done("iterate", *STEADY, "grounding=gat", "real=nao_worn", "name=loop", folder=folder)
     return folder
 
 

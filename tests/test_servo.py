@@ -5,7 +5,8 @@ import pytest
 
 from gsl.core.plant import Servo
 from gsl.worlds.drive_train import TOOTH_STIFFNESS
-from gsl.worlds.servo import BRISTLE, first_state, packed, servo_torque
+from gsl.worlds.servo import BRISTLE, servo_torque
+from gsl.worlds.servo_state import first_state, packed
 
 STEP, PERIOD = 0.002, 0.02
 INERTIA = 0.008  # of the joint's output in these tests [kg·m²]

@@ -15,7 +15,7 @@ from gsl.diagnosis.torque_width import held_out_widths
 from gsl.effects.effect import applied, built
 from gsl.robots.nao import nao
 from gsl.worlds.held import Held, Windows
-from gsl.worlds.servo import COMMANDS
+from gsl.worlds.servo_state import COMMANDS
 
 PERIOD, NOISE = 0.02, {"encoder_noise": {"sd": 3e-4}}
 

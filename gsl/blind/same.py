@@ -10,22 +10,13 @@ import numpy as np
 from gsl.blind.extras import extra_rows, extra_torque
 from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
-from gsl.core.servo_law import HIDDEN
+from gsl.core.servo_law import HIDDEN, LAYERS
 from gsl.effects.effect import applied, built
 from gsl.worlds.chain import COLUMNS, Chain, accelerate, nothing
 from gsl.worlds.encoder import first_history
 from gsl.worlds.held import Held
-from gsl.worlds.servo import (
-    COMMANDS,
-    DRIVE,
-    MEMORY,
-    SMOOTHED,
-    SPEED,
-    ServoParameters,
-    ServoState,
-    encoder_motion,
-    servo_torque,
-)
+from gsl.worlds.servo import encoder_motion, servo_torque
+from gsl.worlds.servo_state import COMMANDS, DRIVE, MEMORY, SMOOTHED, SPEED, ServoParameters, ServoState
 
 STEP = 0.001  # physics period [s]
 SETTLE = 25  # control periods for which the first command is held before a motion begins
@@ -76,9 +67,8 @@ def _play(
     memory[1], memory[2], memory[SPEED], memory[SMOOTHED] = motion[0], motion[1], motion[1], commands[periods]
     history = first_history(motion, step)
     for t in range(periods):
-        state = ServoState(
-            commands[periods - 1 - t : periods - 1 - t + COMMANDS], memory, history, clock, steps, np.zeros((3, HIDDEN))
-        )
+        newest = commands[periods - 1 - t : periods - 1 - t + COMMANDS]
+        state = ServoState(newest, memory, history, clock, steps, np.zeros((LAYERS, HIDDEN)))
         for k in range(substeps):
             servo_torque(servo, state, motion, k * step, step, substeps * step, torque)
             extra_torque(rows, extras, rest, motion, memory[DRIVE], step, torque)

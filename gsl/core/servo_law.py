@@ -22,13 +22,17 @@ LAGS = 8  # targets that the law sees, the newest included: 70 ms, beyond what s
 LAG = 0.01  # from one of them to the next [s]
 HIDDEN = 16
 INPUTS = LAGS + 3
+LAYERS = 5  # rows of scratch: inputs, the two hidden layers before activation, and behind it
 SPEED_UNIT = 4.0  # [rad/s]: usual speeds of a joint are then about 1
 SIGN = 10.0  # [s/rad]: 0.1 rad/s is well in motion
 NOBODY = -1  # group of a joint without a law
+FIRST_BIAS, FIRST, SECOND_BIAS = 0, 1, 1 + INPUTS  # rows of the weights in one array: fewer arrays are passed on faster
+SECOND, LAST, LAST_BIAS = SECOND_BIAS + 1, SECOND_BIAS + 1 + HIDDEN, SECOND_BIAS + 3 + HIDDEN
+WEIGHTS = LAST_BIAS + 1  # how many these are
 
 
 class ServoLaw(NamedTuple):
-    """The law as the kernel reads it, for n motors in G groups that share their weights.
+    """The law of n motors in G groups that share their weights.
 
     Attributes:
         group: Of each motor, NOBODY where there is no law, shape (n,).
@@ -68,33 +72,38 @@ def act(z: float) -> float:
     return z * (27.0 + z * z) / (27.0 + 9.0 * z * z)
 
 
+def weights(law: ServoLaw) -> np.ndarray:
+    """Return the networks as the kernel reads them, shape (G, WEIGHTS, HIDDEN); the last layer lies in two rows."""
+    rows = np.zeros((len(law.first), WEIGHTS, HIDDEN))
+    rows[:, FIRST_BIAS], rows[:, FIRST:SECOND_BIAS] = law.first_bias, law.first
+    rows[:, SECOND_BIAS], rows[:, SECOND:LAST] = law.second_bias, law.second
+    rows[:, LAST:LAST_BIAS], rows[:, LAST_BIAS, :2] = law.last.transpose(0, 2, 1), law.last_bias
+    return rows
+
+
 @compiled
-def correction(law: ServoLaw, i: int, layers: np.ndarray) -> tuple[float, float]:
-    """Return the torques that motor i's law adds before the limit and behind it [N·m].
+def network(weights: np.ndarray, g: int, layers: np.ndarray) -> tuple[float, float]:
+    """Return what group g's network adds before the torque limit and behind it, in torque limits.
 
     Args:
-        law: Of all motors.
-        i: Motor.
-        layers: Row 0 holds the inputs x; rows 1 and 2 are scratch for the hidden layers; shape (3, HIDDEN).
+        weights: From `weights`.
+        g: Group.
+        layers: Row 0 holds the inputs; rows 1 and 2 become the hidden layers before activation, rows 3 and 4 behind it;
+            shape (LAYERS, HIDDEN).
     """
-    g, drive = law.group[i], 0.0 * layers[0, 0]
+    still = 0.0 * layers[0, 0]
     for h in range(HIDDEN):
-        layers[1, h] = law.first_bias[g, h] + 0.0 * drive
-        layers[2, h] = law.second_bias[g, h] + 0.0 * drive
-    for k in range(INPUTS):
-        x = layers[0, k]
-        for h in range(HIDDEN):
-            layers[1, h] += law.first[g, k, h] * x
+        z = weights[g, FIRST_BIAS, h] + still
+        for k in range(INPUTS):
+            z += weights[g, FIRST + k, h] * layers[0, k]
+        layers[1, h], layers[3, h] = z, act(z)
+    for h in range(HIDDEN):
+        z = weights[g, SECOND_BIAS, h] + still
+        for k in range(HIDDEN):
+            z += weights[g, SECOND + k, h] * layers[3, k]
+        layers[2, h], layers[4, h] = z, act(z)
+    drive, output = weights[g, LAST_BIAS, 0] + still, weights[g, LAST_BIAS, 1] + still
     for k in range(HIDDEN):
-        x = act(layers[1, k])
-        for h in range(HIDDEN):
-            layers[2, h] += law.second[g, k, h] * x
-    output = law.last_bias[g, 1] + 0.0 * drive
-    drive += law.last_bias[g, 0]
-    for k in range(HIDDEN):
-        x = act(layers[2, k])
-        drive += law.last[g, k, 0] * x
-        output += law.last[g, k, 1] * x
-    for k in range(LAGS):
-        drive += law.lag[i, k] * layers[0, k]
-    return law.torque[i] * drive, law.torque[i] * output
+        drive += weights[g, LAST, k] * layers[4, k]
+        output += weights[g, LAST + 1, k] * layers[4, k]
+    return drive, output

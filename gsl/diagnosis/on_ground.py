@@ -17,7 +17,7 @@ from gsl.diagnosis.records import OnGround, Pieces
 from gsl.diagnosis.replay import Effects
 from gsl.effects.effect import applied, built
 from gsl.worlds.engine import Engine, Physics, Reading
-from gsl.worlds.servo import COMMANDS
+from gsl.worlds.servo_state import COMMANDS
 from gsl.worlds.start import lowest_point
 
 HEIGHT = 1e-3  # error of a logged height [m]: estimate

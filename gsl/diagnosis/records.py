@@ -17,7 +17,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
 from gsl.errors import GslError
 from gsl.worlds.held import Windows
-from gsl.worlds.servo import COMMANDS
+from gsl.worlds.servo_state import COMMANDS
 
 BASE = ("base.x", "base.y", "base.z", "base.roll", "base.pitch", "base.yaw")
 LOADED = 3.0  # on a foot that stands [N]

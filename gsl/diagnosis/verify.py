@@ -11,7 +11,7 @@ from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.nuisance import calibrated
 from gsl.effects.effect import applied, built
 from gsl.worlds.engine import Engine, Physics
-from gsl.worlds.servo import COMMANDS
+from gsl.worlds.servo_state import COMMANDS
 from gsl.worlds.start import resting
 
 WINDOWS = 12  # held-out windows that are replayed

@@ -17,9 +17,13 @@ from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.effects.effect import together
 from gsl.errors import ConfigError
+from gsl.grounding.draws import UncertainCause, around
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding, GroundingRun
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.randomised import RandomisedEffects
+from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.ensemble import EnsembleWorld
 from gsl.worlds.world import World
 
 MANY = 6  # effects, more of which are counted and not named
@@ -38,6 +42,7 @@ class Diagnosis:
         simulated: The `effects:` of the simulator as it was.
         effects: What it lacks, its calibration included.
         before, after: The held-out gap without and with them, in noise floors; None where nobody measured.
+        uncertain: Causes with their probabilities and intervals, as far as it tells them.
     """
 
     verdict: str
@@ -48,6 +53,7 @@ class Diagnosis:
     effects: Mapping[str, Any]
     before: float | None = None
     after: float | None = None
+    uncertain: tuple[UncertainCause, ...] = ()
 
     @property
     def told(self) -> str:
@@ -78,6 +84,28 @@ class DiagnosedEffects:
     inner: Annotated[
         Grounding | ActionTransformation, setting("what stands between action and the diagnosed simulator")
     ] = field(default_factory=NoGrounding)
+    draws: Annotated[
+        bool, setting("each episode is in another simulator, drawn from the causes' probabilities and intervals")
+    ] = False
+
+    def __post_init__(self) -> None:
+        """Refuse to draw what nobody diagnosed, or twice.
+
+        Raises:
+            ConfigError: One of these.
+        """
+        if self.draws and (self.effects or self.method != "diagnose"):
+            problem = "are around a diagnosis; what was given or fitted at once has no intervals"
+            raise ConfigError("draws", problem, given="true")
+        if self.draws and isinstance(self.inner, RandomisedEffects):
+            raise ConfigError("draws", "and grounding.inner both draw simulators; take one", given="true")
+
+    def drawn(self, world: World, found: Diagnosis) -> World:
+        """Return the world with the effects as it is, or simulators around it if these were asked for."""
+        if not self.draws:
+            return world
+        assert isinstance(world, BulletWorld | EnsembleWorld), "only these are diagnosed"
+        return around(world, found.uncertain)
 
     def load(self, read: Callable[[str, str], Diagnosis]) -> Diagnosis:
         """Return the diagnosis; `read` finds one by its reference and method.

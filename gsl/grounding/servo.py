@@ -19,8 +19,11 @@ from gsl.grounding.ane import ActionNoise
 from gsl.grounding.grounding import Grounding, GroundingRun
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.torque_noise import with_torque_noise
-from gsl.models.servo_file import read_servo
+from gsl.models.servo_file import read_members, read_servo
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.ensemble import EnsembleWorld
+
+MEMBERS = 4  # of the ensemble that a chain learns: as many as rollouts that a candidate usually has at most
 
 
 @component
@@ -31,6 +34,7 @@ class LearnedServo:
     torque_noise: Annotated[
         float, setting("torque noise on top, in units of what held-out motions leave unexplained", ge=0)
     ] = 0.0
+    ensemble: Annotated[bool, setting("each episode is with another member of the servo, of several")] = False
     noise: Annotated[float, setting("action noise on top", unit="rad", ge=0)] = 0.0
 
     def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
@@ -41,8 +45,13 @@ class LearnedServo:
         """
         raise ConfigError("grounding", "its servo is not switched on; a stage that uses it has to do that")
 
-    def switched_on(self, world: Any) -> BulletWorld:
-        """Return the world with the learned servo.
+    @property
+    def members(self) -> int:
+        """How many members a chain learns."""
+        return MEMBERS if self.ensemble else 1
+
+    def switched_on(self, world: Any) -> BulletWorld | EnsembleWorld:
+        """Return the world with the learned servo, or with its members in turn.
 
         Raises:
             ConfigError: There is no servo, or the world cannot have one.
@@ -50,7 +59,14 @@ class LearnedServo:
         checked = self.check(world)
         if not self.servo:
             raise ConfigError("grounding.servo", "is missing; name a run of gsl train-servo")
-        return self.shaken(replace(checked, servo=self.servo))
+        first = self.shaken(replace(checked, servo=self.servo))
+        if not self.ensemble:
+            return first
+        count = len(read_members(self.servo).members)
+        if count == 1:
+            problem = f"{self.servo} has one member; gsl train-servo members={MEMBERS} makes more"
+            raise ConfigError("grounding.ensemble", problem, given="true")
+        return EnsembleWorld(first, tuple(replace(first, servo_member=k) for k in range(count)))
 
     def shaken(self, world: BulletWorld) -> BulletWorld:
         """Return a world with its learned servo and the torque noise that was asked for."""

@@ -14,7 +14,8 @@ from gsl.errors import ConfigError
 
 FACTORS = ("kp", "kd", "limit")  # numbers that are multiplied
 SUMS = ("delay", "coulomb", "viscous", "deadband", "armature", "offset")  # and those that are added to
-NUMBERS = (*FACTORS, *SUMS)
+LOSSES = ("load_friction", "duty_loss")  # and so are these, in replays alone: gradients leave them as they are
+NUMBERS = (*FACTORS, *SUMS, *LOSSES)
 LEAST_INERTIA = 0.2  # share of the rotor's inertia that is left: below it the joint is not stable at 2 ms
 
 
@@ -26,7 +27,8 @@ class ServoModel:
         robot: Name of the robot.
         joints: Its motors, in order.
         groups: Names of the groups.
-        numbers: Logarithms of FACTORS [-] and SUMS [s, N·m, N·m·s/rad, rad, kg·m², rad], by name, shape (n,) each.
+        numbers: Logarithms of FACTORS [-], SUMS [s, N·m, N·m·s/rad, rad, kg·m², rad] and LOSSES [-], by name, shape
+            (n,) each.
         lag: See `ServoLaw`, shape (n, LAGS).
         group: Of each motor, shape (n,).
         network: The other fields of `ServoLaw` by name.
@@ -48,7 +50,7 @@ class ServoModel:
         """Return a plant of the same robot whose servos are the learned ones."""
         servo, change = plant.servo, self.numbers
         fields = {name: getattr(servo, name) * np.exp(change[name]) for name in FACTORS}
-        fields |= {name: np.maximum(0.0, getattr(servo, name) + change[name]) for name in SUMS[:-2]}
+        fields |= {name: np.maximum(0.0, getattr(servo, name) + change[name]) for name in (*SUMS[:-2], *LOSSES)}
         least = LEAST_INERTIA * servo.armature
         fields |= {"armature": np.maximum(least, servo.armature + change["armature"])}
         fields |= {"offset": servo.offset + change["offset"]}
@@ -90,9 +92,14 @@ class ServoModel:
         each = change[:, plant.robot.drive] * np.array([units(plant)[name] for name in NUMBERS])
         return replace(self, numbers={name: self.numbers[name] + each[k] for k, name in enumerate(NUMBERS)})
 
+    def within(self, plant: Plant, longest: float) -> ServoModel:
+        """Return the model with delays that a simulator can remember, `longest` [s] in all."""
+        delay = np.minimum(self.numbers["delay"], longest - plant.servo.delay)
+        return replace(self, numbers={**self.numbers, "delay": delay})
+
 
 def units(plant: Plant) -> dict[str, np.ndarray]:
-    """Return what one unit of each number is, shape (n,): logarithms, [s], [N·m], [N·m·s/rad], [rad], [kg·m²], [rad].
+    """Return what one unit of each number is, shape (n,), in the units of `ServoModel.numbers`.
 
     About how far robots of one class are from their data sheets: see the ranges of the effects.
     """
@@ -100,7 +107,7 @@ def units(plant: Plant) -> dict[str, np.ndarray]:
     return {
         "kp": 0.2 * each, "kd": 0.3 * each, "limit": 0.1 * each, "delay": 0.01 * each, "coulomb": 0.05 * servo.limit,
         "viscous": 0.1 * servo.kd, "deadband": 0.003 * each, "armature": 0.3 * (servo.armature + 1e-3 * servo.kd),
-        "offset": 0.005 * each,
+        "offset": 0.005 * each, "load_friction": 0.1 * each, "duty_loss": 0.1 * each,
     }  # fmt: skip
 
 
@@ -136,6 +143,18 @@ def neutral(plant: Plant, rng: np.random.Generator) -> ServoModel:
         arrays,
         np.zeros((len(names), 2)),
     )
+
+
+def with_group(model: ServoModel, other: ServoModel, name: str) -> ServoModel:
+    """Return the model with the joints of a group as in another model of the same robot."""
+    g = model.groups.index(name)
+    own = model.group == g
+    numbers = {key: np.where(own, other.numbers[key], values) for key, values in model.numbers.items()}
+    network = {key: values.copy() for key, values in model.network.items()}
+    for key, values in network.items():
+        values[g] = other.network[key][g]
+    lag, group = np.where(own[:, None], other.lag, model.lag), np.where(own, other.group, model.group)
+    return replace(model, numbers=numbers, lag=lag, group=group, network=network)
 
 
 def without_group(model: ServoModel, name: str) -> ServoModel:

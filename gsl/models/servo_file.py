@@ -8,6 +8,7 @@ from pathlib import Path
 from gsl.core.checkpoint import read_checkpoint
 from gsl.errors import ArtifactError, ConfigError
 from gsl.models.servo import ServoModel
+from gsl.models.servo_members import ServoMembers
 
 FILE = "servo_model.safetensors"
 MAKER = "train_servo"
@@ -31,21 +32,26 @@ def servo_file(reference: str) -> Path:
     )
 
 
-def read_servo(reference: str) -> ServoModel:
-    """Read a learned servo.
+def read_servo(reference: str, member: int = 0) -> ServoModel:
+    """Read a learned servo, or another member of it than the first.
 
     Raises:
         ConfigError: There is none.
         ArtifactError: The file is damaged or of another kind or version.
     """
+    return read_members(reference).member(member, reference)
+
+
+def read_members(reference: str) -> ServoMembers:
+    """Read all members of a learned servo; errors as those of `read_servo`."""
     path = servo_file(reference)
     return _read(path, path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, changed: int) -> ServoModel:
+def _read(path: Path, changed: int) -> ServoMembers:
     arrays, about = read_checkpoint(path, kind=ServoModel.kind)
     try:
-        return ServoModel.from_arrays(arrays, about)
+        return ServoMembers.from_arrays(arrays, about)
     except (KeyError, ValueError, TypeError) as error:
         raise ArtifactError(path, f"is no learned servo of this version ({error}); train it again") from error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from gsl.report.markdown import table as markdown
 AS_IT_WAS, CALIBRATED, DIAGNOSED = "as it was", "calibrated", "diagnosed"
 SAID = {"unknown": " (suspected)", "inseparable": " (or another that the log cannot tell apart)"}
 GAT, DIAGNOSED_GAT = "GAT", "diagnosed + GAT"
+SERVO, DIAGNOSED_SERVO = "servo", "diagnosed + servo"
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class Fold:
         names: Of the held-out trajectories.
         errors: Mean absolute error of each of them in a whole replay [rad], by what replays it; NaN where it diverges
             or where the torque is never on.
+        servos: What servos that were learned say of themselves, by what replays with them.
     """
 
     values: Sequence[Any]
@@ -40,6 +42,7 @@ class Fold:
     ceiling: float | None
     names: Sequence[str]
     errors: Mapping[str, Sequence[float]]
+    servos: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def held_out(self) -> str:
@@ -75,7 +78,9 @@ def table(folds: Sequence[Fold], by: str) -> str:
     every = {way: np.concatenate([one.replayed[way] for one in folds]) for way in ways}
     rows.append(("all", *(_mean(every[way]) for way in ways), "", "", ""))
     below = "Mean absolute error of the joints in open-loop replays of whole trajectories that no fit has seen."
-    return "\n".join([markdown(columns, rows), below, *_lost(folds), *_compared(folds, every), ""])
+    return "\n".join(
+        [markdown(columns, rows), below, *_lost(folds), *_compared(folds, every), *_on_top(folds, every), ""]
+    )
 
 
 def _lost(folds: Sequence[Fold]) -> Iterator[str]:
@@ -95,10 +100,9 @@ def _compared(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterato
     after = every[DIAGNOSED]
     if not len(after):
         return
-    rival = min(
-        (way for way in every if way not in (DIAGNOSED, DIAGNOSED_GAT)), key=lambda way: float(np.mean(every[way]))
-    )
-    change = _change([one for one in folds if len(one.replayed[rival])], rival)
+    others = [way for way in every if way not in (DIAGNOSED, DIAGNOSED_GAT, DIAGNOSED_SERVO)]
+    rival = min(others, key=lambda way: float(np.mean(every[way])))
+    change = _change([one for one in folds if len(one.replayed[rival])], DIAGNOSED, rival)
     yield (
         f"The diagnosed simulator's mean error against the best of the others ({rival}): {100.0 * change.mean:+.0f} % "
         f"({100.0 * change.lower:+.0f} to {100.0 * change.upper:+.0f} %, bootstrap over folds and "
@@ -106,26 +110,41 @@ def _compared(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterato
     )
 
 
+def _on_top(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterator[str]:
+    """Tell what a learned servo does on top of the diagnosis."""
+    if DIAGNOSED_SERVO not in every or not len(every[DIAGNOSED]):
+        return
+    some = [one for one in folds if len(one.replayed[DIAGNOSED])]
+    change = _change(some, DIAGNOSED_SERVO, DIAGNOSED)
+    means = [[float(np.mean(one.replayed[way])) for way in (DIAGNOSED_SERVO, DIAGNOSED)] for one in some]
+    worse = [one.held_out for one, (after, before) in zip(some, means, strict=True) if after > before]
+    yield (
+        f"A learned servo on top changes the diagnosed simulator's mean error by {100.0 * change.mean:+.0f} % "
+        f"({100.0 * change.lower:+.0f} to {100.0 * change.upper:+.0f} %); folds that get worse: "
+        f"{'; '.join(worse) or 'none'}."
+    )
+
+
 def _mean(errors: np.ndarray) -> str:
     return f"{1e3 * np.mean(errors):.1f}" if len(errors) else "-"
 
 
-def _change(folds: Sequence[Fold], rival: str) -> Interval:
+def _change(folds: Sequence[Fold], way: str, rival: str) -> Interval:
     """Return the relative change of the mean error, with an interval over folds and the trajectories in them."""
     rng = np.random.default_rng(0)
 
     def drawn(index: np.ndarray) -> float:
-        errors = {way: [np.asarray(folds[k].replayed[way]) for k in index] for way in (rival, DIAGNOSED)}
+        errors = {one: [np.asarray(folds[k].replayed[one]) for k in index] for one in (rival, way)}
         again = [rng.integers(len(one), size=len(one)) for one in errors[rival]]
         after, before = (
-            np.mean(np.concatenate([one[chosen] for one, chosen in zip(errors[way], again, strict=True)]))
-            for way in (DIAGNOSED, rival)
+            np.mean(np.concatenate([one[chosen] for one, chosen in zip(errors[name], again, strict=True)]))
+            for name in (way, rival)
         )
         return float(after / before) - 1.0
 
-    every = {way: np.mean(np.concatenate([one.replayed[way] for one in folds])) for way in (rival, DIAGNOSED)}
+    every = {one: np.mean(np.concatenate([fold.replayed[one] for fold in folds])) for one in (rival, way)}
     found = bootstrap_interval(drawn, len(folds), np.random.default_rng(0))
-    return found._replace(mean=float(every[DIAGNOSED] / every[rival]) - 1.0)
+    return found._replace(mean=float(every[way] / every[rival]) - 1.0)
 
 
 def _percent(share: float | None) -> str:

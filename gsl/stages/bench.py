@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from gsl.core.described import described
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.grounding.none import NoGrounding
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.bench_loop import loops, untrained
+from gsl.stages.bench_loop import LearnedWorld, loops, untrained
 from gsl.stages.population import Job, trajectories
 from gsl.stages.rollout import Scenario
 from gsl.storage.trajectories import write
@@ -29,6 +30,7 @@ from gsl.worlds.bullet import BulletWorld
 FIGURES: Mapping[str, tuple[str, float | None]] = {
     "loop_ratio": ("control loop / bare physics steps", 1.30),
     "loop_ratio_grounded": ("the same with an MLP grounding", 1.35),
+    "loop_ratio_servo": ("the same with a learned servo", 1.40),
     "worker_inflation": ("rollouts in 2 processes / in one", 1.05),
     "reload_share": ("reload / rollout", 0.01),
     "io_share": ("writing trajectories / making them", 0.01),
@@ -54,16 +56,20 @@ def run_bench(console: Any) -> None:
 
 def measured(console: Any) -> dict[str, float]:
     """Return all figures by name."""
-    scenario = Scenario(BulletWorld(robot="nao", effects={}), Walk(), WalkEngine(), SIM, NoGrounding())
+    world = BulletWorld(robot="nao", effects={})
+    scenario = Scenario(world, Walk(), WalkEngine(), SIM, NoGrounding())
     console.status("control loops without grounding")
     bare = loops(scenario, REPEATS)
     console.status("control loops with an MLP grounding")
     grounded = loops(untrained(scenario), REPEATS)
+    console.status("control loops with a learned servo")
+    learned = loops(replace(scenario, world=LearnedWorld(world)), REPEATS)
     console.status(f"{ROLLOUTS} rollouts in one process and in {WORKERS}")
     inflation, seconds, made = _workers(scenario, console)
     return {
         "loop_ratio": bare.ratio,
         "loop_ratio_grounded": grounded.ratio,
+        "loop_ratio_servo": learned.ratio,
         "worker_inflation": inflation,
         "reload_share": bare.reload_seconds / bare.seconds,
         "io_share": _writing(scenario, made) / (EPISODES / ROLLOUTS * seconds),

@@ -5,20 +5,24 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from gsl.core.layout import Layout
+from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, ServoLaw
 from gsl.grounding.gat import LoadedTransformation
 from gsl.models.config import ModelConfig
 from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Regression
 from gsl.models.network import Network
 from gsl.stages.rollout import Scenario, rollout
+from gsl.worlds.bullet import BulletEnv, BulletWorld
 
 THROUGH_PYBULLET = 0  # the handle of an engine that steps through pybullet, where single steps can be timed
+SMALL = 0.01  # weights of a law: less than a hundredth of a torque limit
 TRUST = 0.01  # alpha of the untrained grounding: π0 has to stay up
 
 
@@ -36,6 +40,26 @@ class LoopCost(NamedTuple):
     seconds: float
     reload_seconds: float
     step_us: float
+
+
+@dataclass(frozen=True)
+class LearnedWorld:
+    """A world whose servos have a law, of random weights so small that π0 stays up."""
+
+    world: BulletWorld
+
+    @property
+    def layout(self) -> Layout:
+        """That of the world."""
+        return self.world.layout
+
+    def make(self) -> BulletEnv:
+        """Build the environment."""
+        rng, servo, n = np.random.default_rng(0), self.world.plant.servo, len(self.world.plant.robot.motors)
+        shapes = (n, LAGS), (1, INPUTS, HIDDEN), (1, HIDDEN), (1, HIDDEN, HIDDEN), (1, HIDDEN), (1, HIDDEN, 2), (1, 2)
+        arrays = (SMALL * rng.standard_normal(shape) for shape in shapes)
+        law = ServoLaw(np.zeros(n, dtype=np.int64), servo.kp / servo.limit, servo.limit, *arrays)
+        return BulletEnv(self.world, replace(self.world.plant, law=law))
 
 
 class StepClock:

@@ -192,7 +192,7 @@ class Chain:
         inner = innermost(grounding)
         if isinstance(inner, LearnedServo):
             effects = grounding.load(read_diagnosis) if isinstance(grounding, DiagnosedEffects) else None
-            made = self.diagnosis.servo(self.real, self.sim, effects, home, **common)
+            made = self.diagnosis.servo(self.real, self.sim, effects, home, members=inner.members, **common)
             grounding = with_innermost(grounding, replace(inner, servo=str(made.folder)))
         return grounding
 

@@ -18,6 +18,7 @@ from gsl.grounding.none import NoGrounding
 from gsl.stages.compliance import Compliance, measure
 from gsl.storage.documents import write_json
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.ensemble import EnsembleWorld
 from gsl.worlds.world import World
 
 SECTION = "compliance"  # of the grounding's report and of metrics
@@ -148,12 +149,13 @@ def report_compliance(
 
     Args:
         plain: The simulator.
-        world: What the grounding has made of it.
+        world: What the grounding has made of it; of an ensemble what it is drawn around.
         grounding: What is left to do with the actions; ready to act.
         report: File to which it is added.
         console: Where it is shown.
         seed: Of all randomness.
     """
+    world = world.world if isinstance(world, EnsembleWorld) else world
     nothing = isinstance(grounding, NoGrounding | ActionNoise) and world == plain
     if nothing or not (isinstance(plain, BulletWorld) and isinstance(world, BulletWorld)):
         return {}

@@ -23,13 +23,24 @@ from gsl.diagnosis.options import Options
 from gsl.diagnosis.records import Record
 from gsl.diagnosis.shrinkage import ceiling, removed
 from gsl.diagnosis.whole import mean_errors
-from gsl.effects.effect import effect_class
+from gsl.effects.effect import applied, built, effect_class
 from gsl.errors import ConfigError, InputError
-from gsl.report.cross_validation import AS_IT_WAS, CALIBRATED, DIAGNOSED, DIAGNOSED_GAT, GAT, Fold, table
+from gsl.report.cross_validation import (
+    AS_IT_WAS,
+    CALIBRATED,
+    DIAGNOSED,
+    DIAGNOSED_GAT,
+    DIAGNOSED_SERVO,
+    GAT,
+    SERVO,
+    Fold,
+    table,
+)
 from gsl.stages.diagnosis_settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
 from gsl.stages.learned_replay import LearnedReplay, Simulated
 from gsl.stages.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
 from gsl.stages.population import Workers, threads
+from gsl.stages.servo_folds import servo_errors
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.velocity_motors import check_servos
@@ -46,7 +57,7 @@ class CrossValidate:
     A diagnosis checks its hypotheses on every second motion of what is left: right where values are repeats, such as
     dates, which make the floor. Where they are conditions that a cause shall hold for, such as gains, it checks them on
     the next value. Beside it stand the simulator as it was, calibrated, with some usual effects fitted alone, and with
-    a grounding by actions, which learns from the same trajectories, in front of it as it was and as it was diagnosed.
+    what learns from the same trajectories, on it as it was and as it was diagnosed: a grounding by actions, a servo.
     """
 
     kind: ClassVar[str] = "cross_validate"
@@ -65,6 +76,7 @@ class CrossValidate:
     gat: Annotated[
         LearnedReplay | None, setting("a grounding by actions that learns from the same logs; none leaves it out")
     ] = None
+    servo: Annotated[bool, setting("a learned servo beside the diagnosis and on top of it, from the same logs")] = False
     folds: Annotated[
         int | None, setting("groups that the values are held out in; none holds out one value after the other", ge=2)
     ] = None
@@ -152,6 +164,7 @@ class CrossValidate:
         after = found.simulator.told(chosen.effects, chosen.fit.nuisances, exp.pieces)
         causes = [chosen.names[one.index] for one in found.verdict.causes]
         console.status(f"{told}: {' '.join([found.verdict.word, *causes])}")
+        errors, servos = self._errors(found, _checked(exp))
         return Fold(
             values=values,
             verdict=found.verdict.word,
@@ -160,7 +173,8 @@ class CrossValidate:
             removed=removed(exp, *(exp.comparison.residual(one, exp.pieces) for one in (before, after)))[0],
             ceiling=ceiling(exp, before, seed=self.seed),
             names=[one.name for one in _checked(exp)],
-            errors=self._errors(found, _checked(exp)),
+            errors=errors,
+            servos=servos,
         )
 
     def _rest(self, log: Batch, values: list[Any]) -> Batch:
@@ -169,8 +183,8 @@ class CrossValidate:
         about = {**log.metadata, "episodes": [labels[k] for k in kept]}
         return replace(log, episodes=tuple(log.episodes[k] for k in kept), metadata=about)
 
-    def _errors(self, found: Findings, held: Sequence[Record]) -> dict[str, list[float]]:
-        """Return the mean absolute error of every held-out trajectory [rad], by what replays it."""
+    def _errors(self, found: Findings, held: Sequence[Record]) -> tuple[dict[str, list[float]], dict[str, Any]]:
+        """Return the mean absolute error of every held-out trajectory [rad] by what replays it, and what servos say."""
         n = len(found.experiment.joints)
         ways: dict[str, tuple[Mapping[str, Any], np.ndarray]] = {AS_IT_WAS: ({}, nuisance.none(n))}
         fits = {CALIBRATED: found.selection.none, _names(self.usual): _usual(found, self.usual)}
@@ -181,12 +195,18 @@ class CrossValidate:
             way: mean_errors(found.simulator, effects, nuisances, held, robot).mean(axis=1).tolist()
             for way, (effects, nuisances) in ways.items()
         }
-        if self.gat is None:
-            return errors
-        for name, way in ((GAT, AS_IT_WAS), (DIAGNOSED_GAT, DIAGNOSED)):
+        for name, way in ((GAT, AS_IT_WAS), (DIAGNOSED_GAT, DIAGNOSED)) if self.gat is not None else ():
+            assert self.gat is not None
             world = Simulated(self.sim, found.simulator, robot, *ways[way])
             errors[name] = self.gat.errors(world, found.experiment.records, held, self.seed)
-        return errors
+        servos: dict[str, Any] = {}
+        for name, way in ((SERVO, AS_IT_WAS), (DIAGNOSED_SERVO, DIAGNOSED)) if self.servo else ():
+            effects, nuisances = ways[way]
+            plant = nuisance.calibrated(applied(found.simulator.plant, built(effects)), nuisances)
+            errors[name], servos[name] = servo_errors(
+                found.experiment, plant, found.simulator.step, held, seed=self.seed, threads=threads(self.workers)
+            )
+        return errors, servos
 
 
 def _checked(exp: Experiment) -> list[Record]:

@@ -74,8 +74,9 @@ class DiagnosisPlan:
         return built(stage, home / method, console)
 
     def servo(
-        self, real: World, sim: World, effects: Diagnosis | None, home: Path, *, workers: int, seed: int, console: Any
-    ) -> Artifact:
+        self, real: World, sim: World, effects: Diagnosis | None, home: Path, *,
+        members: int = 1, workers: int, seed: int, console: Any,
+    ) -> Artifact:  # fmt: skip
         """Return the servo learned from an excitation of the real robot, on top of effects if there are any.
 
         Raises:
@@ -87,8 +88,9 @@ class DiagnosisPlan:
         check_servos(sim.motors)
         below = sim if effects is None else switched_on(sim, effects)
         assert isinstance(below, BulletWorld), "effects leave a world what it is"
-        stage = TrainServo(real=str(log.folder), sim=below, workers=workers, seed=seed)
-        return built(stage, home / (stage.kind if effects is None else f"{stage.kind}_on_effects"), console)
+        stage = TrainServo(real=str(log.folder), sim=below, members=members, workers=workers, seed=seed)
+        name = stage.kind if effects is None else f"{stage.kind}_on_effects"
+        return built(stage, home / (name if members == 1 else f"{name}_members"), console)
 
     def flown(self, real: World, home: Path, *, workers: int, seed: int, console: Any) -> Artifact:
         """Return the log of an excitation of the real robot in the air, built below `home`.

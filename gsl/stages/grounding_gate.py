@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -39,6 +40,8 @@ from gsl.storage.models import model_file, read_forward_model, read_inverse_mode
 from gsl.storage.references import resolve
 from gsl.storage.trajectories import read
 from gsl.tasks.task import SIM
+from gsl.worlds.ensemble import EnsembleWorld
+from gsl.worlds.world import World
 
 REPORT, FIGURE = "grounding.json", "grounding.png"
 
@@ -62,8 +65,10 @@ def settled(scenario: Scenario, found: Mapping[str, Any]) -> Scenario:
     """Return a scenario ready to act with what a search settled of its grounding (its metrics), without a check."""
     grounding = scenario.grounding
     if isinstance(grounding, DiagnosedEffects):
-        world = switched_on(scenario.world, grounding.load(read_diagnosis))
-        return settled(replace(scenario, world=world, grounding=grounding.inner), found)
+        diagnosis = grounding.load(read_diagnosis)
+        world = switched_on(scenario.world, diagnosis)
+        inside = settled(replace(scenario, world=world, grounding=grounding.inner), found)
+        return replace(inside, world=grounding.drawn(inside.world, diagnosis))
     if isinstance(grounding, ActionTransformation):
         chosen = replace(grounding, alpha=found["alpha"], x=tuple(found["x"])) if "x" in found else grounding
         return replace(scenario, grounding=chosen.load(read_forward_model, read_inverse_model))
@@ -140,12 +145,14 @@ class Gate:
     def _having_servo(self, scenario: Scenario, settings: LearnedServo) -> tuple[Scenario, Mapping[str, Any]]:
         """Switch a learned servo on, if it is near enough to the log that it was learned from."""
         ready = replace(scenario, world=settings.switched_on(scenario.world), grounding=settings.actions)
-        report = check_servo(settings.servo, ready, self.parameters, derived_seed(self.seed, "check"))
+        seed = derived_seed(self.seed, "check")
+        report = check_servo(settings.servo, ready, self.parameters, seed, ensemble=settings.ensemble)
         write_json(self.folder / REPORT, report)
         for line in report["remarks"]:
             self.console.status(f"warning: {line}")
         self._judge(report["problems"], "Log more motions, or learn on top of a diagnosis (grounding=effects_servo)")
         floors = {"floors_before": report["floors_before"], "floors_after": report["floors_after"]}
+        self._in_turn(ready.world)
         return ready, {"servo": floors, "grounding_acceptable": report["acceptable"]}
 
     def _diagnosed(self, scenario: Scenario, settings: DiagnosedEffects) -> tuple[Scenario, Mapping[str, Any]]:
@@ -155,13 +162,23 @@ class Gate:
         inside = replace(scenario, world=switched_on(scenario.world, found), grounding=settings.inner)
         about = {"effects": list(found.causes), "diagnosis": found.verdict}
         ready, checked = self.passed(inside)
-        if not isinstance(settings.inner, ActionTransformation | LearnedServo):
+        own = isinstance(settings.inner, ActionTransformation | LearnedServo)
+        report_file = self.folder / REPORT
+        before = json.loads(report_file.read_text(encoding="utf-8")) if own and report_file.exists() else {}
+        ready = replace(ready, world=settings.drawn(ready.world, found))
+        if settings.draws or not own:
             report = check_effects(found, ready, self.parameters, derived_seed(self.seed, "check"))
-            write_json(self.folder / REPORT, report)
+            write_json(report_file, {**before, "drawn": report} if own else report)
             passed = report["acceptable"] and checked.get("grounding_acceptable", True)
             checked = {**checked, "grounding_acceptable": passed}
             self._judge(report["problems"], "Diagnose again")
+        if settings.draws:
+            self._in_turn(ready.world)
         return ready, {**about, **checked}
+
+    def _in_turn(self, world: World) -> None:
+        if isinstance(world, EnsembleWorld):
+            self.console.status(f"every episode of the search is in one of {len(world.members)} simulators")
 
     def _transformed(self, scenario: Scenario, settings: ActionTransformation) -> tuple[Scenario, Mapping[str, Any]]:
         """Load models, settle alpha, and compare with held-out real trajectories."""

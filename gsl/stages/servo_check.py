@@ -9,11 +9,13 @@ import numpy as np
 from gsl.models.servo_file import MAKER
 from gsl.stages.grounding_check import pi0_in
 from gsl.stages.rollout import Scenario
-from gsl.stages.train_servo import problems, remarks
+from gsl.stages.train_servo import problems, problems_of_members, remarks
 from gsl.storage.references import load
 
 
-def check_servo(reference: str, scenario: Scenario, parameters: np.ndarray, seed: int) -> dict[str, Any]:
+def check_servo(
+    reference: str, scenario: Scenario, parameters: np.ndarray, seed: int, *, ensemble: bool = False
+) -> dict[str, Any]:
     """Return what is known of a learned servo, and why nothing should be optimised with it, if there is a reason.
 
     Args:
@@ -21,9 +23,10 @@ def check_servo(reference: str, scenario: Scenario, parameters: np.ndarray, seed
         scenario: With its world.
         parameters: Of π0, shape (n_parameters,).
         seed: Of all randomness.
+        ensemble: Whether all its members are used.
     """
     metrics, ran = load(reference, MAKER).metrics, pi0_in(scenario, parameters, seed)
-    found = problems(metrics)
+    found = problems(metrics) + (problems_of_members(metrics) if ensemble else [])
     if falls := sum(fell for _, fell in ran):
         found.append(f"π0 falls in {falls} of {len(ran)} episodes of the simulator with the learned servo")
     return {

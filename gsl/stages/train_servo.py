@@ -18,6 +18,7 @@ from gsl.diagnosis.torque_width import TorqueWidth, held_out_widths
 from gsl.errors import ConfigError, InputError
 from gsl.models.servo import ServoModel
 from gsl.models.servo_file import FILE
+from gsl.models.servo_members import ServoMembers
 from gsl.report.servo_curves import servo_curves
 from gsl.stages.diagnosis_settings import Tolerance
 from gsl.stages.logs import check_log, log_parents, on_ground, read_logs
@@ -48,6 +49,7 @@ class TrainServo:
     held_out: Annotated[
         Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
     ] = field(default_factory=dict)
+    members: Annotated[int, setting("of an ensemble; a further one takes a third of the time", ge=1, le=64)] = 1
     workers: Workers = -1
     seed: Annotated[int, setting("of the first weights", ge=0)] = 1
 
@@ -74,9 +76,18 @@ class TrainServo:
         console.status(f"learning the servo from {len(exp.records)} motions; a minute for a humanoid")
         count = threads(self.workers)
         labelled = bool(self.held_out)
-        learned = learn_servo(exp, self.sim.plant, self.sim.step, labelled=labelled, seed=self.seed, threads=count)
+        learned = learn_servo(
+            exp,
+            self.sim.plant,
+            self.sim.step,
+            labelled=labelled,
+            seed=self.seed,
+            threads=count,
+            members=self.members,
+        )
         model = replace(learned.model, noise=self._unexplained(exp, learned.model))
-        write_model(folder, model)
+        further = [replace(one.model, noise=model.noise) for one in learned.further]
+        write_model(folder, ServoMembers((model, *further)))
         self._write_world(folder, learned)
         servo_curves(folder / CURVES, self.sim.plant, model, self.sim.step, exp.period)
         told = document(learned)
@@ -112,6 +123,19 @@ def problems(metrics: Mapping[str, Any]) -> list[str]:
     if after > FARTHEST:
         return [f"held out, the learned servo is {after:.1f} noise floors from the log, more than {FARTHEST:g}"]
     return [f"held out, the gap is {after:.2f} noise floors, {before:.2f} without"] if after > before else []
+
+
+def problems_of_members(metrics: Mapping[str, Any]) -> list[str]:
+    """Return why nothing should be searched with all members of a learned servo, if there is a reason.
+
+    Args:
+        metrics: Of its artifact.
+    """
+    return [
+        f"held out, member {k} is {floors:.1f} noise floors from the log, more than {FARTHEST:g}"
+        for k, floors in enumerate(metrics["members"])
+        if k and floors > FARTHEST
+    ]
 
 
 def remarks(metrics: Mapping[str, Any]) -> list[str]:

@@ -14,6 +14,7 @@ from gsl.models.inverse import InverseModel, inverse_from
 from gsl.models.servo import ServoModel
 from gsl.models.servo_file import FILE as SERVO_FILE
 from gsl.models.servo_file import MAKER
+from gsl.models.servo_members import ServoMembers
 from gsl.models.states import NearestChoice, StateForward, StateInverse, state_inverse_from
 from gsl.storage.checkpoints import write_checkpoint
 from gsl.storage.references import resolve
@@ -28,7 +29,7 @@ AnyForward = Forward | StateForward | Counts
 AnyInverse = InverseModel | StateInverse | NearestChoice | Counts
 
 
-def write_model(folder: Path, model: AnyForward | AnyInverse | ServoModel) -> Path:
+def write_model(folder: Path, model: AnyForward | AnyInverse | ServoModel | ServoMembers) -> Path:
     """Write a model into a folder under the name of its kind and return the file."""
     about = model.description()
     path = folder / FILES[about["kind"]]

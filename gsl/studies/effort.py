@@ -31,6 +31,8 @@ FLOWN = {  # a second of motion in the air, on two cores [s]
     "identify": 2.0,
     "servo": 1.0,
     "servo_on_effects": 1.0,
+    "servo_members": 1.5,
+    "servo_on_effects_members": 1.5,
 }
 
 
@@ -82,9 +84,11 @@ def seconds(study: Compare, *, search: bool = True) -> float:
 def _flown(method: Grounding | ActionTransformation) -> tuple[str, ...]:
     """Return what a method makes of motions in the air."""
     diagnosed = (method.method,) if isinstance(method, DiagnosedEffects) and not method.effects else ()
-    if not isinstance(innermost(method), LearnedServo):
+    servo = innermost(method)
+    if not isinstance(servo, LearnedServo):
         return diagnosed
-    return (*diagnosed, "servo_on_effects" if isinstance(method, DiagnosedEffects) else "servo")
+    name = "servo_on_effects" if isinstance(method, DiagnosedEffects) else "servo"
+    return (*diagnosed, f"{name}_members" if servo.ensemble else name)
 
 
 def seconds_of_models(iterate: Iterate) -> float:

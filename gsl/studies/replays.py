@@ -101,7 +101,8 @@ class Replays:
     def _check(self) -> None:
         for name, grounding in self.methods.items():
             inner = innermost(grounding)
-            drawn = isinstance(inner, LearnedServo) and (inner.torque_noise or inner.noise)
+            drawn = isinstance(inner, LearnedServo) and (inner.torque_noise or inner.noise or inner.ensemble)
+            drawn = drawn or (isinstance(grounding, DiagnosedEffects) and grounding.draws)
             if drawn or not isinstance(inner, ActionTransformation | NoGrounding | LearnedServo):
                 raise ConfigError(f"methods.{name}", "is drawn anew each time; replays are of what is expected")
             check_trainable(self.iterate, f"methods.{name}", grounding)

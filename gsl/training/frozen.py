@@ -2,14 +2,41 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
 from gsl.diagnosis.records import Pieces
-from gsl.training.adjoint import Frozen
 from gsl.worlds.chain import COLUMNS, Chain, accelerate, chain, nothing
-from gsl.worlds.servo import ROTOR, packed
+from gsl.worlds.servo_state import ROTOR, packed
+
+
+class Frozen(NamedTuple):
+    """Windows of a log with their rigid-body terms; W windows, T control periods, n motors, of which m are logged.
+
+    Attributes:
+        commands: Motor targets, newest first [rad], shape (W, T + COMMANDS - 1, n).
+        motion: At the beginning [rad], [rad/s], shape (W, 2, n).
+        clock: Time since the episode began, at the beginning [s], shape (W,).
+        mobility: Inverse mass matrix in the middle of each period [1/(kg·m²)], shape (W, T, n, n).
+        free: Acceleration without torque, there [rad/s²], shape (W, T, n).
+        real: Measured after each period [rad], shape (W, T, m).
+        floor: Noise floor [rad], shape (m,).
+        bias: Of the logged positions [rad], shape (n,).
+        warm_up: Periods at the beginning that are not scored.
+    """
+
+    commands: np.ndarray
+    motion: np.ndarray
+    clock: np.ndarray
+    mobility: np.ndarray
+    free: np.ndarray
+    real: np.ndarray
+    floor: np.ndarray
+    bias: np.ndarray
+    warm_up: int
 
 
 def freeze(plant: Plant, pieces: Pieces, floor: np.ndarray, period: float) -> Frozen:
@@ -55,7 +82,10 @@ def _rigid_body(tree: Chain, position: np.ndarray, speed: np.ndarray, mobility: 
 
 
 def heavier(data: Frozen, inertia: np.ndarray) -> Frozen:
-    """Return the windows with more rotor inertia [kg·m²], shape (n,): (M + E)⁻¹ = (1 + M⁻¹ E)⁻¹ M⁻¹."""
+    """Return the windows with more inertia E that moves with the outputs [kg·m²], shape (n,).
+
+    (M + E)⁻¹ = (1 + M⁻¹ E)⁻¹ M⁻¹; of a rotor beyond play or a spring only a share moves with the output.
+    """
     if not inertia.any():
         return data
     factor = np.linalg.inv(np.eye(len(inertia)) + data.mobility * inertia)

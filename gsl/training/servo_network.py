@@ -1,9 +1,9 @@
-"""The second step of learning a servo: numbers of joints, lags and network, by L-BFGS with the adjoint's gradient."""
+"""The second step of learning a servo: numbers joint by joint, lags and network, by L-BFGS with adjoint gradients."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -14,9 +14,11 @@ from gsl.core.lanes import LANES
 from gsl.core.plant import Plant
 from gsl.core.servo_law import LAGS
 from gsl.models.servo import NETWORK, NUMBERS, ServoModel, shapes, units
-from gsl.training.adjoint import Frozen, Gradient, cost_and_gradient
-from gsl.training.frozen import heavier
-from gsl.worlds.servo import packed
+from gsl.training.adjoint import cost_and_gradient
+from gsl.training.frozen import Frozen, heavier
+from gsl.training.gradient import NUMBERS as SLOPES
+from gsl.training.gradient import Gradient
+from gsl.worlds.servo_state import OUTPUT_ARMATURE, packed
 
 ROBUST = 3.0  # residual beyond which one counts less and less [floors]
 RIDGE_LAG, RIDGE_WEIGHT = 1e-2, 1e-4  # of squares, in mean squares of a residual
@@ -30,18 +32,26 @@ class Progress(NamedTuple):
     level: float
 
 
+class Alike(NamedTuple):
+    """Windows whose records share what is known of them, and the plant under it."""
+
+    plant: Plant
+    data: Frozen
+
+
 class _Free:
     """What is free, as one vector: numbers of joints in units, a group's lags, the networks."""
 
-    def __init__(self, plant: Plant, model: ServoModel) -> None:
-        self.plant, self.model = plant, model
+    def __init__(self, plant: Plant, model: ServoModel, longest: float) -> None:
+        self.plant, self.model, self.longest = plant, model, longest
         self.joints, self.groups = len(plant.robot.controlled), len(model.groups)
-        self.sizes = (len(NUMBERS) * self.joints, self.groups * LAGS)
-        self.unit = np.array([units(plant)[name] for name in NUMBERS])
+        self.sizes = (SLOPES * self.joints, self.groups * LAGS)
+        self.unit = np.array([units(plant)[name] for name in NUMBERS[:SLOPES]])
         group = model.group[: self.joints]
         same = (group[:, None] == group[None, :]).astype(float)
         self.apart = np.eye(self.joints) - same / same.sum(axis=1, keepdims=True)
-        self.begun = np.array([model.numbers[name] for name in NUMBERS])[:, : self.joints] / self.unit[:, : self.joints]
+        numbers = np.array([model.numbers[name] for name in NUMBERS[:SLOPES]])
+        self.begun = numbers[:, : self.joints] / self.unit[:, : self.joints]
         lag = np.array([model.lag[model.group == g].mean(axis=0) for g in range(self.groups)])
         weights = [model.network[name].ravel() for name in NETWORK]
         self.start = np.concatenate([np.zeros(self.sizes[0]), lag.ravel(), *weights])
@@ -51,14 +61,16 @@ class _Free:
 
     def model_at(self, theta: np.ndarray) -> ServoModel:
         numbers, lag, weights = self.parts(theta)
-        moved, network, k = self.model.moved(self.plant, numbers.reshape(len(NUMBERS), -1)), {}, 0
+        change = np.zeros((len(NUMBERS), self.joints))
+        change[:SLOPES] = numbers.reshape(SLOPES, -1)
+        moved, network, k = self.model.moved(self.plant, change).within(self.plant, self.longest), {}, 0
         for name, shape in shapes(self.groups).items():
             size = int(np.prod(shape))
             network[name], k = weights[k : k + size].reshape(shape).copy(), k + size
         return replace(moved, lag=lag.reshape(self.groups, LAGS)[self.model.group], network=network)
 
     def gradient(self, to: Gradient) -> np.ndarray:
-        numbers = np.zeros((len(NUMBERS), self.joints))
+        numbers = np.zeros((SLOPES, self.joints))
         for motor, joint in enumerate(self.plant.robot.drive):
             numbers[:, joint] += to.numbers[:, motor] * self.unit[:, motor]
         lag = np.array([to.lag[self.model.group == g].sum(axis=0) for g in range(self.groups)])
@@ -76,60 +88,65 @@ class _Free:
 
 
 def fit_network(
-    plant: Plant, model: ServoModel, data: Frozen, some: np.ndarray, step: float, period: float, *,
-    judge: Callable[[ServoModel], float], iterations: int = 300, every: int = 10, patience: int = 6, threads: int = 1,
+    plant: Plant, model: ServoModel, windows: Sequence[Alike], step: float, period: float, pool: Executor, *,
+    judge: Callable[[ServoModel], float], longest: float = np.inf, iterations: int = 300, every: int = 10,
+    patience: int = 6,
 ) -> tuple[ServoModel, list[Progress]]:  # fmt: skip
     """Return the model fitted to some windows, as the judge likes it best on the way, and the way.
+
+    What lies side by side is always the same, and so is the order of sums: the number of threads changes no bit.
 
     Args:
         plant: The servo that the model stands on.
         model: Where to begin.
-        data: Windows, frozen for `plant`.
-        some: Those that are fitted, shape (k,).
+        windows: That are fitted, each kind frozen for its plant.
         step: Physics period [s].
         period: Control period [s].
+        pool: Threads that replay side by side.
         judge: Returns the level of a model on windows that are not fitted.
+        longest: Delay of the target that a simulator can remember [s].
         iterations: Of L-BFGS, at most.
         every: Iterations from one judgement to the next.
         patience: Judgements without a better one after which it ends.
-        threads: That replay side by side.
     """
-    free, scored = _Free(plant, model), data.real[0, data.warm_up :].size * len(some)
+    free, scored = _Free(plant, model, longest), sum(one.data.real[:, one.data.warm_up :].size for one in windows)
     best, way, costs = [(judge(model), model)], list[Progress](), [0.0]
-    size = -(-len(some) // (LANES * threads)) * LANES
-    blocks = [some[k : k + size] for k in range(0, len(some), size)]
+    lanes = [(k, np.arange(len(one.data.clock))) for k, one in enumerate(windows)]
+    blocks = [(k, index[at : at + LANES]) for k, index in lanes for at in range(0, len(index), LANES)]
 
-    with ThreadPoolExecutor(threads) as pool:
+    carried = [packed(one.plant.servo, one.plant.robot.supply_voltage).rows[OUTPUT_ARMATURE] for one in windows]
 
-        def value(theta: np.ndarray) -> tuple[float, np.ndarray]:
-            now = free.model_at(theta)
-            changed = now.on(plant)
-            servos = packed(changed.servo, changed.robot.supply_voltage, changed.law)
-            here = heavier(data, changed.servo.armature - plant.servo.armature)
+    def value(theta: np.ndarray) -> tuple[float, np.ndarray]:
+        now = free.model_at(theta)
+        changed = [now.on(one.plant) for one in windows]
+        servos = [packed(one.servo, one.robot.supply_voltage, one.law) for one in changed]
+        more = [own.rows[OUTPUT_ARMATURE] - before for own, before in zip(servos, carried, strict=True)]
+        here = [heavier(one.data, inertia) for one, inertia in zip(windows, more, strict=True)]
 
-            def of(block: np.ndarray) -> tuple[float, np.ndarray]:
-                to = Gradient(
-                    np.zeros_like(free.unit), np.zeros_like(now.lag), *map(np.zeros, shapes(free.groups).values())
-                )
-                return cost_and_gradient(servos, here, block, step, round(period / step), ROBUST, to), free.gradient(to)
+        def of(block: tuple[int, np.ndarray]) -> tuple[float, np.ndarray]:
+            kind, index = block
+            arrays = map(np.zeros, shapes(free.groups).values())
+            to = Gradient(np.zeros_like(free.unit), np.zeros_like(now.lag), *arrays)
+            cost = cost_and_gradient(servos[kind], here[kind], index, step, round(period / step), ROBUST, to)
+            return cost, free.gradient(to)
 
-            done = list(pool.map(of, blocks))
-            cost, slope = free.ridge(theta)
-            costs[0] = sum(one for one, _ in done) / scored
-            return costs[0] + cost, np.sum([one for _, one in done], axis=0) / scored + slope
+        done = list(pool.map(of, blocks))
+        cost, slope = free.ridge(theta)
+        costs[0] = sum(one for one, _ in done) / scored
+        return costs[0] + cost, np.sum([one for _, one in done], axis=0) / scored + slope
 
-        def watch(theta: np.ndarray) -> None:
-            way.append(Progress(costs[0], np.nan))
-            if len(way) % every:
-                return
-            now = free.model_at(theta)
-            level = judge(now)
-            way[-1] = Progress(costs[0], level)
-            if level < best[0][0]:
-                best[0] = level, now
-            elif np.argmin([np.inf if np.isnan(one.level) else one.level for one in way]) < len(way) - every * patience:
-                raise StopIteration
+    def watch(theta: np.ndarray) -> None:
+        way.append(Progress(costs[0], np.nan))
+        if len(way) % every:
+            return
+        now = free.model_at(theta)
+        level = judge(now)
+        way[-1] = Progress(costs[0], level)
+        if level < best[0][0]:
+            best[0] = level, now
+        elif np.argmin([np.inf if np.isnan(one.level) else one.level for one in way]) < len(way) - every * patience:
+            raise StopIteration
 
-        options = {"maxiter": iterations, "maxcor": 30, "maxfun": 2 * iterations}
-        minimize(value, free.start, jac=True, method="L-BFGS-B", callback=watch, options=options)
+    options = {"maxiter": iterations, "maxcor": 30, "maxfun": 2 * iterations}
+    minimize(value, free.start, jac=True, method="L-BFGS-B", callback=watch, options=options)
     return best[0][1], way

@@ -6,7 +6,7 @@ all groups, or for offsets all joints, at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -18,35 +18,41 @@ PROBE = 0.02  # of the finite differences, in units
 ROBUST = 3.0  # residual beyond which one counts less and less [floors]
 ROUNDS = 4  # in which the robust scale comes down to ROBUST
 STEPS = 8  # of each round, at most
-RIDGE = 0.02  # of a change by a unit, in residuals per sqrt(number of residuals)
+RIDGE = 0.02  # cost of a change by a unit, in residuals per sqrt(number of residuals)
 FAR = 100.0  # floors beyond which a residual is cut off before it sets a scale
 
 
-def fit_numbers(plant: Plant, model: ServoModel, residual: Callable[[Plant], np.ndarray]) -> ServoModel:
+def fit_numbers(
+    plant: Plant, model: ServoModel, residual: Callable[[ServoModel], np.ndarray], *,
+    free: Sequence[str] = NUMBERS, ridge: float = RIDGE, longest: float = np.inf,
+) -> ServoModel:  # fmt: skip
     """Return the model with the numbers that replay a log best.
 
     Args:
         plant: The servo that the model stands on.
         model: Where to begin.
-        residual: Of a plant's replays, in floors, shape (W, scored, n_joints); joints come first among the motors.
+        residual: Of a model's replays, in floors, shape (W, scored, n_joints); joints come first among the motors.
+        free: Names of the numbers that are fitted.
+        ridge: Cost of a change by a unit, in residuals per sqrt(number of residuals).
+        longest: Delay of the target that a simulator can remember [s].
     """
     joints = len(plant.robot.controlled)
-    columns = _columns(model.group[:joints])
+    columns = _columns(model.group[:joints], free)
 
     def numbers(x: np.ndarray) -> ServoModel:
-        return model.moved(plant, np.einsum("c,ckj->kj", x, columns))
+        return model.moved(plant, np.einsum("c,ckj->kj", x, columns)).within(plant, longest)
 
     def at(x: np.ndarray) -> np.ndarray:
-        return residual(numbers(x).on(plant)).reshape(-1, joints)
+        return residual(numbers(x)).reshape(-1, joints)
 
     x = np.zeros(len(columns))
-    ridge = RIDGE * np.sqrt(at(x).size) * np.eye(len(x))
+    pull = ridge * np.sqrt(at(x).size) * np.eye(len(x))
 
     def cost(x: np.ndarray) -> np.ndarray:
-        return np.r_[at(x).ravel(), ridge @ x]
+        return np.r_[at(x).ravel(), pull @ x]
 
     def jacobian(x: np.ndarray) -> np.ndarray:
-        return np.vstack([_slopes(at, x, columns), ridge])
+        return np.vstack([_slopes(at, x, columns), pull])
 
     for left in range(ROUNDS - 1, -1, -1):
         far = np.sqrt(np.mean(np.minimum(np.abs(at(x)), FAR) ** 2))
@@ -55,10 +61,12 @@ def fit_numbers(plant: Plant, model: ServoModel, residual: Callable[[Plant], np.
     return numbers(x)
 
 
-def _columns(group: np.ndarray) -> np.ndarray:
-    """Return what each free number moves, (n_free, NUMBERS, n_joints): joints of a group, or one's offset."""
+def _columns(group: np.ndarray, free: Sequence[str]) -> np.ndarray:
+    """Return which numbers each free one moves, shape (n_free, NUMBERS, n_joints): of a group, or a joint's offset."""
     rows = []
     for kind, name in enumerate(NUMBERS):
+        if name not in free:
+            continue
         masks = np.eye(len(group)) if name == "offset" else [group == g for g in np.unique(group)]
         for mask in masks:
             row = np.zeros((len(NUMBERS), len(group)))

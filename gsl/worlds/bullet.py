@@ -46,6 +46,7 @@ class BulletWorld:
     start_noise: Annotated[float, setting("standard deviation of the joints at the start", unit="rad", ge=0)] = 0.03
     settle: Annotated[float, setting("time the start posture is held before the episode", unit="s", ge=0)] = 0.5
     servo: Annotated[str | None, setting("learned servo that acts on top: a path or run of train-servo")] = None
+    servo_member: Annotated[int, setting("which member of the learned servo, the first is 0", ge=0)] = 0
     motors: Annotated[
         Motors, setting("what turns the joints: our servo by torque, or the engine's velocity motors")
     ] = "servo"
@@ -55,6 +56,8 @@ class BulletWorld:
         check_periods(self.step, self.period)
         check_plant(self.plant, self.step, self.period)
         check_base(self.plant.robot, floating=self.floating)
+        if self.servo_member and self.servo is None:
+            raise ConfigError("servo_member", "is of a learned servo; name one by servo", given=str(self.servo_member))
         if self.motors != "servo":
             check_motors(nominal(robot(self.robot)), built(self.effects))
             if self.servo is not None:
@@ -69,7 +72,9 @@ class BulletWorld:
     def plant(self) -> Plant:
         """The robot with its effects and its learned servo."""
         plant = applied(nominal(robot(self.robot)), built(self.effects))
-        return plant if self.servo is None else having_servo(plant, read_servo(self.servo), self.servo)
+        if self.servo is None:
+            return plant
+        return having_servo(plant, read_servo(self.servo, self.servo_member), self.servo)
 
     @property
     def layout(self) -> Layout:
@@ -90,12 +95,13 @@ class BulletEnv(gymnasium.Env):
     Args:
         world: Its configuration.
         plant: Another one of the same robot, such as a calibrated one; by default the world's.
+        host: An environment that was reset, whose Bullet client this one uses in turn with it; see `leave`.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  gymnasium's own name and type
 
-    def __init__(self, world: BulletWorld, plant: Plant | None = None) -> None:
-        self.world, self.layout = world, world.layout
+    def __init__(self, world: BulletWorld, plant: Plant | None = None, host: BulletEnv | None = None) -> None:
+        self.world, self.layout, self._host = world, world.layout, host
         self._plant = plant or world.plant
         self._robot = lumped(self._plant.robot)
         self._drive, self._n = self._robot.drive, len(self._robot.controlled)
@@ -125,7 +131,7 @@ class BulletEnv(gymnasium.Env):
             physics = Physics(
                 self.world.step, self.world.iterations, self.world.period, self.world.floating, self.world.motors
             )
-            self._engine = Engine(self._plant, physics)
+            self._engine = Engine(self._plant, physics, None if self._host is None else self._host._engine)
         before = 0 if options.get("start") else round(self.world.settle / self.world.period)
         surface = self._surface()
         self._middle = None if surface is None else start.reading.place[:2]
@@ -154,6 +160,11 @@ class BulletEnv(gymnasium.Env):
             raise GslError(f"the robot has come to the edge of the uneven ground ({REACH} m): shorten task.duration")
         fell = self.world.floating and (reading.up < FALLEN_TILT or reading.place[2] < self._robot.upright_height)
         return self._observe(reading), 0.0, bool(fell), False, {"fell": bool(fell)}
+
+    def leave(self) -> None:
+        """Leave the client to another environment that uses it, until the next reset."""
+        if self._engine is not None:
+            self._engine.leave()
 
     def close(self) -> None:
         """Free Bullet's client."""

@@ -15,7 +15,8 @@ from numba import carray  # type: ignore[attr-defined]
 from gsl.core.compiled import compiled
 from gsl.worlds import bullet_c as c
 from gsl.worlds.rotor import Rotors, compensation
-from gsl.worlds.servo import ServoParameters, ServoState, servo_torque
+from gsl.worlds.servo import servo_torque
+from gsl.worlds.servo_state import ServoParameters, ServoState
 
 
 class Drive(NamedTuple):

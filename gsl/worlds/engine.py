@@ -22,7 +22,8 @@ from gsl.worlds.control_period import Drive, first_memory, in_c, in_python, read
 from gsl.worlds.ground import PLANE, lay
 from gsl.worlds.pushes import aimed, apply_push, overlap
 from gsl.worlds.rotor import carried_inertia, rotors
-from gsl.worlds.servo import ROTOR, encoder_motion, first_state, packed
+from gsl.worlds.servo import encoder_motion
+from gsl.worlds.servo_state import ROTOR, first_state, packed
 from gsl.worlds.velocity_motors import Motors, VelocityMotors
 
 NOTHING = -1  # Bullet's number of a robot that is not loaded yet
@@ -84,6 +85,7 @@ class Engine:
     Args:
         plant: What to simulate.
         physics: How.
+        host: Another engine, whose client this one uses in turn with it; see `leave`.
 
     Attributes:
         bullet, client: The pybullet module and our client in it.
@@ -97,11 +99,12 @@ class Engine:
     links: Mapping[str, int]
     joints: Sequence[int]
 
-    def __init__(self, plant: Plant, physics: Physics) -> None:
+    def __init__(self, plant: Plant, physics: Physics, host: Engine | None = None) -> None:
         with quiet():
             import pybullet
 
-            self.bullet, self.client = pybullet, pybullet.connect(pybullet.DIRECT)
+            self.bullet, self.hosted = pybullet, host is not None
+            self.client: int = pybullet.connect(pybullet.DIRECT) if host is None else host.client
         self.body = NOTHING
         self.plant, self.physics, self.robot = plant, physics, lumped(plant.robot)
         self.handle = client_handle(pybullet.__file__, self.client)
@@ -122,9 +125,14 @@ class Engine:
             Path(self._folder.name, f"{name}.urdf").write_text(text)
 
     def close(self) -> None:
-        """Free the client and its files."""
-        self.bullet.disconnect(self.client)
+        """Free the client, if it is its own, and the files."""
+        if not self.hosted:
+            self.bullet.disconnect(self.client)
         self._folder.cleanup()
+
+    def leave(self) -> None:
+        """Leave the client to another engine; the next `load` resets it."""
+        self.body = NOTHING
 
     def load(
         self, reading: Reading, commands: np.ndarray, clock: float = 0.0, heights: np.ndarray | None = None

@@ -8,7 +8,7 @@ from gsl.core.body import Robot, lumped
 from gsl.core.plant import Plant
 from gsl.errors import ConfigError
 from gsl.worlds.encoder import REMEMBERED
-from gsl.worlds.servo import COMMANDS
+from gsl.worlds.servo_state import COMMANDS
 
 
 def check_periods(step: float, period: float) -> None:

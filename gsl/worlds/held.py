@@ -15,24 +15,12 @@ from gsl.core.body import Robot, carrier
 from gsl.core.compiled import compiled
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
 from gsl.core.plant import Plant, Push
-from gsl.core.servo_law import HIDDEN
+from gsl.core.servo_law import HIDDEN, LAYERS
 from gsl.worlds.chain import COLUMNS, Chain, Pushed, accelerate, chain
-from gsl.worlds.encoder import REMEMBERED, fill_history
+from gsl.worlds.encoder import REMEMBERED
 from gsl.worlds.pushes import acting
-from gsl.worlds.servo import (
-    COMMANDS,
-    MEMORY,
-    ROTOR,
-    ROTOR_ANGLE,
-    ROTOR_SPEED,
-    SMOOTHED,
-    SPEED,
-    ServoParameters,
-    ServoState,
-    encoder_motion,
-    packed,
-    servo_torque,
-)
+from gsl.worlds.servo import encoder_motion, servo_torque
+from gsl.worlds.servo_state import COMMANDS, MEMORY, ROTOR, ServoParameters, ServoState, packed, settle
 
 RUNAWAY = 1e3  # speed at which a replay has no meaning any more [rad/s]
 
@@ -152,9 +140,9 @@ def _side_by_side(
     asked, since = zeros_in_lanes(periods + COMMANDS - 1, n), zeros_in_lanes(1, 1)
     _fill(windows, first, numbers, asked, since)
     commands, clock, steps = side_by_side(asked), side_by_side(since)[0], np.zeros(1, dtype=np.int64)
-    memory, layers = side_by_side(zeros_in_lanes(MEMORY, n)), side_by_side(zeros_in_lanes(3, HIDDEN))
+    memory, layers = side_by_side(zeros_in_lanes(MEMORY, n)), side_by_side(zeros_in_lanes(LAYERS, HIDDEN))
     history = side_by_side(zeros_in_lanes(REMEMBERED, 2 * n).reshape((REMEMBERED, 2, n, LANES)))
-    _settle(memory, history, motion, commands[periods], step)
+    settle(memory, history, motion, commands[periods], step)
     pushed = Pushed(pushes[:, 0].astype(np.int64), pushes[:, 6:].copy(), side_by_side(zeros_in_lanes(len(pushes), 3)))
     torque, work = side_by_side(zeros_in_lanes(1, n))[0], side_by_side(zeros_in_lanes(n, COLUMNS))
     matrix = side_by_side(zeros_in_lanes(n, n))
@@ -189,15 +177,6 @@ def _fill(windows: Windows, first: int, motion: np.ndarray, commands: np.ndarray
                 motion[k, i, lane] = windows.motion[w, k, i]
             for k in range(len(commands)):
                 commands[k, i, lane] = windows.commands[w, k, i]
-
-
-@compiled
-def _settle(memory: np.ndarray, history: np.ndarray, motion: np.ndarray, target: np.ndarray, step: float) -> None:
-    """Fill in the state of settled servos, as `servo.first_state` does."""
-    for i in range(motion.shape[1]):
-        memory[ROTOR_ANGLE, i], memory[ROTOR_SPEED, i], memory[SPEED, i] = motion[0, i], motion[1, i], motion[1, i]
-        memory[SMOOTHED, i] = target[i]
-    fill_history(history, motion, step)
 
 
 @compiled

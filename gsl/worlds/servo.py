@@ -18,99 +18,60 @@ external torque being what the last physics step tells: armature · acceleration
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.lanes import where
-from gsl.core.plant import Servo
-from gsl.core.servo_law import HIDDEN, LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, ServoLaw, act, correction, no_law
-from gsl.worlds.drive_train import ROTOR_SHARE, STIFFEST, limited, through_gear
-from gsl.worlds.encoder import REMEMBERED, first_history, seen
+from gsl.core.servo_law import LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, act, network
+from gsl.worlds.drive_train import limited, through_gear
+from gsl.worlds.encoder import REMEMBERED, seen
+from gsl.worlds.servo_state import (
+    BENT,
+    COMMANDS,
+    COMPLIANCE,
+    COULOMB,
+    DEADBAND,
+    DELAY,
+    DRIVE,
+    DUTY_LOSS,
+    FADE,
+    FRICTION,
+    GROUP,
+    KD,
+    KP,
+    LAG_SHARE,
+    LAW_BENT,
+    LIMIT,
+    LOAD,
+    LOWER,
+    MOTOR_ENCODER,
+    NO_LOAD,
+    OFFSET,
+    OUTPUT_ARMATURE,
+    PER_AMPERE,
+    PLAY,
+    QUANTUM,
+    ROTOR,
+    ROTOR_ANGLE,
+    ROTOR_SPEED,
+    SAG,
+    SENSOR_DELAY,
+    SMOOTHED,
+    SMOOTHING,
+    SPEED,
+    STIFFNESS,
+    STRIBECK,
+    STRIBECK_VELOCITY,
+    THROUGH,
+    TORQUE,
+    UPPER,
+    VISCOUS,
+    ServoParameters,
+    ServoState,
+)
 
 BRISTLE = 1e-3  # deflection at which dry friction slips [rad]: below an encoder's noise, stable at 2 ms with our rotors
 STOP_STIFFNESS, STOP_DAMPING = 500.0, 2.0  # of a hard stop [N·m/rad], [N·m·s/rad]: stable at 2 ms with our rotors
-COMMANDS = 16  # control periods of targets that are remembered: the longest delay
-
-(
-    KP, KD, LIMIT, NO_LOAD, COULOMB, VISCOUS, STRIBECK, STRIBECK_VELOCITY, LOAD, OUTPUT_ARMATURE, DELAY, SMOOTHING,
-    QUANTUM, DEADBAND, PLAY, COMPLIANCE, SAG, DUTY_LOSS, FADE, OFFSET, SENSOR_DELAY, LOWER, UPPER, MOTOR_ENCODER,
-    PER_AMPERE, ROTOR,
-) = range(26)  # rows of the parameters  # fmt: skip
-BENT, ROTOR_ANGLE, ROTOR_SPEED, SMOOTHED, SPEED, DRIVE, THROUGH, FRICTION, LAW_BENT = range(9)  # rows of the state
-MEMORY = 9  # how many these are
-
-
-class ServoParameters(NamedTuple):
-    """What never changes: rows of numbers, shape (26, n_motors), and the learned law."""
-
-    rows: np.ndarray
-    law: ServoLaw
-
-
-class ServoState(NamedTuple):
-    """What changes in time, all of it in place.
-
-    Attributes:
-        commands: Targets of the last control periods, newest first [rad], shape (COMMANDS, n_motors).
-        memory: Bristle deflection [rad]; rotor angle [rad] and speed [rad/s] as seen at the output; filtered target
-            [rad]; at the last physics step: output speed [rad/s], motor torque, torque through the gear, friction
-            [N·m]; bristle of the learned law [rad]; shape (MEMORY, n_motors).
-        history: What the encoders measured at the last physics steps, see `encoder.seen`.
-        clock: Time of the newest command since the episode began [s], shape (1,).
-        steps: Number of physics steps so far, shape (1,).
-        layers: Scratch of the learned law, shape (3, HIDDEN).
-    """
-
-    commands: np.ndarray
-    memory: np.ndarray
-    history: np.ndarray
-    clock: np.ndarray
-    steps: np.ndarray
-    layers: np.ndarray
-
-
-def packed(servo: Servo, supply_voltage: float, law: ServoLaw | None = None) -> ServoParameters:
-    """Return the parameters as the kernel reads them.
-
-    Args:
-        servo: The servos.
-        supply_voltage: Of the common supply without load [V].
-        law: What they do beyond their parameters.
-    """
-    two_masses = (servo.play > 0.0) | (servo.compliance >= STIFFEST)
-    rotor = np.where(two_masses, ROTOR_SHARE * servo.armature, 0.0)
-    rows = (
-        servo.kp, servo.kd, servo.limit, servo.no_load_speed, servo.coulomb, servo.viscous, servo.stribeck,
-        servo.stribeck_velocity, servo.load_friction, servo.armature - rotor, servo.delay, servo.smoothing,
-        servo.quantum, servo.deadband, servo.play, servo.compliance, servo.supply_resistance / supply_voltage,
-        servo.duty_loss, servo.fade, servo.offset, servo.sensor_delay, servo.lower_stop, servo.upper_stop,
-        servo.motor_encoder, 1.0 / servo.torque_constant, rotor,
-    )  # fmt: skip
-    return ServoParameters(np.array(rows), no_law(len(servo.kp)) if law is None else law)
-
-
-def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: float = 0.0) -> ServoState:
-    """Return the state of servos in motion, their bristles slack, gaps centred and filters settled.
-
-    Args:
-        commands: Targets so far, newest first [rad], shape (k, n_motors); the oldest one is taken to be older still.
-        motion: Positions [rad] and velocities [rad/s] at the output, shape (2, n_motors).
-        step: Physics period [s].
-        clock: Time since the episode began [s].
-    """
-    older = np.repeat(commands[-1:], max(0, COMMANDS - len(commands)), axis=0)
-    memory = np.zeros((MEMORY, motion.shape[1]))
-    memory[ROTOR_ANGLE], memory[ROTOR_SPEED], memory[SMOOTHED], memory[SPEED] = *motion, commands[0], motion[1]
-    return ServoState(
-        np.vstack([commands, older])[:COMMANDS].copy(),
-        memory,
-        first_history(motion, step),
-        np.array([clock]),
-        np.zeros(1, dtype=np.int64),
-        np.zeros((3, HIDDEN)),
-    )
 
 
 @compiled
@@ -166,7 +127,7 @@ def sensed_error(
     """Return motor i's control error [rad], and position [rad] and velocity [rad/s] as its servo sees them."""
     count = state.steps[0]
     target = delayed(state.commands, i, (elapsed - parameters[DELAY, i]) / period, step / period)
-    target = _shaped(parameters, state.memory, i, target, step)
+    target = shaped(parameters, state.memory, i, target, step)
     q, v = _measured(parameters, state.memory, i, motion)
     if parameters[SENSOR_DELAY, i] > 0.0:
         delay, now = parameters[SENSOR_DELAY, i], (q, v)
@@ -189,29 +150,32 @@ def wanted_torque(
     elapsed: float, step: float, period: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the torque that motor i's servo wants and what a learned law adds at the output [N·m]."""
-    parameters, law = servos.rows, servos.law
+    parameters = servos.rows
     error -= min(parameters[DEADBAND, i], max(-parameters[DEADBAND, i], error))
     u, output = kept_gain(parameters, state, i, elapsed) * error - parameters[KD, i] * v, 0.0 * v
-    if law.group[i] != NOBODY:
+    if parameters[GROUP, i] != NOBODY:
         since = elapsed - parameters[DELAY, i]
         for k in range(LAGS):
             lagged = delayed(state.commands, i, (since - LAG * k) / period, step / period)
-            state.layers[0, k] = law.stiffness[i] * (lagged + parameters[OFFSET, i] - q)
-        drive, output = _learned(law, state.memory, i, motion[1, i], step, state.layers)
+            state.layers[0, k] = parameters[STIFFNESS, i] * (lagged + parameters[OFFSET, i] - q)
+        drive, output = _learned(parameters, servos.weights, state.memory, i, motion[1, i], step, state.layers)
         u += drive
     return u, output
 
 
 @compiled
 def _learned(
-    law: ServoLaw, memory: np.ndarray, i: int, v: float, step: float, layers: np.ndarray
+    parameters: np.ndarray, weights: np.ndarray, memory: np.ndarray, i: int, v: float, step: float, layers: np.ndarray
 ) -> tuple[float, float]:
     """Return what motor i's law adds before the torque limit and behind it [N·m], errors being in `layers` already."""
     memory[LAW_BENT, i] = min(BRISTLE, max(-BRISTLE, memory[LAW_BENT, i] + v * step))
     layers[0, LAGS] = v / SPEED_UNIT
     layers[0, LAGS + 1] = act(SIGN * v)
     layers[0, LAGS + 2] = memory[LAW_BENT, i] / BRISTLE
-    return correction(law, i, layers)
+    drive, output = network(weights, int(parameters[GROUP, i]), layers)
+    for k in range(LAGS):
+        drive += parameters[LAG_SHARE + k, i] * layers[0, k]
+    return parameters[TORQUE, i] * drive, parameters[TORQUE, i] * output
 
 
 @compiled
@@ -254,7 +218,7 @@ def delayed(commands: np.ndarray, i: int, start: float, length: float) -> float:
 
 
 @compiled
-def _shaped(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, step: float) -> float:
+def shaped(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, step: float) -> float:
     """Filter and round a target [rad]."""
     if parameters[SMOOTHING, i] > 0.0:
         memory[SMOOTHED, i] += (1.0 - np.exp(-step / parameters[SMOOTHING, i])) * (target - memory[SMOOTHED, i])

@@ -22,7 +22,8 @@ from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
 from gsl.effects.effect import Effect
 from gsl.errors import ConfigError
-from gsl.worlds.servo import DEADBAND, DELAY, LIMIT, OFFSET, ServoState, _shaped, delayed
+from gsl.worlds.servo import delayed, shaped
+from gsl.worlds.servo_state import DEADBAND, DELAY, LIMIT, OFFSET, ServoState
 
 Motors = Literal["servo", "velocity"]
 HEARD = {"limit", "delay", "smoothing", "quantum", "deadband", "offset"}  # fields of a servo that act here
@@ -92,7 +93,7 @@ def ask_speed(
     """
     for i in range(len(position)):
         target = delayed(state.commands, i, -parameters[DELAY, i] / period, 1.0)
-        target = _shaped(parameters, state.memory, i, target, period)
+        target = shaped(parameters, state.memory, i, target, period)
         error = target + parameters[OFFSET, i] - position[i]
         error -= min(parameters[DEADBAND, i], max(-parameters[DEADBAND, i], error))
         speed[i] = min(fastest[i], max(-fastest[i], error / period))

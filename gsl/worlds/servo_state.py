@@ -1,0 +1,117 @@
+"""What the compiled servos read and remember: parameters in rows, and a state that moves on in place."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gsl.core.compiled import compiled
+from gsl.core.plant import Servo
+from gsl.core.servo_law import HIDDEN, LAYERS, ServoLaw, no_law, weights
+from gsl.worlds.drive_train import ROTOR_SHARE, STIFFEST
+from gsl.worlds.encoder import REMEMBERED, fill_history
+
+COMMANDS = 16  # control periods of targets that are remembered: the longest delay
+
+(
+    KP, KD, LIMIT, NO_LOAD, COULOMB, VISCOUS, STRIBECK, STRIBECK_VELOCITY, LOAD, OUTPUT_ARMATURE, DELAY, SMOOTHING,
+    QUANTUM, DEADBAND, PLAY, COMPLIANCE, SAG, DUTY_LOSS, FADE, OFFSET, SENSOR_DELAY, LOWER, UPPER, MOTOR_ENCODER,
+    PER_AMPERE, ROTOR, GROUP, STIFFNESS, TORQUE, LAG_SHARE,
+) = range(30)  # rows of the parameters  # fmt: skip
+BENT, ROTOR_ANGLE, ROTOR_SPEED, SMOOTHED, SPEED, DRIVE, THROUGH, FRICTION, LAW_BENT = range(9)  # rows of the state
+MEMORY = 9  # how many these are
+
+
+class ServoParameters(NamedTuple):
+    """What never changes; in few arrays, for every one that a compiled function passes on takes time.
+
+    Attributes:
+        rows: Of numbers, those of a learned law last: see `ServoLaw`; shape (LAG_SHARE + LAGS, n_motors).
+        weights: Of its networks, from `servo_law.weights`.
+    """
+
+    rows: np.ndarray
+    weights: np.ndarray
+
+
+class ServoState(NamedTuple):
+    """What changes in time, all of it in place.
+
+    Attributes:
+        commands: Targets of the last control periods, newest first [rad], shape (COMMANDS, n_motors).
+        memory: Bristle deflection [rad]; rotor angle [rad] and speed [rad/s] as seen at the output; filtered target
+            [rad]; at the last physics step: output speed [rad/s], motor torque, torque through the gear, friction
+            [N·m]; bristle of the learned law [rad]; shape (MEMORY, n_motors).
+        history: What the encoders measured at the last physics steps, see `encoder.seen`.
+        clock: Time of the newest command since the episode began [s], shape (1,).
+        steps: Number of physics steps so far, shape (1,).
+        layers: Scratch of the learned law, shape (LAYERS, HIDDEN).
+    """
+
+    commands: np.ndarray
+    memory: np.ndarray
+    history: np.ndarray
+    clock: np.ndarray
+    steps: np.ndarray
+    layers: np.ndarray
+
+
+def packed(servo: Servo, supply_voltage: float, law: ServoLaw | None = None) -> ServoParameters:
+    """Return the parameters as the kernel reads them.
+
+    Args:
+        servo: The servos.
+        supply_voltage: Of the common supply without load [V].
+        law: What they do beyond their parameters.
+    """
+    law = no_law(len(servo.kp)) if law is None else law
+    two_masses = (servo.play > 0.0) | (servo.compliance >= STIFFEST)
+    rotor = np.where(two_masses, ROTOR_SHARE * servo.armature, 0.0)
+    rows = (
+        servo.kp, servo.kd, servo.limit, servo.no_load_speed, servo.coulomb, servo.viscous, servo.stribeck,
+        servo.stribeck_velocity, servo.load_friction, servo.armature - rotor, servo.delay, servo.smoothing,
+        servo.quantum, servo.deadband, servo.play, servo.compliance, servo.supply_resistance / supply_voltage,
+        servo.duty_loss, servo.fade, servo.offset, servo.sensor_delay, servo.lower_stop, servo.upper_stop,
+        servo.motor_encoder, 1.0 / servo.torque_constant, rotor, law.group, law.stiffness, law.torque, *law.lag.T,
+    )  # fmt: skip
+    return ServoParameters(np.array(rows), weights(law))
+
+
+def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: float = 0.0) -> ServoState:
+    """Return the state of servos in motion, their bristles slack, gaps centred and filters settled.
+
+    Args:
+        commands: Targets so far, newest first [rad], shape (k, n_motors); the oldest one is taken to be older still.
+        motion: Positions [rad] and velocities [rad/s] at the output, shape (2, n_motors).
+        step: Physics period [s].
+        clock: Time since the episode began [s].
+    """
+    older = np.repeat(commands[-1:], max(0, COMMANDS - len(commands)), axis=0)
+    memory, history = np.zeros((MEMORY, motion.shape[1])), np.empty((REMEMBERED, *motion.shape))
+    settle(memory, history, motion, commands[0], step)
+    return ServoState(
+        np.vstack([commands, older])[:COMMANDS].copy(),
+        memory,
+        history,
+        np.array([clock]),
+        np.zeros(1, dtype=np.int64),
+        np.zeros((LAYERS, HIDDEN)),
+    )
+
+
+@compiled
+def settle(memory: np.ndarray, history: np.ndarray, motion: np.ndarray, target: np.ndarray, step: float) -> None:
+    """Write what settled servos remember, the rest of the memory being zero; floats or lanes.
+
+    Args:
+        memory: Of `ServoState`.
+        history: Of `ServoState`.
+        motion: Positions [rad] and velocities [rad/s] at the output, shape (2, n_motors).
+        target: Of the filter [rad], shape (n_motors,).
+        step: Physics period [s].
+    """
+    for i in range(motion.shape[1]):
+        memory[ROTOR_ANGLE, i], memory[ROTOR_SPEED, i], memory[SPEED, i] = motion[0, i], motion[1, i], motion[1, i]
+        memory[SMOOTHED, i] = target[i]
+    fill_history(history, motion, step)

@@ -1,0 +1,194 @@
+"""Learning a servo from a pendulum's log: what is true is recovered, what is not there is not, bad logs are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gsl.core.plant import Plant, nominal
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.diagnosis.experiment import Experiment, experiment
+from gsl.diagnosis.records import slope
+from gsl.effects.effect import applied, built
+from gsl.errors import InputError
+from gsl.models.servo import ServoModel, neutral, with_group, without_group
+from gsl.robots.pendulum import pendulum
+from gsl.training.learn_servo import LearnedServo, document, learn_servo
+from gsl.worlds.bullet import BulletEnv, BulletWorld
+from gsl.worlds.held import Held
+
+ROBOT, PERIOD = pendulum(), 0.02
+NOISE, STEP = 1e-3, 0.002
+SLOW = {
+    "servo_gain": {"kp": 0.7},
+    "command_latency": {"delay": 0.03},
+    "coulomb_friction": {"torque": 0.03},
+}
+
+
+def commands(rng: np.random.Generator, period: float, seconds: float, size: float = 1.0) -> np.ndarray:
+    """A motion of a few sines and steps [rad], shape (T, 1)."""
+    time = np.arange(round(seconds / period)) * period
+    waves = sum(
+        rng.uniform(0.1, 0.5) * np.sin(2 * np.pi * rng.uniform(0.2, 2.0) * time + rng.uniform(0.0, 6.0))
+        for _ in range(3)
+    )
+    steps = rng.uniform(-0.4, 0.4, size=8)[np.minimum(7, (8 * np.arange(len(time))) // len(time))]
+    return size * (waves + steps)[:, None]
+
+
+def log(plant: Plant, *, period: float = PERIOD, motions: int = 10, seconds: float = 4.0, size: float = 1.0,
+        noise: float = NOISE, seed: int = 0) -> Batch:  # fmt: skip
+    """What a robot that is `plant` logs of motions of its own."""
+    rng = np.random.default_rng(seed)
+    paths = [commands(rng, period, seconds, size) for _ in range(motions)]
+    played = Held.of(plant, min(STEP, period), period).play(paths, [path[0] for path in paths], round(1.0 / period))
+    episodes = []
+    for path, position in zip(paths, played, strict=True):
+        seen = position + noise * rng.standard_normal(position.shape)
+        time = period * np.arange(len(seen))
+        episodes.append(Trajectory(time, path, seen, slope(seen, period)))
+    labels = [{"policy": f"motion_{k}"} for k in range(motions)]
+    return Batch(tuple(episodes), ROBOT.controlled, period, metadata={"episodes": labels})
+
+
+def real(effects: dict[str, Any]) -> Plant:
+    return applied(nominal(ROBOT), built(effects))
+
+
+def prepared(effects: dict[str, Any], **how: Any) -> Experiment:
+    return experiment(log(real(effects), **how), ROBOT)
+
+
+def learned(exp: Experiment, *, threads: int = 1, step: float = STEP) -> LearnedServo:
+    return learn_servo(exp, nominal(ROBOT), step, labelled=False, seed=1, threads=threads)
+
+
+@pytest.fixture(scope="module")
+def slow() -> LearnedServo:
+    return learned(prepared(SLOW))
+
+
+def test_gain_lag_and_friction_are_recovered(slow: LearnedServo) -> None:
+    assert slow.before["all"] > 10.0
+    assert slow.after["all"] < 1.3
+    assert not slow.worse
+
+
+def test_a_report_says_what_held_out_motions_say(slow: LearnedServo) -> None:
+    told = document(slow)
+    assert told["floors_before"] == slow.before["all"]
+    assert told["floors_after"] == slow.after["all"]
+    assert all(group["kept"] for group in told["groups"].values())
+
+
+def test_neither_time_nor_threads_change_a_bit(slow: LearnedServo) -> None:
+    again = learned(prepared(SLOW), threads=2)
+    assert again.after == slow.after
+    for name, values in slow.model.numbers.items():
+        np.testing.assert_array_equal(again.model.numbers[name], values)
+    for name, values in slow.model.network.items():
+        np.testing.assert_array_equal(again.model.network[name], values)
+
+
+def test_nothing_is_learned_where_nothing_differs() -> None:
+    null = learned(prepared({}))
+    assert null.before["all"] == pytest.approx(1.0, abs=0.15)
+    assert null.after["all"] < null.before["all"] + 0.05
+
+
+def pushed(motion: np.ndarray, time: float) -> np.ndarray:
+    """What no effect says: friction in one direction alone, and a load that depends on where the joint is [N·m]."""
+    q, v = motion
+    return -0.03 * (1.0 + np.tanh(v / 0.1)) + 0.1 * np.sin(3.0 * q)
+
+
+def played_by_bullet(plant: Plant, *, motions: int = 12, seconds: float = 4.0) -> Batch:
+    """What a robot logs in the other engine, which knows of a user's own torques."""
+    world = BulletWorld(robot="pendulum", effects={}, floating=False, step=STEP, period=PERIOD)
+    rng, env, episodes = np.random.default_rng(3), BulletEnv(world, plant), []
+    for _ in range(motions):
+        path = commands(rng, PERIOD, seconds)
+        seen = [env.reset(seed=0, options={"posture": path[0]})[0]]
+        seen += [env.step(action)[0] for action in path]
+        position = np.array(seen)[:, env.layout["position"]]
+        position = position + NOISE * rng.standard_normal(position.shape)
+        episodes.append(Trajectory(PERIOD * np.arange(len(position)), path, position, slope(position, PERIOD)))
+    env.close()
+    labels = [{"policy": f"motion_{k}"} for k in range(motions)]
+    return Batch(tuple(episodes), ROBOT.controlled, PERIOD, metadata={"episodes": labels})
+
+
+def test_a_network_learns_what_no_number_says() -> None:
+    exp = experiment(played_by_bullet(replace(nominal(ROBOT), hook=pushed)), ROBOT)
+    found = learned(exp)
+    assert found.model.network["last"].any()
+    assert found.before["all"] > 10.0
+    assert found.after["all"] < 0.3 * found.before["all"]
+
+
+def test_a_group_that_gets_worse_keeps_its_servo() -> None:
+    """The motions that are held out come from another robot than those that are fitted."""
+    fitted, held = log(real({"servo_gain": {"kp": 0.5}})), log(real({}), seed=1)
+    labels = [{**one, "robot": name} for name, batch in (("soft", fitted), ("plain", held)) for one in about(batch)]
+    both = replace(fitted, episodes=(*fitted.episodes, *held.episodes), metadata={"episodes": labels})
+    exp = experiment(both, ROBOT, held_out={"robot": "plain"})
+    found = learn_servo(exp, nominal(ROBOT), STEP, labelled=True, seed=1, threads=1)
+    assert found.after == found.before
+    assert not any(values.any() for values in found.model.numbers.values())
+
+
+def about(batch: Batch) -> list[dict[str, Any]]:
+    labels: list[dict[str, Any]] = batch.metadata["episodes"]
+    return labels
+
+
+def test_known_conditions_are_no_news() -> None:
+    """One servo at two firmware gains: what is learned is the rest, and holds at both."""
+    soft = {"servo_gain": {"kp": 0.5}}
+    late = {"command_latency": {"delay": 0.03}}
+    first, second = log(real(late), motions=6), log(real(late | soft), motions=6, seed=1)
+    labels = [*about(first), *({**one, "conditions": soft} for one in about(second))]
+    both = replace(first, episodes=(*first.episodes, *second.episodes), metadata={"episodes": labels})
+    found = learned(experiment(both, ROBOT))
+    assert found.after["all"] < 1.3 < found.before["all"]
+    assert found.model.numbers["delay"][0] == pytest.approx(0.03, abs=0.005)
+    assert found.model.numbers["kp"][0] == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize("period", [0.05, 0.001])
+def test_slow_and_fast_logs_are_learned_from(period: float) -> None:
+    seconds, motions = (6.0, 8) if period > 0.01 else (2.5, 6)
+    exp = prepared({"servo_gain": {"kp": 0.6}}, period=period, seconds=seconds, motions=motions)
+    found = learned(exp, step=min(STEP, period))
+    assert found.after["all"] < 0.5 * found.before["all"]
+
+
+def test_a_delay_stays_within_what_servos_remember() -> None:
+    exp = prepared({"servo_gain": {"kp": 0.6}}, period=0.001, seconds=2.5, motions=6)
+    found = learned(exp, step=0.001)
+    assert found.model.numbers["delay"].max() <= 15 * 0.001 + 1e-12
+
+
+def test_a_log_without_motion_is_refused() -> None:
+    with pytest.raises(InputError, match="the log's joints hardly move: by .* mrad"):
+        learned(prepared(SLOW, size=0.0))
+
+
+def test_one_motion_alone_is_learned_from() -> None:
+    found = learned(prepared(SLOW, motions=1, seconds=30.0))
+    assert found.after["all"] <= found.before["all"]
+
+
+def test_a_group_is_taken_from_another_model() -> None:
+    plant, rng = nominal(ROBOT), np.random.default_rng(0)
+    old, new = neutral(plant, rng), neutral(plant, rng)
+    new = replace(new, numbers={name: values + 0.1 for name, values in new.numbers.items()})
+    back: ServoModel = with_group(new, old, "all")
+    assert not any(values.any() for values in back.numbers.values())
+    for name, values in back.network.items():
+        np.testing.assert_array_equal(values, old.network[name])
+    assert without_group(new, "all").on(plant).servo.kp == pytest.approx(plant.servo.kp)
