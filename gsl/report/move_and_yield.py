@@ -52,12 +52,14 @@ def move_and_yield_figure(
         for (left, right), (world, methods) in zip(axes, moving.items(), strict=True):
             draw_methods(left, methods, CLOSE * spanned)
             left.set_title(f"{world}: how joints move", loc="left", fontsize=10.5)
-            right.set_title(f"how {group} yield", loc="left", fontsize=10.5)
+            lacking = [name for name in MARKERS if not any(len(getattr(one, name)) for one in yielding[world].values())]
+            same = f"; no gap in {' and '.join(lacking)}" if lacking else ""
+            right.set_title(f"how {group} yield{same}", loc="left", fontsize=10.5)
             _draw(right, yielding[world], [one.colour for one in methods.values()])
             right.tick_params(axis="y", length=0, labelleft=False)
         left, right = axes[-1]
         left.set_xlabel("joints off the real ones after 0.2 s [°]")
-        right.set_xlabel("share of the gap closed, joint by joint (● stiffness, ■ strength)")
+        right.set_xlabel("gap closed joint by joint (● stiffness, ■ strength)")
         headline(whole, "Joints that move like the robot's need not yield like them; each trial a mark")
     return whole
 
@@ -66,7 +68,7 @@ def _draw(axes: Axes, methods: Mapping[str, Shares], colours: Sequence[str]) -> 
     for place, name in ((0.0, "simulator"), (1.0, "robot")):
         axes.axvline(place, color=QUIET, linewidth=1.0, zorder=0)
         axes.annotate(
-            name, (place, 1.0), xycoords=("data", "axes fraction"), ha="center", va="bottom", fontsize=9, color=INK
+            name, (place, 0.0), xycoords=("data", "axes fraction"), ha="center", va="bottom", fontsize=9, color=INK
         )
     for row, (shares, colour) in enumerate(zip(methods.values(), colours, strict=True)):
         for name, (marker, apart) in MARKERS.items():
@@ -76,9 +78,6 @@ def _draw(axes: Axes, methods: Mapping[str, Shares], colours: Sequence[str]) -> 
             )
             if len(values):
                 axes.plot([values.mean()] * 2, [row + apart - 0.14, row + apart + 0.14], color=colour, linewidth=2.2)
-    lacking = [name for name in MARKERS if not any(len(getattr(shares, name)) for shares in methods.values())]
-    if lacking:
-        note = f"{' and '.join(lacking)}: simulator and robot do not differ"
-        axes.annotate(note, (1.0, 0.0), xycoords="axes fraction", ha="right", va="bottom", fontsize=9, color=INK)
+    axes.set_ylim(len(methods) - 0.1, -0.5)
     low, high = axes.get_xlim()
     axes.set_xlim(min(low, -MARGIN), max(high, 1.0 + MARGIN))
