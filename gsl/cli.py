@@ -125,7 +125,7 @@ stage("reproduce fig12", "A heavy pendulum with noisy actions, as in the paper's
 stage("reproduce fig13", "A cheetah with noisy actions, as in the paper's figure 13 (gsl[mujoco,rl]).")
 stage("reproduce garat", "The heavier worlds of the GARAT suite (gsl[mujoco,rl]).")
 stage("reproduce budget", "Return and grounding error against the number of real trajectories.")
-stage("reproduce replays", "How far grounded simulators are from real trajectories off π0; nothing is searched.")
+stage("reproduce replays", "How grounded simulators move and yield beside the real world; nothing is searched.")
 stage("survey", "See how far real worlds are from the simulator.")
 stage("answer", "Check logs and measured returns of a real robot, and take them in for a request.")
 stage("rehearse", "Let a simulated world answer a request as the real robot would.")

@@ -301,7 +301,7 @@ def test_a_recipe_is_of_what_a_trial_comes_from(tmp_path: Path) -> None:
     assert first != recipe(world, gat, 2) and first != recipe(replace(world, step=0.001), gat, 1)
     search = CmaEs(candidates=4, generations=2)
     assert recipe(search, world) != recipe(replace(search, sigma=0.1), world)
-    idle = {"workers": 2, "preset_name": "quick", "first": 1, "diagnosis": "one"}
+    idle = {"workers": 2, "preset_name": "quick", "first": 1, "diagnosis": "one", "servo": "one/train_servo"}
     assert recipe({"_target_": "Stage", **idle}) == recipe({"_target_": "Stage"})
     assert all(recipe({"kwargs": {name: value}}) != recipe({"kwargs": {}}) for name, value in idle.items())
     assert recipe(ModelConfig()) != recipe(ModelConfig(covariance="full"))
@@ -321,19 +321,23 @@ def test_a_figure_is_one_command(what: str, figures: list[str], tmp_path: Path) 
 
 
 def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
-    left_out = ("gat_residual", "gat_multi_step", "gat_gated", "effects", "effects_gat")
+    left_out = ("gat_residual", "gat_multi_step", "gat_gated", "effects", "effects_gat", "effects_servo")
     few = ("preset=toy", "iterate.workers=1", "iterate.task.duration=1.2", *(f"~methods.{name}" for name in left_out))
-    said = done("reproduce", "replays", *few, "~worlds.nao_weak", folder=tmp_path)
+    gains = f"gains={Path(__file__).parents[1] / 'docs/results/table2/trials.json'}"
+    said = done("reproduce", "replays", *few, "~worlds.nao_weak", gains, folder=tmp_path)
     assert "about 1 minute for all of its results" in said.err
     folder = tmp_path / "runs/replays/reproduce"
     rows = {one["method"]: one for one in json.loads((folder / "replays.json").read_text())}
-    assert set(rows) == {"none", "gat", "gat_x_auto", "identified"} and not list(tmp_path.rglob("optimize"))
+    assert set(rows) == {"none", "gat", "gat_x_auto", "identified", "servo"} and not list(tmp_path.rglob("optimize"))
     assert rows["identified"]["joints"] < rows["none"]["joints"] != rows["gat"]["joints"]
+    assert rows["servo"]["joints"] < rows["none"]["joints"] and 0.8 < rows["servo"]["stiffness"]["legs"] < 1.2
+    assert rows["none"]["stiffness"] == rows["none"]["strength"] == {"legs": 0.0, "arms": 0.0}
     assert rows["none"]["unreached"] is None and 0.0 <= rows["gat"]["unreached"] < 1.0
     table = (folder / "table.md").read_text()
     assert all(f"| nao_worn | {name} | {one['joints']:.2f} |" in table for name, one in rows.items())
     assert (folder / "replays.png").stat().st_size > 10_000
-    assert "| minus none (95 %, paired) |" in table and "effects from motions in the air" in table
+    assert "3 points (nao_worn: none, gat, identified)" in table
+    assert "| minus none (95 %, paired) |" in table and "effects and servos from motions in the air" in table
     replays, again = folder / "replays.json", ("~worlds.nao_weak", "force=true")
     (tmp_path / "known.json").write_text(replays.read_text())
     for more in (again, (*again, "name=known", "known=known.json")):  # of this version, and of any

@@ -28,7 +28,7 @@ from gsl.studies.trial import Trial
 from gsl.studies.tried import foretelling
 
 ROOT = Path(__file__).parents[1]
-PAGES = [*sorted((ROOT / "docs/results").glob("*.md")), ROOT / "docs/environments.md"]
+PAGES = [*sorted((ROOT / "docs/results").glob("*.md")), ROOT / "docs/torque.md", ROOT / "docs/environments.md"]
 # What a row of a study is, and which of its fields its recipes go by.
 CELLS: dict[type, tuple[Any, ...]] = {
     Replays: (Replay, "trial", "world", "method"),

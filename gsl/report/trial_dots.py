@@ -47,14 +47,15 @@ def trial_dots_figure(panels: Mapping[str, Mapping[str, Dots]], *, axis: str, ti
         for axes, (world, methods) in zip(
             whole.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0], panels.items(), strict=True
         ):
-            _draw(axes, methods, CLOSE * spanned)
+            draw_methods(axes, methods, CLOSE * spanned)
             axes.set_title(world, loc="left", fontsize=10.5)
             axes.set_xlabel(axis)
         headline(whole, title)
     return whole
 
 
-def _draw(axes: Axes, methods: Mapping[str, Dots], close: float) -> None:
+def draw_methods(axes: Axes, methods: Mapping[str, Dots], close: float) -> None:
+    """Draw the methods, from above; dots nearer to each other than `close` are moved apart."""
     axes.axvline(0.0, color=QUIET, linewidth=1.0, zorder=0)
     for row, one in enumerate(methods.values()):
         values, failed = np.asarray(one.values, float), np.asarray(one.failed, bool)

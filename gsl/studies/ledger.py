@@ -22,7 +22,7 @@ from gsl.studies.duration import duration_told
 from gsl.studies.ledger_file import MADE_BY, RECIPE, Figures, read
 
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
-MADE = ("forward_model", "inverse_model", "diagnosis")  # of a grounding: names of what a trial makes itself
+MADE = ("forward_model", "inverse_model", "diagnosis", "servo")  # names of what a trial makes; a world's are files
 NUMBER = ("number", "trial")  # what rows call their trial
 # Settings that came after trials were written down, at what changes nothing.
 LATER = {"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim", "rested": False,
@@ -49,22 +49,23 @@ def recipe(*parts: Any) -> str:
     return hashlib.sha256(settings.encode()).hexdigest()[:DIGITS]
 
 
-def known_parents(known: str | tuple[str, ...] | None, name: str) -> dict[str, Path]:
+def known_parents(known: str | tuple[str, ...] | None, name: str, role: str = "known") -> dict[str, Path]:
     """Return the files of earlier trials, or those of runs, as parents of the study.
 
     Args:
         known: As the user gave it.
         name: Of such a file in a study's artifact.
+        role: Setting that the user gave.
 
     Raises:
         ArtifactError: There is none.
         ConfigError: It is an empty list.
     """
     if isinstance(known, str):
-        return {"known": _file(known, name)}
+        return {role: _file(known, name)}
     if known == ():
-        raise ConfigError("known", "is an empty list; leave it out")
-    return {f"known.{index}": _file(one, name) for index, one in enumerate(known or ())}
+        raise ConfigError(role, "is an empty list; leave it out")
+    return {f"{role}.{index}": _file(one, name) for index, one in enumerate(known or ())}
 
 
 def _file(known: str, name: str) -> Path:

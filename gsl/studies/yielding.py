@@ -1,0 +1,81 @@
+"""Compliance transferred, as a study measures it: worlds without a grounding once a trial, the others as they come."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from gsl.core.impedance import closed
+from gsl.core.seeds import derived_seed
+from gsl.grounding.grounding import Grounding
+from gsl.grounding.none import NoGrounding
+from gsl.stages.compliance import Compliance, measure
+from gsl.stages.compliance_report import RESOLUTION, SECTION, transferred
+from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.world import World
+
+
+class Yielding(NamedTuple):
+    """Compliance transferred by group of joints, as `Replay` has it."""
+
+    stiffness: Mapping[str, float | None] | None = None
+    strength: Mapping[str, float | None] | None = None
+    stiffness_closed: Mapping[str, float | None] | None = None
+    strength_closed: Mapping[str, float | None] | None = None
+
+
+def closed_strength(sim: Compliance, grounded: Compliance, real: Compliance, group: str) -> float | None:
+    """Return the share of a group's gap in strength that is closed joint by joint; None where there is none."""
+    where = sim.where(group)
+    before, after, robot = (place.torque[where] for place in (sim, grounded, real))
+    return closed(before, after, robot, RESOLUTION * before)
+
+
+@dataclass(frozen=True)
+class Loads:
+    """What loads on single joints say of a trial's worlds.
+
+    Attributes:
+        sim: The plain simulator.
+        seed: Of all randomness.
+        bare: Worlds that were measured without a grounding already.
+    """
+
+    sim: World
+    seed: int
+    bare: list[tuple[World, Compliance]] = field(default_factory=list)
+
+    def yielding(self, world: World, grounding: Grounding, real: World) -> Yielding:
+        """Return what a grounding hands over; nothing where nobody can load the robots.
+
+        Args:
+            world: What the grounding has made of the simulator.
+            grounding: What is left to do with the actions; ready to act.
+            real: The real world.
+        """
+        if not all(isinstance(place, BulletWorld) for place in (self.sim, world, real)):
+            return Yielding()
+        sim, robot = self._bare(self.sim), self._bare(real)
+        if sim.motors != robot.motors:
+            return Yielding()
+        bare = isinstance(grounding, NoGrounding)
+        grounded = self._bare(world) if bare else measure(world, grounding, self._start)
+        shares = transferred(sim, grounded, robot)
+        return Yielding(
+            {group: share.stiffness for group, share in shares.items()},
+            {group: share.torque for group, share in shares.items()},
+            {group: share.impedance for group, share in shares.items()},
+            {group: closed_strength(sim, grounded, robot, group) for group in shares},
+        )
+
+    @property
+    def _start(self) -> int:
+        return derived_seed(self.seed, SECTION)  # as optimize and iterate measure it
+
+    def _bare(self, world: World) -> Compliance:
+        for measured, compliance in self.bare:
+            if measured == world:
+                return compliance
+        self.bare.append((world, measure(world, NoGrounding(), self._start)))
+        return self.bare[-1][1]
