@@ -30,7 +30,7 @@ from gsl.worlds.servo_state import COMMANDS
 SHORT = (0.1, 0.4)  # warm-up and scored part of a window for a network [s]: errors stay small enough to be frozen
 LONG = (0.4, 1.6)  # the same for numbers: what a log does not show at first, such as friction's state, is forgotten
 WINDOWS = 160  # that are fitted, at most
-MOST = 200  # iterations of the network's fit
+MOST = 300  # iterations of the network's fit
 SAMPLES = 1000  # of a bootstrap over motions
 CHANCE = 0.025  # of a bootstrap, on either side
 WORTH = 0.1  # of the cost that a network has to take: for less it is not let loose on motions that nobody has logged
