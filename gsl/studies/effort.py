@@ -31,8 +31,8 @@ FLOWN = {  # a second of motion in the air, on two cores [s]
     "identify": 2.0,
     "servo": 1.0,
     "servo_on_effects": 1.0,
-    "servo_members": 1.5,
-    "servo_on_effects_members": 1.5,
+    "servo_members": 1.6,
+    "servo_on_effects_members": 1.6,
 }
 
 

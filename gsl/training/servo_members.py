@@ -16,7 +16,7 @@ from gsl.core.plant import Plant
 from gsl.core.seeds import derived_seed
 from gsl.models.servo import ServoModel, neutral, without_group
 
-ITERATIONS = 60  # of a fit; the first member's judge falls by 7 % after these (NAO worn, 70 s), in 200
+ITERATIONS = 60  # of a fit: in 140 more the judged gap would fall by 5 % (nao_worn, 70 s in the air)
 
 
 class Member(NamedTuple):
