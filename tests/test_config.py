@@ -210,7 +210,7 @@ OF_ENVIRONMENTS = {  # what is for gymnasium environments, and goes with no robo
 }
 HELD = ("go2_in_air", "so101", "so101_menagerie", "urdf", "xl330_pendulum")  # robots without feet
 EXAMPLE = Path(__file__).parents[1] / "examples/arm.urdf"
-REPLAYING = ("diagnose", "identify", "cross_validate", "blind_make")  # logs, with servos
+REPLAYING = ("train_servo", "diagnose", "identify", "cross_validate", "blind_make")  # logs, with servos
 NEEDED = {  # what has no default
     "diagnose": ("real=logs",),
     "identify": ("real=logs",),

@@ -26,7 +26,7 @@ from gsl.stages.needed_model import as_needed, looking_ahead
 from gsl.stages.train_forward import TrainForward, fitted
 from gsl.stages.train_inverse import TrainInverse
 from gsl.stages.training import Parts
-from gsl.storage.models import FILES, read_forward_model, read_inverse_model
+from gsl.storage.models import FILES, FORWARD, INVERSE, read_forward_model, read_inverse_model
 from gsl.storage.trajectories import write
 
 QUIET: Any = SimpleNamespace(status=lambda text: None, table=lambda title, columns, rows: None)
@@ -123,7 +123,7 @@ def test_a_model_tells_over_how_many_ticks_it_was_fitted_and_no_other_serves(tmp
     for ticks, members in ((1, 1), (3, 1), (3, 2)):
         model = ModelConfig(multi_step=ticks, members=members, **few)
         TrainForward(str(tmp_path / "real.parquet"), model).run(tmp_path, QUIET)
-        asked = ActionTransformation(*(str(tmp_path / FILES[kind]) for kind in FILES), multi_step=3)
+        asked = ActionTransformation(*(str(tmp_path / FILES[kind]) for kind in (FORWARD, INVERSE)), multi_step=3)
         if ticks == 1:
             with pytest.raises(
                 ConfigError, match="was not fitted to its own answers of 3 ticks; train it with model=mlp"

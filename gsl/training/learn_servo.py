@@ -2,7 +2,6 @@
 
 A group of joints takes a step only if held-out motions say so: numbers, which are few, if these come nearer, a network
 if they come nearer by a good share, significantly. Half of them also say when to stop, the others are for the report.
-Numbers that need no network are fitted once more to all motions then: few numbers want many motions, not many checks.
 """
 
 from __future__ import annotations
@@ -30,9 +29,10 @@ from gsl.worlds.servo_state import COMMANDS
 SHORT = (0.1, 0.4)  # warm-up and scored part of a window for a network [s]: errors stay small enough to be frozen
 LONG = (0.4, 1.6)  # the same for numbers: what a log does not show at first, such as friction's state, is forgotten
 WINDOWS = 160  # that are fitted, at most
-MOST = 200  # iterations of the network's fit
+MOST = 300  # iterations of the network's fit
 SAMPLES = 1000  # of a bootstrap over motions
 CHANCE = 0.025  # of a bootstrap, on either side
+LIKELY = 0.9  # share of bootstraps in which numbers have to help: they are few, and each means something
 WORTH = 0.1  # of the cost that a network has to take: for less it is not let loose on motions that nobody has logged
 WIDE = 10.0  # noise floors that a joint moves in a window, at least, to show what drives it: noise alone spans 6
 LEAST_MOVING = 4  # windows in which a joint moves so far, at least
@@ -59,7 +59,7 @@ class LearnedServo:
 
     Attributes:
         model: The servo.
-        before, after: Gap of the test windows in noise floors, by group and `all`; after, of what no test motion knows.
+        before, after: Gap of the test windows in noise floors, by group and `all`.
         worse: Groups whose law was dropped because it made held-out replays significantly worse.
         way: Of the optimisation.
         windows: How many were fitted, judged and tested.
@@ -113,7 +113,7 @@ def learn_servo(
     with ThreadPoolExecutor(threads) as pool:
         bench = _Bench(exp, Replays(plant, step, exp.period, threads, pool), start)
         held = np.concatenate([parts.judge, parts.test])
-        numbers = bench.kept(held, start, bench.numbers(parts.train), 0.5, 0.0)
+        numbers = bench.kept(held, start, bench.numbers(parts.train), LIKELY, 0.0)
         some = _windows(exp, parts.train, SHORT)
 
         def fit(begun: ServoModel, index: np.ndarray, iterations: int) -> tuple[ServoModel, list[Progress]]:
@@ -134,8 +134,6 @@ def learn_servo(
         for name in worse:
             model = without_group(model, name)
         levels = [bench.by_group(parts.test, one) for one in (start, model)]
-        if not model.network["last"].any():
-            model = _refitted(bench, model, worse)
         others = further(
             members - 1, numbers, worse,
             lambda begun, index: fit(begun, index, ITERATIONS)[0], lambda one: bench.level(parts.test, one),
@@ -143,17 +141,6 @@ def learn_servo(
         )  # fmt: skip
         sizes = len(some), len(parts.judge), len(parts.test)
         return LearnedServo(model, levels[0], levels[1], worse, tuple(way), sizes, tuple(others))
-
-
-def _refitted(bench: _Bench, model: ServoModel, worse: tuple[str, ...]) -> ServoModel:
-    """Return numbers that are fitted to all motions, in the groups that have any."""
-    again = bench.numbers(np.arange(len(bench.exp.pieces)))
-    for g, name in enumerate(model.groups):
-        if not any(values[model.group == g].any() for values in model.numbers.values()):
-            again = with_group(again, bench.start, name)
-    for name in worse:
-        again = without_group(again, name)
-    return again
 
 
 @dataclass(frozen=True)
