@@ -259,6 +259,7 @@ def document(learned: LearnedServo) -> dict[str, Any]:
             for name, value in learned.after.items()
             if name != "all"
         },
+        "members": [learned.after["all"], *(member.floors for member in learned.further)],
         "windows": {"fitted": fitted, "judged": judged, "tested": tested},
         "iterations": len(learned.way),
     }
