@@ -87,7 +87,7 @@ class ServoModel:
                 raise ValueError(f"{name} has the shape {arrays[name].shape}, not {shape}")
         return cls(about["robot"], joints, groups, numbers, arrays["group"], arrays["lag"], network, arrays["noise"])
 
-    def moved(self, plant: Plant, change: np.ndarray) -> ServoModel:
+    def shift(self, plant: Plant, change: np.ndarray) -> ServoModel:
         """Return the model with numbers changed, in `units`, shape (NUMBERS, n_joints); coupled motors follow."""
         each = change[:, plant.robot.drive] * np.array([units(plant)[name] for name in NUMBERS])
         return replace(self, numbers={name: self.numbers[name] + each[k] for k, name in enumerate(NUMBERS)})

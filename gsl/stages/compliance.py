@@ -107,7 +107,7 @@ def measure(world: Any, grounding: Grounding, seed: int) -> Compliance:
         rising = Ramp(RATE * effort * loaded * inwards(robot), DRAG * effort * loaded, found[0])
         hold(held, quiet, rising, MOST / RATE, derived_seed(seed, "yield", number))
         found[3, loaded] = np.where(rising.yielded, rising.torque, MOST * effort)[loaded]
-    return Compliance(robot.motors, grouped(robot), *found)
+    return Compliance(robot.motors, joint_groups(robot), *found)
 
 
 class Swing:
@@ -230,7 +230,7 @@ def rounds(robot: Robot) -> list[np.ndarray]:
     return list(masks)
 
 
-def grouped(robot: Robot) -> Mapping[str, tuple[str, ...]]:
+def joint_groups(robot: Robot) -> Mapping[str, tuple[str, ...]]:
     """Return the motors by group of the robot; what is in none is a group, all motors if there are no groups."""
     groups = {name: tuple(one for one in robot.motors if one in members) for name, members in robot.groups.items()}
     inside = {one for members in groups.values() for one in members}

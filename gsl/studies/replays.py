@@ -18,7 +18,7 @@ from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.servo import LearnedServo
 from gsl.models.free_run import TICKS
-from gsl.stages.compliance import grouped
+from gsl.stages.compliance import joint_groups
 from gsl.stages.grounding_check import asked
 from gsl.stages.grounding_gate import Gate
 from gsl.stages.grounding_replay import replayed
@@ -164,7 +164,7 @@ class Replays:
         sizes = f"{sizes_of(self.preset_name)} {trials}; {self.iterate.budget.learned}, {flown}."
         robot = self.iterate.sim.plant.robot if isinstance(self.iterate.sim, BulletWorld) else None
         colours = {name: method_colour(method) for name, method in self.methods.items()}
-        shown = Shown(rows, tuple(self.worlds), colours, tuple(grouped(robot)) if robot else ())
+        shown = Shown(rows, tuple(self.worlds), colours, tuple(joint_groups(robot)) if robot else ())
         gains = known_parents(self.gains, TRIALS, "gains").values()
         foretold = predictors(rows, searched(gains), self.iterate.seed)
         parts = filter(None, (shown.table(), MEASURED, *shown.about(), sizes, foretold, made))

@@ -45,7 +45,7 @@ class Split:
     Attributes:
         train: Fitted.
         judge: Choose when to stop.
-        test: Are looked at once, for the report.
+        test: Are for the report; with the judge they also say whether a group takes a step (`_Bench.kept`).
     """
 
     train: np.ndarray

@@ -63,7 +63,7 @@ class _Free:
         numbers, lag, weights = self.parts(theta)
         change = np.zeros((len(NUMBERS), self.joints))
         change[:SLOPES] = numbers.reshape(SLOPES, -1)
-        moved, network, k = self.model.moved(self.plant, change).within(self.plant, self.longest), {}, 0
+        moved, network, k = self.model.shift(self.plant, change).within(self.plant, self.longest), {}, 0
         for name, shape in shapes(self.groups).items():
             size = int(np.prod(shape))
             network[name], k = weights[k : k + size].reshape(shape).copy(), k + size

@@ -40,7 +40,7 @@ def fit_numbers(
     columns = _columns(model.group[:joints], free)
 
     def numbers(x: np.ndarray) -> ServoModel:
-        return model.moved(plant, np.einsum("c,ckj->kj", x, columns)).within(plant, longest)
+        return model.shift(plant, np.einsum("c,ckj->kj", x, columns)).within(plant, longest)
 
     def at(x: np.ndarray) -> np.ndarray:
         return residual(numbers(x)).reshape(-1, joints)
