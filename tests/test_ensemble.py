@@ -61,7 +61,7 @@ def softer(member: int) -> Any:
     """A learned servo that differs from the nominal one by a softer gain."""
     change = np.zeros((len(NUMBERS), len(NAO.plant.robot.controlled)))
     change[NUMBERS.index("kp")] = -1.5 * member  # in units of 0.2
-    return neutral(NAO.plant, np.random.default_rng(member)).moved(NAO.plant, change)
+    return neutral(NAO.plant, np.random.default_rng(member)).shift(NAO.plant, change)
 
 
 @dataclass(frozen=True)
