@@ -16,15 +16,13 @@ from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.arena import arena_of
-from gsl.diagnosis.experiment import experiment
 from gsl.diagnosis.identified import identified
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.replay import Bench, Effects
 from gsl.diagnosis.world_file import joined
-from gsl.errors import GslError
 from gsl.stages.diagnosis_files import REPORT
 from gsl.stages.diagnosis_settings import Without
-from gsl.stages.logs import check_log, log_parents, on_ground, read_logs
+from gsl.stages.logs import log_parents, read_motions
 from gsl.stages.population import Workers, threads
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
@@ -59,13 +57,7 @@ class Identify:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write report.json and the identified world."""
-        robot, batch = lumped(self.sim.plant.robot), read_logs(self.real)
-        check_log(batch, robot, self.real)
-        if on_ground(batch):
-            raise GslError(f"{self.real}: identification needs the robot in the air; see `gsl collect task=excite`")
-        found = experiment(batch, robot)
-        if not len(found.train) or not len(found.held_out):
-            raise GslError(f"{self.real}: too little to fit and to check: two motions of some seconds are the least")
+        found = read_motions(self.real, lumped(self.sim.plant.robot))
         options = Options(self.without, threads=threads(self.workers))
         arena = arena_of(found, self.sim.plant, self.sim.step, options, lambda phase: checkpoint())
         with console.progress(self.evaluations, "fitting all parameters at once") as progress:

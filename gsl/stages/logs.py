@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gsl.core.body import Robot
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.experiment import SCORED, WARM_UP
+from gsl.diagnosis.experiment import SCORED, WARM_UP, Experiment, experiment
 from gsl.errors import ArtifactError, InputError, TrajectoryError
 from gsl.stages.training import data_file
 from gsl.storage.importers.formats import readable
@@ -114,6 +116,27 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
         )
     _check_units(batch, robot, name)
     _check_velocities(batch, name)
+
+
+def read_motions(reference: str, robot: Robot, held_out: Mapping[str, Any] | None = None) -> Experiment:
+    """Return logs of a robot in the air, of which a part is held out.
+
+    Args:
+        reference: A run, a file or a folder of files.
+        robot: Whose logs they are.
+        held_out: Labels of the trajectories that are for checking; every second motion by default.
+
+    Raises:
+        InputError: They cannot be replayed, the robot stood on the ground, or they are too few.
+    """
+    batch = read_logs(reference)
+    check_log(batch, robot, reference)
+    if on_ground(batch):
+        raise InputError(f"{reference}: needs the robot in the air; see `gsl collect task=excite`")
+    motions = experiment(batch, robot, held_out=held_out or {})
+    if not len(motions.train) or not len(motions.held_out):
+        raise InputError(f"{reference}: too little to fit and to check: two motions of some seconds are the least")
+    return motions
 
 
 def _check_time(batch: Batch, name: str) -> None:

@@ -13,7 +13,7 @@ import yaml
 from gsl.core.body import lumped
 from gsl.core.described import described
 from gsl.core.setting import component, setting
-from gsl.diagnosis.experiment import Experiment, experiment
+from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.torque_width import TorqueWidth, held_out_widths
 from gsl.errors import ConfigError, InputError
 from gsl.models.servo import ServoModel
@@ -21,7 +21,7 @@ from gsl.models.servo_file import FILE
 from gsl.models.servo_members import ServoMembers
 from gsl.report.servo_curves import servo_curves
 from gsl.stages.diagnosis_settings import Tolerance
-from gsl.stages.logs import check_log, log_parents, on_ground, read_logs
+from gsl.stages.logs import log_parents, read_motions
 from gsl.stages.population import Workers, threads
 from gsl.storage import documents
 from gsl.storage.models import write_model
@@ -65,13 +65,9 @@ class TrainServo:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the checkpoint, the world that it makes and what it has learned as curves."""
-        robot, batch = lumped(self.sim.plant.robot), read_logs(self.real)
-        check_log(batch, robot, self.real)
-        if on_ground(batch):
-            raise InputError(f"{self.real}: a servo is learned from motions in the air; see `gsl collect task=excite`")
-        exp = experiment(batch, robot, held_out=self.held_out)
-        if not len(exp.train) or len(exp.held_out) < 2:
-            raise InputError(f"{self.real}: too little to fit and to check: two motions of some seconds are the least")
+        exp = read_motions(self.real, lumped(self.sim.plant.robot), self.held_out)
+        if len(exp.held_out) < 2:
+            raise InputError(f"{self.real}: one window is held out; a servo needs two, to stop by and to check by")
         exp = exp.with_model_error(np.full(len(exp.joints), self.tolerance))
         console.status(f"learning the servo from {len(exp.records)} motions; a minute for a humanoid")
         count = threads(self.workers)
