@@ -41,10 +41,12 @@ def commands(rng: np.random.Generator, period: float, seconds: float, size: floa
 
 
 def log(plant: Plant, *, period: float = PERIOD, motions: int = 10, seconds: float = 4.0, size: float = 1.0,
-        noise: float = NOISE, seed: int = 0) -> Batch:  # fmt: skip
-    """What a robot that is `plant` logs of motions of its own."""
+        noise: float = NOISE, seed: int = 0, rests: bool = False) -> Batch:  # fmt: skip
+    """What a robot that is `plant` logs of motions of its own, whose second half it may rest."""
     rng = np.random.default_rng(seed)
     paths = [commands(rng, period, seconds, size) for _ in range(motions)]
+    for path in paths if rests else []:
+        path[len(path) // 2 :] = path[len(path) // 2]
     played = Held.of(plant, min(STEP, period), period).play(paths, [path[0] for path in paths], round(1.0 / period))
     episodes = []
     for path, position in zip(paths, played, strict=True):
@@ -176,6 +178,14 @@ def test_a_delay_stays_within_what_servos_remember() -> None:
 def test_a_log_without_motion_is_refused() -> None:
     with pytest.raises(InputError, match="the log's joints hardly move: by .* mrad"):
         learned(prepared(SLOW, size=0.0))
+
+
+def test_a_joint_that_shakes_is_learned_from_or_left_alone() -> None:
+    """A stiff servo that measures late swings at rest; what is learned of its gain must not be worse than nothing."""
+    exp = prepared({"sensor_delay": {"delay": 0.02}, "servo_gain": {"kp": 0.6}}, motions=6, rests=True)
+    assert exp.comparison.shaking.all()
+    found = learned(exp)
+    assert found.after["all"] <= found.before["all"]
 
 
 def test_one_motion_alone_is_learned_from() -> None:

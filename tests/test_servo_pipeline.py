@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 import yaml
 from commands import SMALL, Said, done, refused
@@ -140,6 +142,15 @@ def test_bad_input_gets_one_line(air: tuple[Path, Said], changes: tuple[str, ...
     changed = {change.partition("=")[0] for change in changes}
     line = [word for word in TRAIN if word.partition("=")[0] not in changed]
     assert told in refused(*line, *changes, "name=refused", folder=folder)
+
+
+def test_a_log_with_a_hole_is_refused_by_its_row(air: tuple[Path, Said], tmp_path: Path) -> None:
+    folder, _ = air
+    whole = pq.read_table(folder / FIRST / "collect_excitation/trajectories.parquet")
+    pq.write_table(whole.filter(pc.not_equal(whole["step"], 30)), tmp_path / "holes.parquet")
+    line = [word for word in TRAIN if not word.startswith("real=")]
+    said = refused(*line, f"real={tmp_path / 'holes.parquet'}", "name=refused", folder=folder)
+    assert "holes.parquet" in said and len(said.strip().splitlines()) == 1
 
 
 def test_a_servo_of_another_robot_or_version_is_refused(air: tuple[Path, Said], tmp_path: Path) -> None:
