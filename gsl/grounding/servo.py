@@ -23,6 +23,9 @@ from gsl.models.servo_file import read_members, read_servo
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
 
+# Of a joint's torque limit, at every step and constant: motions in the air do not show what loads of the ground do.
+# Chosen for gain and falls together in searches on three other worlds (docs/results/servo.md).
+LEAST_NOISE = (0.2, 0.06)
 MEMBERS = 4  # of the ensemble that a chain learns: as many as rollouts that a candidate usually has at most
 
 
@@ -32,7 +35,8 @@ class LearnedServo:
 
     servo: Annotated[str, setting("path or run of train-servo")] = ""
     torque_noise: Annotated[
-        float, setting("torque noise on top, in units of what held-out motions leave unexplained", ge=0)
+        float,
+        setting("torque noise on top; 1 is what held-out motions leave unexplained, at least 0.2 of the limit", ge=0),
     ] = 0.0
     ensemble: Annotated[bool, setting("each episode is with another member of the servo, of several")] = False
     noise: Annotated[float, setting("action noise on top", unit="rad", ge=0)] = 0.0
@@ -72,10 +76,10 @@ class LearnedServo:
         """Return a world with its learned servo and the torque noise that was asked for."""
         if not self.torque_noise:
             return world
-        model = read_servo(self.servo)
-        widths = self.torque_noise * np.where(
-            model.group[:, None] == NOBODY, 0.0, model.noise[model.group]
-        )  # (n_motors, 2)
+        model, limit = read_servo(self.servo), world.plant.servo.limit[:, None]
+        unexplained = np.where(model.group[:, None] == NOBODY, 0.0, model.noise[model.group])
+        least = np.where(np.isfinite(limit), limit * LEAST_NOISE, 0.0)
+        widths = self.torque_noise * np.maximum(unexplained, least)  # (n_motors, 2)
         step, constant = (dict(zip(model.joints, column.tolist(), strict=True)) for column in widths.T)
         noisy: BulletWorld = with_torque_noise(world, step, constant)
         return noisy
