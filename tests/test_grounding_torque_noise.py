@@ -17,10 +17,14 @@ from gsl.core.plant import Plant
 from gsl.errors import ConfigError, Refused
 from gsl.grounding.effects import DiagnosedEffects
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.servo import LearnedServo
 from gsl.grounding.torque_noise import TorqueNoise, torque_limits, with_torque_noise
+from gsl.models.servo import neutral
+from gsl.models.servo_members import ServoMembers
 from gsl.policies.walk_engine import WalkEngine
 from gsl.stages.grounding_gate import Gate, settled
 from gsl.stages.rollout import Scenario
+from gsl.storage.models import write_model
 from gsl.worlds.bullet import BulletWorld
 
 WORLD = BulletWorld(robot="nao", effects={"torque_limit": {"factor": 0.5, "joints": "arms"}})
@@ -50,6 +54,17 @@ def test_widths_are_in_newton_metres_by_scope_and_add_in_square_to_what_is_there
     twice = with_torque_noise(made, 0.4, 0.0)
     np.testing.assert_allclose(noise(twice)[0], np.where(legs, 0.5, 0.4))
     assert with_torque_noise(WORLD, 0.0, 0.0) is WORLD
+
+
+def test_noise_on_a_servo_is_what_motions_leave_unexplained_or_a_share_of_the_limit(tmp_path: Path) -> None:
+    """Legs leave much unexplained, arms nothing; the least is a fifth of a limit, and 6 % of it constant."""
+    model = neutral(WORLD.plant, np.random.default_rng(0))
+    unexplained = np.array([[1.5, 0.4] if name == "legs" else [0.0, 0.0] for name in model.groups])
+    write_model(tmp_path, ServoMembers((replace(model, noise=unexplained),)))
+    made = LearnedServo(servo=str(tmp_path), torque_noise=1.0).shaken(replace(WORLD, servo=str(tmp_path)))
+    least = np.outer([0.2, 0.06], WORLD.plant.servo.limit)
+    np.testing.assert_allclose(noise(made), np.where(WORLD.plant.mask("legs"), [[1.5], [0.4]], least))
+    assert LearnedServo(servo=str(tmp_path)).shaken(WORLD) is WORLD
 
 
 def test_without_noise_an_episode_has_the_bits_it_had() -> None:

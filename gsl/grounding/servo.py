@@ -80,7 +80,8 @@ class LearnedServo:
         unexplained = np.where(model.group[:, None] == NOBODY, 0.0, model.noise[model.group])
         least = np.where(np.isfinite(limit), limit * LEAST_NOISE, 0.0)
         widths = self.torque_noise * np.maximum(unexplained, least)  # (n_motors, 2)
-        step, constant = (dict(zip(model.joints, column.tolist(), strict=True)) for column in widths.T)
+        joints = world.plant.robot.controlled  # coupled motors follow them
+        step, constant = (dict(zip(joints, column.tolist(), strict=False)) for column in widths.T)
         noisy: BulletWorld = with_torque_noise(world, step, constant)
         return noisy
 
