@@ -144,6 +144,18 @@ def test_bad_input_gets_one_line(air: tuple[Path, Said], changes: tuple[str, ...
     assert told in refused(*line, *changes, "name=refused", folder=folder)
 
 
+def test_walks_beside_motions_in_the_air_bring_walks_nearer(air: tuple[Path, Said]) -> None:
+    folder, _ = air
+    world = [word.replace("real", "world", 1) for word in SOFT]
+    done("collect", "role=real", *SMALL, *world, "episodes=2", "neighbours=0", "name=walked", folder=folder)
+    done(*TRAIN, "walks=walked/collect_real", "name=walked", folder=folder)
+    metrics = loaded(folder / "runs/walked/train_servo/metrics.json")
+    assert metrics["walks"]["floors_after"] < 0.5 * metrics["walks"]["floors_before"]
+    assert metrics["floors_after"] < 0.2 * metrics["floors_before"]
+    said = refused(*TRAIN, f"walks={FIRST}/collect_excitation", "name=refused", folder=folder)
+    assert "the robot is in the air here" in said
+
+
 def test_a_log_with_a_hole_is_refused_by_its_row(air: tuple[Path, Said], tmp_path: Path) -> None:
     folder, _ = air
     whole = pq.read_table(folder / FIRST / "collect_excitation/trajectories.parquet")

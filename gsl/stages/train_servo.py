@@ -21,12 +21,13 @@ from gsl.models.servo_file import FILE
 from gsl.models.servo_members import ServoMembers
 from gsl.report.servo_curves import servo_curves
 from gsl.stages.diagnosis_settings import Tolerance
-from gsl.stages.logs import log_parents, read_motions
+from gsl.stages.logs import check_log, log_parents, on_ground, read_logs, read_motions
 from gsl.stages.population import Workers, threads
 from gsl.storage import documents
 from gsl.storage.models import write_model
 from gsl.storage.workplace import destination
 from gsl.training.learn_servo import LearnedServo, document, learn_servo
+from gsl.training.servo_walks import Walks, walks
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.velocity_motors import check_servos
 
@@ -45,6 +46,9 @@ class TrainServo:
 
     real: Annotated[str, setting("trajectories in the air: a run, a parquet file or a folder of them", min_length=1)]
     sim: Annotated[BulletWorld, setting("the simulator whose servos are to become the robot's")]
+    walks: Annotated[str | None, setting("trajectories on the ground besides, from which numbers are learned too")] = (
+        None
+    )
     tolerance: Tolerance = 0.0
     held_out: Annotated[
         Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
@@ -61,7 +65,7 @@ class TrainServo:
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""
-        return log_parents(real=self.real)
+        return log_parents(real=self.real, walks=self.walks)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the checkpoint, the world that it makes and what it has learned as curves."""
@@ -69,18 +73,12 @@ class TrainServo:
         if len(exp.held_out) < 2:
             raise InputError(f"{self.real}: one window is held out; a servo needs two, to stop by and to check by")
         exp = exp.with_model_error(np.full(len(exp.joints), self.tolerance))
+        walked = self._walks(exp)
         console.status(f"learning the servo from {len(exp.records)} motions; a minute for a humanoid")
-        count = threads(self.workers)
-        labelled = bool(self.held_out)
         learned = learn_servo(
-            exp,
-            self.sim.plant,
-            self.sim.step,
-            labelled=labelled,
-            seed=self.seed,
-            threads=count,
-            members=self.members,
-        )
+            exp, self.sim.plant, self.sim.step, labelled=bool(self.held_out), seed=self.seed,
+            threads=threads(self.workers), members=self.members, walks=walked,
+        )  # fmt: skip
         model = replace(learned.model, noise=self._unexplained(exp, learned.model))
         further = [replace(one.model, noise=model.noise) for one in learned.further]
         write_model(folder, ServoMembers((model, *further)))
@@ -91,6 +89,20 @@ class TrainServo:
             console.status(f"warning: {line}")
         noise = {name: row.tolist() for name, row in zip(model.groups, model.noise, strict=True)}
         return {**told, "torque_noise": noise, "problems": problems(told)}
+
+    def _walks(self, exp: Experiment) -> Walks | None:
+        """Return the log on the ground, if there is one.
+
+        Raises:
+            InputError: It cannot be replayed, or has other joints or another rate than the log in the air.
+        """
+        if self.walks is None:
+            return None
+        batch = read_logs(self.walks)
+        check_log(batch, exp.robot, self.walks)
+        if not on_ground(batch):
+            raise InputError(f"{self.walks}: the robot is in the air here; name these logs in real=")
+        return walks(batch, exp.robot, self.sim.plant, self.sim.step, threads(self.workers))
 
     def _unexplained(self, exp: Experiment, model: ServoModel) -> np.ndarray:
         """Return the torque noise that held-out motions leave unexplained [N·m], at every step and constant, (G, 2)."""

@@ -15,24 +15,17 @@ import numpy as np
 
 from gsl.core.plant import Plant
 from gsl.diagnosis.experiment import Experiment
-from gsl.diagnosis.records import Pieces, pieces
-from gsl.diagnosis.residual import Comparison, loss
 from gsl.errors import InputError
-from gsl.models.servo import ServoModel, neutral, with_group, without_group
+from gsl.models.servo import ServoModel, neutral, without_group
 from gsl.training.frozen import freeze
+from gsl.training.servo_bench import CHANCE, LIKELY, ServoBench, cut_windows
 from gsl.training.servo_members import ITERATIONS, Member, further
 from gsl.training.servo_network import Alike, Progress, fit_network
-from gsl.training.servo_numbers import fit_numbers
 from gsl.training.servo_replays import Replays
-from gsl.worlds.servo_state import COMMANDS
+from gsl.training.servo_walks import Walks
 
 SHORT = (0.1, 0.4)  # warm-up and scored part of a window for a network [s]: errors stay small enough to be frozen
-LONG = (0.4, 1.6)  # the same for numbers: what a log does not show at first, such as friction's state, is forgotten
-WINDOWS = 160  # that are fitted, at most
 MOST = 300  # iterations of the network's fit
-SAMPLES = 1000  # of a bootstrap over motions
-CHANCE = 0.025  # of a bootstrap, on either side
-LIKELY = 0.9  # share of bootstraps in which numbers have to help: they are few, and each means something
 WORTH = 0.1  # of the cost that a network has to take: for less it is not let loose on motions that nobody has logged
 WIDE = 10.0  # noise floors that a joint moves in a window, at least, to show what drives it: noise alone spans 6
 LEAST_MOVING = 4  # windows in which a joint moves so far, at least
@@ -45,7 +38,7 @@ class Split:
     Attributes:
         train: Fitted.
         judge: Choose when to stop.
-        test: Are for the report; with the judge they also say whether a group takes a step (`_Bench.kept`).
+        test: Are for the report; with the judge they also say whether a group takes a step (`ServoBench.kept`).
     """
 
     train: np.ndarray
@@ -64,6 +57,7 @@ class LearnedServo:
         way: Of the optimisation.
         windows: How many were fitted, judged and tested.
         further: Further members of an ensemble.
+        walks: Gap of held-out walks before and after in noise floors, if there were some.
     """
 
     model: ServoModel
@@ -73,6 +67,7 @@ class LearnedServo:
     way: tuple[Progress, ...]
     windows: tuple[int, int, int]
     further: tuple[Member, ...] = ()
+    walks: tuple[float, ...] | None = None
 
 
 def split(exp: Experiment, *, labelled: bool) -> Split:
@@ -92,7 +87,15 @@ def split(exp: Experiment, *, labelled: bool) -> Split:
 
 
 def learn_servo(
-    exp: Experiment, plant: Plant, step: float, *, labelled: bool, seed: int, threads: int, members: int = 1
+    exp: Experiment,
+    plant: Plant,
+    step: float,
+    *,
+    labelled: bool,
+    seed: int,
+    threads: int,
+    members: int = 1,
+    walks: Walks | None = None,
 ) -> LearnedServo:
     """Learn the servo of a log on top of a plant.
 
@@ -104,6 +107,7 @@ def learn_servo(
         seed: Of the first weights.
         threads: That replay side by side; the result does not depend on them.
         members: Of an ensemble, the servo included.
+        walks: Of the same robot, that numbers are fitted to besides.
 
     Raises:
         InputError: The log shows too little motion to learn from.
@@ -111,10 +115,12 @@ def learn_servo(
     _check_motion(exp)
     parts, start = split(exp, labelled=labelled), neutral(plant, np.random.default_rng(seed))
     with ThreadPoolExecutor(threads) as pool:
-        bench = _Bench(exp, Replays(plant, step, exp.period, threads, pool), start)
+        bench = ServoBench(exp, Replays(plant, step, exp.period, threads, pool), start)
         held = np.concatenate([parts.judge, parts.test])
         numbers = bench.kept(held, start, bench.numbers(parts.train), LIKELY, 0.0)
-        some = _windows(exp, parts.train, SHORT)
+        if walks:
+            numbers = bench.kept_on_foot(walks, held, numbers, bench.numbers_with(walks, parts.train, numbers))
+        some = cut_windows(exp, parts.train, SHORT)
 
         def fit(begun: ServoModel, index: np.ndarray, iterations: int) -> tuple[ServoModel, list[Progress]]:
             chosen = some.chosen(index)
@@ -133,88 +139,15 @@ def learn_servo(
         worse = tuple(name for name, share in change.items() if np.quantile(share, CHANCE) > 0.0)
         for name in worse:
             model = without_group(model, name)
-        levels = [bench.by_group(parts.test, one) for one in (start, model)]
+        gaps = [bench.by_group(parts.test, one) for one in (start, model)]
         others = further(
             members - 1, numbers, worse,
             lambda begun, index: fit(begun, index, ITERATIONS)[0], lambda one: bench.level(parts.test, one),
             plant=plant, samples=some.samples, seed=seed,
         )  # fmt: skip
         sizes = len(some), len(parts.judge), len(parts.test)
-        return LearnedServo(model, levels[0], levels[1], worse, tuple(way), sizes, tuple(others))
-
-
-@dataclass(frozen=True)
-class _Bench:
-    """A log on which servos are compared, in windows of a second; `start` changes nothing."""
-
-    exp: Experiment
-    replays: Replays
-    start: ServoModel
-
-    @property
-    def floor(self) -> np.ndarray:
-        """Of joints whose phase a fit takes as it comes, whether they shake or not [rad], shape (n_joints,)."""
-        return np.hypot(self.exp.comparison.floor, self.exp.comparison.sway)
-
-    @property
-    def longest(self) -> float:
-        """Delay of a target that servos remember [s]."""
-        return (COMMANDS - 1) * self.exp.period
-
-    def numbers(self, index: np.ndarray) -> ServoModel:
-        """Return the start with numbers fitted to the motions of some windows."""
-        some, floor = _windows(self.exp, index, LONG), self.floor
-        plain = Comparison(floor, np.zeros(len(floor), dtype=bool), np.zeros(len(floor)))
-
-        def residual(model: ServoModel) -> np.ndarray:
-            return plain.residual(self.replays.replay(model, some), some)
-
-        return fit_numbers(self.replays.plant, self.start, residual, longest=self.longest)
-
-    def residuals(self, index: np.ndarray, model: ServoModel) -> np.ndarray:
-        """Return residuals of some windows [floors], shape (W, scored, n_joints)."""
-        some = self.exp.pieces.chosen(index)
-        return self.exp.comparison.residual(self.replays.replay(model, some), some)
-
-    def level(self, index: np.ndarray, model: ServoModel) -> float:
-        """Return the root mean square of residuals [floors]."""
-        return self.by_group(index, model)["all"]
-
-    def by_group(self, index: np.ndarray, model: ServoModel) -> dict[str, float]:
-        """Return the root mean square of residuals by group, and of `all` [floors]."""
-        z, group = self.residuals(index, model), self.start.group[: len(self.floor)]
-        used, square = self.exp.comparison.used(z.shape[1]), (z**2).sum(axis=(0, 1))
-        masks = {name: group == g for g, name in enumerate(model.groups)}
-        masks = {"all": np.ones(len(used), dtype=bool)} | {name: mask for name, mask in masks.items() if mask.any()}
-        return {name: float(np.sqrt(square[mask].sum() / (used[mask].sum() * len(z)))) for name, mask in masks.items()}
-
-    def change(self, index: np.ndarray, old: ServoModel, new: ServoModel) -> dict[str, np.ndarray]:
-        """Return the relative change of the robust cost in bootstraps over motions, by group, shape (SAMPLES,) each."""
-        sample, rng = self.exp.pieces.chosen(index).samples, np.random.default_rng(0)
-        costs = [loss(self.residuals(index, one)).sum(axis=1) for one in (old, new)]
-        sums = np.array([[cost[sample == k].sum(axis=0) for k in np.unique(sample)] for cost in costs])
-        before, after = sums[:, rng.integers(0, sums.shape[1], (SAMPLES, sums.shape[1]))].sum(axis=2)
-        group = self.start.group[: before.shape[1]]
-        return {
-            name: after[:, group == g].sum(axis=1) / before[:, group == g].sum(axis=1) - 1.0
-            for g, name in enumerate(old.groups)
-            if (group == g).any()
-        }
-
-    def kept(self, index: np.ndarray, old: ServoModel, new: ServoModel, sure: float, worth: float) -> ServoModel:
-        """Return the new servo, and the old one in groups whose cost does not fall by a share.
-
-        Args:
-            index: Of windows that the new one was not fitted to.
-            old: What it shall be better than.
-            new: The new one.
-            sure: Share of the bootstraps in which the cost has to fall.
-            worth: Share of the cost by which it has to.
-        """
-        for name, share in self.change(index, old, new).items():
-            if np.quantile(share, sure) >= -worth:
-                new = with_group(new, old, name)
-        return new
+        on_foot = tuple(walks.level(one) for one in (start, model)) if walks else None
+        return LearnedServo(model, gaps[0], gaps[1], worse, tuple(way), sizes, tuple(others), on_foot)
 
 
 def _check_motion(exp: Experiment) -> None:
@@ -232,22 +165,6 @@ def _check_motion(exp: Experiment) -> None:
         )
 
 
-def _windows(exp: Experiment, index: np.ndarray, lengths: tuple[float, float]) -> Pieces:
-    """Return windows of another length of the same motions; the same ones where motions are short, or it is only one.
-
-    Args:
-        exp: The log.
-        index: Of its windows.
-        lengths: Warm-up and scored part [s].
-    """
-    chosen = np.unique(exp.pieces.record[index])
-    warm_up, scored = (max(1, round(part / exp.period)) for part in lengths)
-    if not exp.by_record or any(len(exp.records[k]) < warm_up + scored for k in chosen):
-        return exp.pieces.chosen(index)
-    cut = pieces([exp.records[k] for k in chosen], exp.robot, exp.period, warm_up=warm_up, scored=scored)
-    return cut.chosen(np.unique(np.linspace(0, len(cut) - 1, min(WINDOWS, len(cut))).round().astype(int)))
-
-
 def document(learned: LearnedServo) -> dict[str, Any]:
     """Return what metrics say of a learned servo."""
     fitted, judged, tested = learned.windows
@@ -262,4 +179,7 @@ def document(learned: LearnedServo) -> dict[str, Any]:
         "members": [learned.after["all"], *(member.floors for member in learned.further)],
         "windows": {"fitted": fitted, "judged": judged, "tested": tested},
         "iterations": len(learned.way),
+        **(
+            {"walks": dict(zip(("floors_before", "floors_after"), learned.walks, strict=True))} if learned.walks else {}
+        ),
     }

@@ -24,7 +24,7 @@ FAR = 100.0  # floors beyond which a residual is cut off before it sets a scale
 
 def fit_numbers(
     plant: Plant, model: ServoModel, residual: Callable[[ServoModel], np.ndarray], *,
-    free: Sequence[str] = NUMBERS, ridge: float = RIDGE, longest: float = np.inf,
+    free: Sequence[str] = NUMBERS, ridge: float = RIDGE, longest: float = np.inf, rounds: int = ROUNDS,
 ) -> ServoModel:  # fmt: skip
     """Return the model with the numbers that replay a log best.
 
@@ -35,6 +35,7 @@ def fit_numbers(
         free: Names of the numbers that are fitted.
         ridge: Cost of a change by a unit, in residuals per sqrt(number of residuals).
         longest: Delay of the target that a simulator can remember [s].
+        rounds: In which the robust scale comes down; one is enough near the answer.
     """
     joints = len(plant.robot.controlled)
     columns = _columns(model.group[:joints], free)
@@ -54,9 +55,9 @@ def fit_numbers(
     def jacobian(x: np.ndarray) -> np.ndarray:
         return np.vstack([_slopes(at, x, columns), pull])
 
-    for left in range(ROUNDS - 1, -1, -1):
+    for left in range(rounds - 1, -1, -1):
         far = np.sqrt(np.mean(np.minimum(np.abs(at(x)), FAR) ** 2))
-        scale = ROBUST * max(1.0, far / ROBUST) ** (left / ROUNDS)
+        scale = ROBUST * max(1.0, far / ROBUST) ** (left / rounds)
         x = least_squares(cost, x, jacobian, loss="cauchy", f_scale=scale, max_nfev=STEPS, ftol=1e-3, xtol=1e-3).x
     return numbers(x)
 
