@@ -51,6 +51,13 @@ def test_iterate_learns_the_servo_by_itself_and_reports_the_gap(air: tuple[Path,
     assert [parent["role"] for parent in parents] == ["grounding.servo"]
 
 
+def test_a_motion_and_a_walk_are_drawn(air: tuple[Path, Said]) -> None:
+    folder, said = air
+    made = {path.name for path in (folder / "runs/air/iterate").iterdir()}
+    assert {"joint_trace.png", "walk.png", "learning_curve.png"} < made
+    assert "(joint_trace.png, learning_curve.png, walk.png)" in said.out
+
+
 def test_nothing_is_done_twice(air: tuple[Path, Said]) -> None:
     folder, _ = air
     assert "(unchanged)" in done(*LINE, folder=folder).out.splitlines()[-1]

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.core.layout import check_alike
-from gsl.core.observation import missing
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError, Refused
 from gsl.grounding.effects import learned
@@ -19,24 +18,23 @@ from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.optimizer import Learner
 from gsl.policies.policy import Policy, sized
 from gsl.report.markdown import in_unit
-from gsl.report.render import walk_strip
 from gsl.stages.chain import Budget, Chain, round_seed
-from gsl.stages.choices import FILE, policies, record
+from gsl.stages.choices import FILE, policies, record, records, vector
 from gsl.stages.compliance_report import SECTION, with_real
-from gsl.stages.diagnosis_plan import DiagnosisPlan, flown
+from gsl.stages.diagnosis_plan import EXCITATION, DiagnosisPlan, flown
 from gsl.stages.grounding_gate import REPORT, settled
-from gsl.stages.iteration_report import Rounds, write_curve, write_table, write_trace
+from gsl.stages.iteration_pictures import draw_flight, draw_walk_and_joint, without_margins
+from gsl.stages.iteration_report import Rounds, write_curve, write_table
 from gsl.stages.objective import Objective, Quantile, check_objective
 from gsl.stages.population import Workers
 from gsl.stages.rollout import Scenario
 from gsl.stages.train_forward import HELDOUT
-from gsl.stages.training import of_policy
+from gsl.stages.training import DATA, of_policy
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policies import write_policies
 from gsl.storage.trajectories import read
 from gsl.tasks.task import SIM, Task
-from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.gymnasium import try_out
 from gsl.worlds.world import World
@@ -134,8 +132,7 @@ class Iterate:
         yielding = with_real(home / FIRST / "optimize" / REPORT, self.real, self.seed)
         write_table(folder, rounds, [yielding.told] if yielding else [])
         write_curve(folder, rounds)
-        if self.learned:
-            self._trace(folder, home, first)
+        self._draw(folder, home, first)
         if yielding:
             console.status(yielding.told)
         return {**rounds.metrics(), SECTION: yielding.metrics() if yielding else None}
@@ -184,17 +181,18 @@ class Iterate:
         found = self.chain.search(place / "optimize_none", NoGrounding(), start, self.seed, console)
         return self.chain.measure(place / "evaluate_none", found, self.seed, console)
 
-    def _trace(self, folder: Path, home: Path, ready: Grounding) -> None:
-        """Draw a real walk that no model has seen, and what the first iteration's grounding makes of it."""
+    def _draw(self, folder: Path, home: Path, first: Grounding) -> None:
+        """Draw what the first iteration's grounding makes of real motions that nothing was learned from, and a walk."""
         place = home / FIRST
         search = Artifact(place / "optimize", manifest.read(place / "optimize"))
-        scenario = settled(Scenario(self.sim, self.task, self.policy, SIM, ready), search.metrics)
-        heldout = read(place / "train_forward" / HELDOUT)
-        walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
-        if not isinstance(scenario.world, BulletWorld) or missing(walk, scenario.world.layout):
-            return  # there are no joints to draw, or nobody knows where the body was
-        write_trace(folder, scenario.world, scenario.grounding, walk)
-        walk_strip(scenario.world.plant.robot, walk, folder / "walk.png")
+        scenario = settled(Scenario(self.sim, self.task, self.policy, SIM, without_margins(first)), search.metrics)
+        if self.learned:
+            heldout = read(place / "train_forward" / HELDOUT)
+            walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
+            draw_walk_and_joint(folder, scenario, walk)
+        elif (place / EXCITATION).is_dir():
+            log, best = read(place / EXCITATION / DATA), records(self.policy, str(folder / FILE))[-1]
+            draw_flight(folder, self.sim, scenario, log, vector(self.policy, best), self.seed)
 
 
 def check_aggregate(iterate: Iterate, groundings: Iterable[Grounding | ActionTransformation], name: str) -> None:

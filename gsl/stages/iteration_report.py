@@ -1,4 +1,4 @@
-"""What a person looks at after `iterate`: table, verdict, learning curve, one joint's traces (the paper's figure 6)."""
+"""What a person reads after `iterate`: table, verdict, learning curve."""
 
 from __future__ import annotations
 
@@ -7,27 +7,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from gsl.core.observation import observations
-from gsl.core.trajectory import Trajectory
-from gsl.core.transitions import actions
-from gsl.grounding.none import NoGrounding
-from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.learning_curve import Search, learning_curve, search
 from gsl.report.markdown import table
 from gsl.stages.diagnosis_plan import Flight
 from gsl.stages.evaluate import TABLE
-from gsl.stages.grounding_replay import PAST, Place, replay
 from gsl.stages.headline import Unit, gained
 from gsl.stages.measured import ended, ends
 from gsl.storage.artifact import Artifact
 from gsl.tasks.task import Task
-from gsl.worlds.bullet import BulletWorld
 
-CURVE, TRACE, MARKDOWN = "learning_curve.png", "joint_trace.png", "table.md"
+CURVE, MARKDOWN = "learning_curve.png", "table.md"
 BEGUN = {"pi0": "π0", "start": "where it began"}  # what a search without a better policy returns
-TAKEN_OVER, SHOWN = 2.0, 0.8  # when the simulators take over from the real robot, and for how long [s]
 
 
 class Rounds:
@@ -204,28 +194,3 @@ def write_table(folder: Path, rounds: Rounds, remarks: Sequence[str] = ()) -> No
 def write_curve(folder: Path, rounds: Rounds) -> None:
     """Write the learning curve of all iterations, and of the search without grounding if there was one."""
     learning_curve(folder / CURVE, rounds.searches(), unit=rounds.unit)
-
-
-def write_trace(folder: Path, world: BulletWorld, grounding: Any, walk: Trajectory) -> None:
-    """Write the trace of the joint that moves most: a real walk, and its actions replayed from one of its states.
-
-    Args:
-        folder: Where to write.
-        world: The simulator.
-        grounding: Ready to act.
-        walk: A real trajectory that no model has seen.
-    """
-    env = world.make()
-    tick = max(PAST, min(round(TAKEN_OVER / world.period), len(walk) // 2))
-    sent = actions(walk, carried_out=True)
-    place = Place(observations(walk, world.layout), sent, tick)
-    ticks = min(round(SHOWN / world.period), len(walk) - tick)
-    rng = np.random.default_rng(0)
-    simulated = [np.array(list(replay(env, way, place, rng, ticks))) for way in (NoGrounding(), grounding)]
-    env.close()
-    shown = slice(tick + 1, tick + 1 + ticks)
-    joint = int(np.argmax(np.ptp(walk.position[shown], axis=0)))
-    command = sent[tick : tick + ticks, joint]
-    bare, grounded = (seen[:, joint] for seen in simulated)
-    traces = Traces(walk.time[shown], command, walk.position[shown, joint], bare, grounded)
-    joint_trace(folder / TRACE, traces, world.layout.joints[joint])
