@@ -98,7 +98,7 @@ def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str |
         searches: Panels from left to right.
         unit: Of all values.
         title: By default how many of the generations' best stay on their feet in real, if some fall, and are above
-            their start; beside those of a search without grounding, if there is one.
+            their start; beside a search without grounding, what both return.
     """
     with look():
         whole = figure(4.6)
@@ -109,7 +109,7 @@ def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str |
             _draw(axes, one)
             axes.tick_params(labelleft=True)
         panels[0].set_ylabel(in_unit("value", unit) if unit else "return of an episode")
-        headline(whole, title or _finding(searches))
+        headline(whole, title or _finding(searches, unit))
     return whole
 
 
@@ -214,15 +214,29 @@ def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -
     axes.annotate(text, (x, y), color=colour, zorder=7, **place)
 
 
-def _finding(searches: Sequence[Search]) -> str:
+def _finding(searches: Sequence[Search], unit: str) -> str:
     bare, grounded = [one for one in searches if one.bare], [one for one in searches if not one.bare]
     count, stable, better = _counted(grounded or bare)
     if grounded and bare:
         others, _, gain = _counted(bare)
-        return f"{better} of {count} generation winners stay up and gain in real, {gain} of {others} {bare[0].label}"
+        start = grounded[0].points[0].real
+        ours = f"{_number(_returned(grounded))} {unit}".rstrip()
+        values = f"{ours} with grounding, {_number(_returned(bare))} without"
+        stay = f"{better} and {gain} of {count}" if count == others else f"{better} of {count} and {gain} of {others}"
+        return f"On the real side {values}, {grounded[0].start} {_number(start)}; {stay} winners stay up and gain"
     if stable == count:
         return f"{better} of {count} generation winners are above their start in real"
     return f"Of {count} generation winners {stable} stay on their feet in real, {better} are above their start"
+
+
+def _returned(searches: Sequence[Search]) -> float:
+    """Return the real value of what searches end with: the last policy that was chosen, else their start."""
+    chosen = [one.confirmed.real for one in searches if one.confirmed]
+    return chosen[-1] if chosen else searches[0].points[0].real
+
+
+def _number(value: float) -> str:
+    return f"{value:.1f}"
 
 
 def _counted(searches: Sequence[Search]) -> tuple[int, int, int]:

@@ -27,6 +27,7 @@ from gsl.training.servo_walks import Walks
 SHORT = (0.1, 0.4)  # warm-up and scored part of a window for a network [s]: errors stay small enough to be frozen
 MOST = 300  # iterations of the network's fit
 WORTH = 0.1  # of the cost that a network has to take: for less it is not let loose on motions that nobody has logged
+LEFT = 0.5  # noise floors that numbers leave in a group, below which no network is tried: searches were right there
 WIDE = 10.0  # noise floors that a joint moves in a window, at least, to show what drives it: noise alone spans 6
 LEAST_MOVING = 4  # windows in which a joint moves so far, at least
 
@@ -133,8 +134,10 @@ def learn_servo(
                 judge=lambda model: bench.level(parts.judge, model), longest=bench.longest, iterations=iterations,
             )  # fmt: skip
 
-        network, way = fit(numbers, np.arange(len(some)), MOST)
-        model = bench.kept(held, numbers, network, 1.0 - CHANCE, WORTH)
+        model, way = numbers, list[Progress]()
+        if max(bench.by_group(parts.judge, numbers).values()) > LEFT:
+            network, way = fit(numbers, np.arange(len(some)), MOST)
+            model = bench.kept(held, numbers, network, 1.0 - CHANCE, WORTH)
         change = bench.change(parts.test, start, model)
         worse = tuple(name for name, share in change.items() if np.quantile(share, CHANCE) > 0.0)
         for name in worse:
