@@ -175,6 +175,13 @@ def test_a_delay_stays_within_what_servos_remember() -> None:
     assert found.model.numbers["delay"].max() <= 15 * 0.001 + 1e-12
 
 
+def test_members_differ_by_what_the_log_leaves_open() -> None:
+    found = learn_servo(prepared(SLOW), nominal(ROBOT), STEP, labelled=False, seed=1, threads=1, members=3)
+    gains = [float(one.numbers["kp"][0]) for one in (found.model, *(member.model for member in found.further))]
+    assert len(set(gains)) == 3
+    assert gains == pytest.approx([np.log(0.7)] * 3, abs=0.1)
+
+
 def test_a_log_without_motion_is_refused() -> None:
     with pytest.raises(InputError, match="the log's joints hardly move: by .* mrad"):
         learned(prepared(SLOW, size=0.0))

@@ -53,7 +53,7 @@ class TrainServo:
     held_out: Annotated[
         Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
     ] = field(default_factory=dict)
-    members: Annotated[int, setting("of an ensemble; a further one takes a fifth of the time", ge=1, le=64)] = 1
+    members: Annotated[int, setting("of an ensemble; a further one takes a third of the time", ge=1, le=64)] = 1
     workers: Workers = -1
     seed: Annotated[int, setting("of the first weights", ge=0)] = 1
 

@@ -144,9 +144,9 @@ def learn_servo(
             model = without_group(model, name)
         gaps = [bench.by_group(parts.test, one) for one in (start, model)]
         others = further(
-            members - 1, numbers, worse,
-            lambda begun, index: fit(begun, index, ITERATIONS)[0], lambda one: bench.level(parts.test, one),
-            plant=plant, samples=some.samples, seed=seed,
+            members - 1, lambda rng: bench.numbers_of_some(parts.train, numbers, rng), worse,
+            lambda begun, index: fit(begun, index, ITERATIONS)[0] if way else begun,
+            lambda one: bench.level(parts.test, one), plant=plant, samples=some.samples, seed=seed,
         )  # fmt: skip
         sizes = len(some), len(parts.judge), len(parts.test)
         on_foot = tuple(walks.level(one) for one in (start, model)) if walks else None

@@ -45,6 +45,13 @@ class ServoBench:
         """Return the start with numbers fitted to the motions of some windows."""
         return fit_numbers(self.replays.plant, self.start, self.fitted_residual(index), longest=self.longest)
 
+    def numbers_of_some(self, index: np.ndarray, begun: ServoModel, rng: np.random.Generator) -> ServoModel:
+        """Return a model with numbers fitted further, to motions of some windows that are drawn with replacement."""
+        motion = self.exp.pieces.record[index]
+        drawn = rng.choice(np.unique(motion), len(np.unique(motion)))
+        residual = self.fitted_residual(index[np.isin(motion, drawn)])
+        return fit_numbers(self.replays.plant, begun, residual, longest=self.longest, rounds=1)
+
     def numbers_with(self, walks: Walks, index: np.ndarray, begun: ServoModel) -> ServoModel:
         """Return a model with numbers fitted further, to motions in the air and on the ground together."""
         air = self.fitted_residual(index)

@@ -1,4 +1,4 @@
-"""Further members of a learned servo: the same numbers to begin with, other first weights, other draws of the motions.
+"""Further members of a learned servo: numbers and networks fitted to other draws of the motions, from other weights.
 
 Weights that begin elsewhere disagree where data say nothing (Lakshminarayanan et al., 1612.01474), and windows drawn
 with replacement disagree by as much as the log is short (Breiman's bagging, 1996).
@@ -28,7 +28,7 @@ class Member(NamedTuple):
 
 def further(
     count: int,
-    first: ServoModel,
+    numbers: Callable[[np.random.Generator], ServoModel],
     dropped: tuple[str, ...],
     fit: Callable[[ServoModel, np.ndarray], ServoModel],
     floors: Callable[[ServoModel], float],
@@ -41,7 +41,7 @@ def further(
 
     Args:
         count: How many.
-        first: The fitted numbers, from which all begin.
+        numbers: Returns a servo with numbers fitted to motions that it draws.
         dropped: Groups that keep their old servo.
         fit: Returns a model fitted to some windows, from where to begin.
         floors: Of a model on held-out motions.
@@ -51,7 +51,7 @@ def further(
     """
     for k in range(count):
         rng = np.random.default_rng(derived_seed(seed, "member", k + 1))
-        begun = replace(first, network=neutral(plant, rng).network)
+        begun = replace(numbers(rng), network=neutral(plant, rng).network)
         model = fit(begun, bootstrap(samples, rng))
         for name in dropped:
             model = without_group(model, name)
