@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -18,6 +18,7 @@ from scipy import stats
 
 from gsl.core.checkpoint import read_checkpoint
 from gsl.core.described import described
+from gsl.core.plant import Plant
 from gsl.errors import ConfigError
 from gsl.grounding.draws import DRAWS, UncertainCause, around, drawings, hypercube, within
 from gsl.grounding.effects import DiagnosedEffects, switched_on
@@ -54,28 +55,30 @@ REPORT = {
     "effects": EFFECTS,
     "shrinkage": {"before": 9.0, "after": 1.0},
 }
-FLOORS = {"floors_before": 9.0, "floors_after": 0.5, "groups": {}}
+FLOORS = {"floors_before": 9.0, "floors_after": 0.5, "groups": {}, "whole_motions": True}
 
 
-def softer(member: int) -> Any:
-    """A learned servo that differs from the nominal one by a softer gain."""
+def softer(member: int, plant: Plant = NAO.plant) -> Any:
+    """A learned servo that differs from the one below by a softer gain."""
     change = np.zeros((len(NUMBERS), len(NAO.plant.robot.controlled)))
     change[NUMBERS.index("kp")] = -1.5 * member  # in units of 0.2
-    return neutral(NAO.plant, np.random.default_rng(member)).shift(NAO.plant, change)
+    return neutral(plant, np.random.default_rng(member)).shift(plant, change)
 
 
 @dataclass(frozen=True)
 class Servo:
-    """Writes a learned servo of some members without learning it."""
+    """Writes a learned servo of some members without learning it, on top of some effects."""
 
     members: int
+    effects: Mapping[str, Any] = field(default_factory=dict)
     kind: ClassVar[str] = "train_servo"
 
     def parents(self) -> Mapping[str, Path]:
         return {}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
-        write_model(folder, ServoMembers(tuple(softer(k) for k in range(self.members))))
+        plant = replace(NAO, effects=self.effects).plant
+        write_model(folder, ServoMembers(tuple(softer(k, plant) for k in range(self.members))))
         return {**FLOORS, "members": [0.5] * self.members}
 
 
@@ -105,6 +108,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("ensemble")
     made(Servo(1), place / "runs/single/train_servo")
     made(Servo(3), place / "runs/several/train_servo")
+    made(Servo(3, EFFECTS), place / "runs/on_effects/train_servo")
     made(Found(), place / "runs/found/diagnose")
     return place
 
@@ -231,7 +235,7 @@ def test_draws_of_a_report_leave_its_calibration(folder: Path) -> None:
 
 
 def test_drawn_effects_and_members_of_a_servo_go_together(folder: Path, tmp_path: Path) -> None:
-    servo = LearnedServo(servo=str(folder / "runs/several/train_servo"), ensemble=True)
+    servo = LearnedServo(servo=str(folder / "runs/on_effects/train_servo"), ensemble=True)
     both = DiagnosedEffects(diagnosis=str(folder / "runs/found/diagnose"), draws=True, inner=servo)
     scenario = Scenario(NAO, Walk(duration=0.6), WalkEngine(), "sim", both)
     ready, about = Gate(WalkEngine().initial, tmp_path, QUIET, False, 1).passed(scenario)
@@ -241,6 +245,9 @@ def test_drawn_effects_and_members_of_a_servo_go_together(folder: Path, tmp_path
     assert settled(scenario, about) == ready
     report = json.loads((tmp_path / "grounding.json").read_text())
     assert report["acceptable"] and report["drawn"]["acceptable"]
+    nominal = replace(both, inner=replace(servo, servo=str(folder / "runs/several/train_servo")))
+    with pytest.raises(ConfigError, match="was learned on top of another servo: kp of LKneePitch was 150"):
+        Gate(WalkEngine().initial, tmp_path, QUIET, False, 1).passed(replace(scenario, grounding=nominal))
 
 
 def test_a_bootstrap_draws_whole_motions_as_many_as_there_are() -> None:
@@ -254,9 +261,12 @@ def test_a_bootstrap_draws_whole_motions_as_many_as_there_are() -> None:
 
 
 def test_a_member_far_from_the_log_is_a_problem_of_the_ensemble_alone() -> None:
-    assert problems_of_members({"members": [0.5, 0.7, 2.9]}) == []
-    assert problems_of_members({"members": [3.5, 0.7, 4.2]}) == [
+    assert problems_of_members({**FLOORS, "members": [0.5, 0.7, 2.9]}) == []
+    assert problems_of_members({**FLOORS, "members": [3.5, 0.7, 4.2]}) == [
         "held out, member 2 is 4.2 noise floors from the log, more than 3"
+    ]
+    assert problems_of_members({"floors_before": 1.5, "members": [0.5, 0.7, 2.9]}) == [
+        "held out, member 2 is 2.9 noise floors from the log, more than 1.5"
     ]
 
 

@@ -59,7 +59,7 @@ def test_widths_are_in_newton_metres_by_scope_and_add_in_square_to_what_is_there
 def test_noise_on_a_servo_is_what_motions_leave_unexplained_or_a_share_of_the_limit(tmp_path: Path) -> None:
     """Legs leave much unexplained, arms nothing; the least is a fifth of a limit, and 6 % of it constant."""
     model = neutral(WORLD.plant, np.random.default_rng(0))
-    unexplained = np.array([[1.5, 0.4] if name == "legs" else [0.0, 0.0] for name in model.groups])
+    unexplained = np.where(WORLD.plant.mask("legs")[:, None], [1.5, 0.4], 0.0)
     write_model(tmp_path, ServoMembers((replace(model, noise=unexplained),)))
     made = LearnedServo(servo=str(tmp_path), torque_noise=1.0).shaken(replace(WORLD, servo=str(tmp_path)))
     least = np.outer([0.2, 0.06], WORLD.plant.servo.limit)

@@ -209,3 +209,10 @@ def nominal(robot: Robot) -> Plant:
         action_noise=zero,
         torque_noise=np.zeros((2, len(joints))),
     )
+
+
+def noiseless(plant: Plant) -> Plant:
+    """Return a plant without the noise of encoders, actions and torques."""
+    sensors = replace(plant.sensors, encoder_noise=np.zeros_like(plant.sensors.encoder_noise))
+    still = {name: np.zeros_like(getattr(plant, name)) for name in ("action_noise", "torque_noise")}
+    return replace(plant, sensors=sensors, **still)

@@ -77,8 +77,9 @@ class Moments(NamedTuple):
 
 
 def held_out_widths(
-    exp: Experiment, plant: Plant, nuisances: np.ndarray | None = None, *, step: float, seed: int = 0
-) -> Mapping[str, TorqueWidth]:
+    exp: Experiment, plant: Plant, nuisances: np.ndarray | None = None, *, step: float, seed: int = 0,
+    groups: Mapping[str, np.ndarray] | None = None,
+) -> Mapping[str, TorqueWidth]:  # fmt: skip
     """Return the widths by group of joints, `all` for a robot without groups, from an experiment's held-out windows.
 
     Args:
@@ -87,6 +88,7 @@ def held_out_widths(
         nuisances: Its calibration, shape (7, n_joints); none by default.
         step: Physics period [s], that of the world in which the noise will act: white noise has its size there.
         seed: Of the white noise.
+        groups: Which joints share their widths, by name, shape (n_joints,) each; those of the robot by default.
     """
     simulator = exp.simulator(plant, step, 1, 1.0)
     assert isinstance(simulator, InTheAir), "loads act in the chain model"
@@ -94,10 +96,14 @@ def held_out_widths(
     replay = replays(simulator, pieces, nuisance.none(len(exp.joints)) if nuisances is None else nuisances)
     floor = np.maximum(roughness(exp.records), max(exp.robot.encoder_step / np.sqrt(12.0), 1e-5))
     calm = ~exp.comparison.shaking  # the phase of the others is not in a log
-    names = exp.robot.groups or {"all": exp.joints}
-    groups = {name: np.isin(exp.joints, members) & calm for name, members in names.items()}
+    if groups is None:
+        names = exp.robot.groups or {"all": exp.joints}
+        groups = {name: np.isin(exp.joints, members) for name, members in names.items()}
+    quiet = {name: mask & calm for name, mask in groups.items()}
     steps = pieces.windows.length * round(exp.period / simulator.step)
-    return torque_widths(replay, pieces, floor, groups, plant, steps, np.random.default_rng(seed))
+    found = torque_widths(replay, pieces, floor, quiet, plant, steps, np.random.default_rng(seed))
+    finer = float(np.sqrt(simulator.step / step))  # of white noise that is drawn less often
+    return {name: TorqueWidth(finer * each.step, each.constant) for name, each in found.items()}
 
 
 def replays(simulator: InTheAir, pieces: Pieces, nuisances: np.ndarray) -> Replay:

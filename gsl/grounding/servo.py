@@ -12,16 +12,17 @@ from typing import Annotated, Any
 import numpy as np
 
 from gsl.core.layout import Layout
-from gsl.core.servo_law import NOBODY
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
 from gsl.grounding.grounding import Grounding, GroundingRun
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.torque_noise import with_torque_noise
+from gsl.models.servo import other_base
 from gsl.models.servo_file import read_members, read_servo
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
+from gsl.worlds.velocity_motors import check_servos
 
 # Of a joint's torque limit, at every step and constant: motions in the air do not show what loads of the ground do.
 # Chosen for gain and falls together in searches on three other worlds (docs/results/servo.md).
@@ -58,11 +59,13 @@ class LearnedServo:
         """Return the world with the learned servo, or with its members in turn.
 
         Raises:
-            ConfigError: There is no servo, or the world cannot have one.
+            ConfigError: There is no servo, it was learned on top of another one, or the world cannot have one.
         """
         checked = self.check(world)
         if not self.servo:
             raise ConfigError("grounding.servo", "is missing; name a run of gsl train-servo")
+        if other := other_base(checked.plant, read_servo(self.servo)):
+            raise ConfigError("grounding.servo", f"was learned on top of another servo: {other}", given=self.servo)
         first = self.shaken(replace(checked, servo=self.servo))
         if not self.ensemble:
             return first
@@ -77,9 +80,8 @@ class LearnedServo:
         if not self.torque_noise:
             return world
         model, limit = read_servo(self.servo), world.plant.servo.limit[:, None]
-        unexplained = np.where(model.group[:, None] == NOBODY, 0.0, model.noise[model.group])
         least = np.where(np.isfinite(limit), limit * LEAST_NOISE, 0.0)
-        widths = self.torque_noise * np.maximum(unexplained, least)  # (n_motors, 2)
+        widths = self.torque_noise * np.maximum(model.noise, least)  # (n_motors, 2)
         joints = world.plant.robot.controlled  # coupled motors follow them
         step, constant = (dict(zip(joints, column.tolist(), strict=False)) for column in widths.T)
         noisy: BulletWorld = with_torque_noise(world, step, constant)
@@ -93,6 +95,7 @@ class LearnedServo:
         """
         if not isinstance(world, BulletWorld):
             raise ConfigError("grounding", "only robots in Bullet worlds have servos to learn; take another grounding")
+        check_servos(world.motors)
         if world.servo is not None:
             raise ConfigError("grounding", "the simulator has a learned servo already; say grounding=none")
         return world

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from gsl.core.plant import Plant
+from gsl.core.plant import Plant, Servo
 from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, NOBODY, ServoLaw
 from gsl.errors import ConfigError
 
@@ -16,6 +16,7 @@ FACTORS = ("kp", "kd", "limit")  # numbers that are multiplied
 SUMS = ("delay", "coulomb", "viscous", "deadband", "armature", "offset")  # and those that are added to
 LOSSES = ("load_friction", "duty_loss")  # and so are these, in replays alone: gradients leave them as they are
 NUMBERS = (*FACTORS, *SUMS, *LOSSES)
+UNLIMITED = 1e9  # in a checkpoint, which holds finite numbers alone
 LEAST_INERTIA = 0.2  # share of the rotor's inertia that is left: below it the joint is not stable at 2 ms
 
 
@@ -32,7 +33,8 @@ class ServoModel:
         lag: See `ServoLaw`, shape (n, LAGS).
         group: Of each motor, shape (n,).
         network: The other fields of `ServoLaw` by name.
-        noise: Torque noise that explains what held-out motions leave: at every step and constant [N·m], shape (G, 2).
+        noise: Torque noise that explains what held-out motions leave: at every step and constant [N·m], shape (n, 2).
+        base: The servo that it stands on, by field of `Servo`, shape (n,) each.
     """
 
     kind: ClassVar[str] = "servo_model"
@@ -45,6 +47,7 @@ class ServoModel:
     lag: np.ndarray
     network: Mapping[str, np.ndarray]
     noise: np.ndarray
+    base: Mapping[str, np.ndarray]
 
     def on(self, plant: Plant) -> Plant:
         """Return a plant of the same robot whose servos are the learned ones."""
@@ -57,11 +60,21 @@ class ServoModel:
         law = ServoLaw(self.group, servo.kp / servo.limit, servo.limit, self.lag, **self.network)
         return replace(plant.with_servo(**fields), law=law)
 
+    def changes(self, name: str) -> bool:
+        """Whether anything was learned of a group of joints."""
+        own = self.group == self.groups.index(name)
+        return bool(own.any()) and (
+            any(values[own].any() for values in self.numbers.values())
+            or bool(self.lag[own].any())
+            or any(self.network[key][self.groups.index(name)].any() for key in ("last", "last_bias"))
+        )
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint holds, by name."""
         numbers = {f"numbers.{name}": values for name, values in self.numbers.items()}
         network = {f"network.{name}": values for name, values in self.network.items()}
-        return {**numbers, **network, "group": self.group, "lag": self.lag, "noise": self.noise}
+        base = {f"base.{name}": values for name, values in self.base.items()}
+        return {**numbers, **network, **base, "group": self.group, "lag": self.lag, "noise": self.noise}
 
     def description(self) -> dict[str, Any]:
         """Return what a checkpoint says about it."""
@@ -79,13 +92,16 @@ class ServoModel:
         numbers = {name: arrays[f"numbers.{name}"] for name in NUMBERS}
         network = {name: arrays[f"network.{name}"] for name in NETWORK}
         wanted = {**{f"numbers.{name}": (len(joints),) for name in NUMBERS}, "lag": (len(joints), LAGS)}
-        wanted |= {"group": (len(joints),), "noise": (len(groups), 2)} | {
-            f"network.{k}": v for k, v in shapes(len(groups)).items()
-        }
+        wanted |= {"group": (len(joints),), "noise": (len(joints), 2)}
+        wanted |= {f"network.{k}": v for k, v in shapes(len(groups)).items()}
+        wanted |= {f"base.{field.name}": (len(joints),) for field in fields(Servo)}
         for name, shape in wanted.items():
             if arrays[name].shape != shape:
                 raise ValueError(f"{name} has the shape {arrays[name].shape}, not {shape}")
-        return cls(about["robot"], joints, groups, numbers, arrays["group"], arrays["lag"], network, arrays["noise"])
+        base = {field.name: arrays[f"base.{field.name}"] for field in fields(Servo)}
+        return cls(
+            about["robot"], joints, groups, numbers, arrays["group"], arrays["lag"], network, arrays["noise"], base
+        )
 
     def shift(self, plant: Plant, change: np.ndarray) -> ServoModel:
         """Return the model with numbers changed, in `units`, shape (NUMBERS, n_joints); coupled motors follow."""
@@ -121,28 +137,28 @@ def shapes(groups: int) -> dict[str, tuple[int, ...]]:
 
 
 def neutral(plant: Plant, rng: np.random.Generator) -> ServoModel:
-    """Return a learned servo that changes nothing, its hidden layers drawn at random."""
-    motors, robot = plant.robot.motors, plant.robot
-    names = tuple(robot.groups) or ("all",)
-    member = {motor: names.index(name) for name in reversed(names) for motor in robot.groups.get(name, motors)}
-    if len(member) < len(motors):
-        names = (*names, "others")
-    group = np.array([member.get(motor, len(names) - 1) for motor in motors])
-    n = len(motors)
+    """Return a learned servo that changes nothing, its hidden layers drawn at random.
+
+    A motor of several groups is of the smallest one: a leg's knee belongs to the knees.
+    """
+    robot, n = plant.robot, len(plant.robot.motors)
+    member = {motor: "others" if robot.groups else "all" for motor in robot.motors}
+    for name in sorted(robot.groups, key=lambda name: -len(robot.groups[name])):
+        member |= {motor: name for motor in robot.motors if motor in robot.groups[name]}
+    names = tuple(dict.fromkeys(member[motor] for motor in robot.motors))
+    group = np.array([names.index(member[motor]) for motor in robot.motors])
     arrays = {
         name: rng.standard_normal(shape) / np.sqrt(shape[1]) if name in ("first", "second") else np.zeros(shape)
         for name, shape in shapes(len(names)).items()
     }
-    return ServoModel(
-        robot.name,
-        motors,
-        names,
-        {name: np.zeros(n) for name in NUMBERS},
-        group,
-        np.zeros((n, LAGS)),
-        arrays,
-        np.zeros((len(names), 2)),
-    )
+    numbers = {name: np.zeros(n) for name in NUMBERS}
+    lag, noise = np.zeros((n, LAGS)), np.zeros((n, 2))
+    return ServoModel(robot.name, robot.motors, names, numbers, group, lag, arrays, noise, base_servo(plant))
+
+
+def base_servo(plant: Plant) -> dict[str, np.ndarray]:
+    """Return the servo below a learned one by field, shape (n,) each; what has no limit is `UNLIMITED`."""
+    return {field.name: np.clip(getattr(plant.servo, field.name), -UNLIMITED, UNLIMITED) for field in fields(Servo)}
 
 
 def with_group(model: ServoModel, other: ServoModel, name: str) -> ServoModel:
@@ -163,6 +179,16 @@ def without_group(model: ServoModel, name: str) -> ServoModel:
     numbers = {key: np.where(own, 0.0, values) for key, values in model.numbers.items()}
     lag, group = np.where(own[:, None], 0.0, model.lag), np.where(own, NOBODY, model.group)
     return replace(model, numbers=numbers, lag=lag, group=group)
+
+
+def other_base(plant: Plant, model: ServoModel) -> str:
+    """Return in what the servo below differs from the one that a model was learned on, nothing if it does not."""
+    for name, own in base_servo(plant).items():
+        values = model.base[name]
+        if not np.allclose(own, values, rtol=1e-6, atol=0.0):
+            k = int(np.argmax(~np.isclose(own, values, rtol=1e-6, atol=0.0)))
+            return f"{name} of {model.joints[k]} was {values[k]:.4g} there and is {own[k]:.4g} here"
+    return ""
 
 
 def having_servo(plant: Plant, model: ServoModel, name: str) -> Plant:

@@ -105,10 +105,10 @@ def _train_inverse(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told
 def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     groups = {"all": metrics, **metrics["groups"]}
     rows = [
-        (name, f"{one['floors_before']:.2f}", f"{one['floors_after']:.2f}", "yes" if one.get("kept", True) else "no")
+        (name, f"{one['floors_before']:.2f}", f"{one['floors_after']:.2f}", "yes" if one["learned"] else "no")
         for name, one in groups.items()
     ]
-    titles = ("joints", "simulator", "with the learned servo", "kept")
+    titles = ("joints", "simulator", "with the learned servo", "learned")
     below = f"what it has learned: {folder.as_posix()}/servo.png"
     return Told("distance from held-out motions [noise floors]", titles, rows, below)
 

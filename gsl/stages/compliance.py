@@ -16,7 +16,7 @@ import numpy as np
 
 from gsl.core.body import Robot
 from gsl.core.impedance import impedance
-from gsl.core.plant import Hook, Plant
+from gsl.core.plant import Hook, Plant, noiseless
 from gsl.core.seeds import derived_seed, grounding_generator
 from gsl.errors import ConfigError
 from gsl.grounding.grounding import Grounding
@@ -185,7 +185,8 @@ class Ramp:
 
 def hold(world: BulletWorld, grounding: Grounding, load: Swing | Ramp, duration: float, seed: int) -> None:
     """Hold the stance for some time [s] or until the load is done; no push acts besides, but a user's own torque."""
-    env = BulletEnv(world, plant=replace(world.plant, hook=_both(load, world.plant.hook), pushes=()))
+    plant = noiseless(world.plant)
+    env = BulletEnv(world, plant=replace(plant, hook=_both(load, plant.hook), pushes=()))
     run = grounding.start(env.layout, grounding_generator(seed))
     action = stance(world.plant.robot)
     observation, _ = env.reset(seed=seed, options={"posture": action})

@@ -171,7 +171,7 @@ def report_compliance(
 def with_real(report: Path, real: World, seed: int) -> ComplianceReport | None:
     """Return a report with the real robot beside it; None if nothing was measured, or nobody can load the robot."""
     document = json.loads(report.read_text(encoding="utf-8")) if report.exists() else {}
-    if SECTION not in document or not isinstance(real, BulletWorld):
+    if SECTION not in document or not isinstance(real, BulletWorld) or real.motors != "servo":
         return None
     by_motor = document[SECTION]["by_motor"]
     sim, grounded = (Compliance.of(by_motor[name]) for name in (SIM, GROUNDED))

@@ -84,8 +84,8 @@ class DiagnosisPlan:
         """
         if not isinstance(sim, BulletWorld):
             raise ConfigError("grounding", ROBOTS_ONLY)
-        log = self.flown(real, home, workers=workers, seed=seed, console=console)
         check_servos(sim.motors)
+        log = self.flown(real, home, workers=workers, seed=seed, console=console)
         below = sim if effects is None else switched_on(sim, effects)
         assert isinstance(below, BulletWorld), "effects leave a world what it is"
         stage = TrainServo(real=str(log.folder), sim=below, members=members, workers=workers, seed=seed)

@@ -76,10 +76,17 @@ def settled(scenario: Scenario, found: Mapping[str, Any]) -> Scenario:
         world = randomised(scenario.world, grounding, found["width"])
         return replace(scenario, world=world, grounding=NoGrounding())
     if isinstance(grounding, LearnedServo):
+        grounding = at_its_place(grounding)
         return replace(scenario, world=grounding.switched_on(scenario.world), grounding=grounding.actions)
     if isinstance(grounding, TorqueNoise):
         return replace(scenario, world=grounding.switched_on(scenario.world), grounding=NoGrounding())
     return scenario
+
+
+def at_its_place(grounding: LearnedServo) -> LearnedServo:
+    """Return a grounding whose servo is named by its folder, whatever run or file it was asked for by."""
+    place = resolve(grounding.servo, kind=MAKER)
+    return replace(grounding, servo=str(place.parent if place.is_file() else place))
 
 
 @dataclass(frozen=True)
@@ -144,6 +151,7 @@ class Gate:
 
     def _having_servo(self, scenario: Scenario, settings: LearnedServo) -> tuple[Scenario, Mapping[str, Any]]:
         """Switch a learned servo on, if it is near enough to the log that it was learned from."""
+        settings = at_its_place(settings)
         ready = replace(scenario, world=settings.switched_on(scenario.world), grounding=settings.actions)
         seed = derived_seed(self.seed, "check")
         report = check_servo(settings.servo, ready, self.parameters, seed, ensemble=settings.ensemble)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from gsl.core.body import Robot
-from gsl.core.plant import Plant
+from gsl.core.plant import noiseless
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
@@ -220,10 +220,3 @@ class Simulated:
     def _trajectory(self, action: np.ndarray, position: np.ndarray) -> Trajectory:
         period = self.simulator.period
         return Trajectory(period * np.arange(len(position)), action, position, slope(position, period))
-
-
-def noiseless(plant: Plant) -> Plant:
-    """Return a plant without the noise of encoders, actions and torques."""
-    sensors = replace(plant.sensors, encoder_noise=np.zeros_like(plant.sensors.encoder_noise))
-    still = {name: np.zeros_like(getattr(plant, name)) for name in ("action_noise", "torque_noise")}
-    return replace(plant, sensors=sensors, **still)

@@ -14,9 +14,9 @@ from gsl.core.body import lumped
 from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.diagnosis.experiment import Experiment
-from gsl.diagnosis.torque_width import TorqueWidth, held_out_widths
+from gsl.diagnosis.torque_width import held_out_widths
 from gsl.errors import ConfigError, InputError
-from gsl.models.servo import ServoModel
+from gsl.models.servo import ServoModel, neutral
 from gsl.models.servo_file import FILE
 from gsl.models.servo_members import ServoMembers
 from gsl.report.servo_curves import servo_curves
@@ -29,6 +29,7 @@ from gsl.storage.workplace import destination
 from gsl.training.learn_servo import LearnedServo, document, learn_servo
 from gsl.training.servo_walks import Walks, walks
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.fits import fitting_step
 from gsl.worlds.velocity_motors import check_servos
 
 WORLD, CURVES = "world/learned.yaml", "servo.png"
@@ -83,11 +84,11 @@ class TrainServo:
         further = [replace(one.model, noise=model.noise) for one in learned.further]
         write_model(folder, ServoMembers((model, *further)))
         self._write_world(folder, learned)
-        servo_curves(folder / CURVES, self.sim.plant, model, self.sim.step, exp.period)
+        servo_curves(folder / CURVES, self.sim.plant, model, fitting_step(self.sim.step, exp.period), exp.period)
         told = document(learned)
         for line in remarks(told):
             console.status(f"warning: {line}")
-        noise = {name: row.tolist() for name, row in zip(model.groups, model.noise, strict=True)}
+        noise = dict(zip(model.joints, model.noise.tolist(), strict=True))
         return {**told, "torque_noise": noise, "problems": problems(told)}
 
     def _walks(self, exp: Experiment) -> Walks | None:
@@ -102,12 +103,17 @@ class TrainServo:
         check_log(batch, exp.robot, self.walks)
         if not on_ground(batch):
             raise InputError(f"{self.walks}: the robot is in the air here; name these logs in real=")
+        if abs(batch.control_period - exp.period) > 1e-9:
+            rates = f"{batch.control_period:g} s, not {exp.period:g} s as in {self.real}"
+            raise InputError(f"{self.walks}: has another control period, {rates}; resample one of them")
         return walks(batch, exp.robot, self.sim.plant, self.sim.step, threads(self.workers))
 
     def _unexplained(self, exp: Experiment, model: ServoModel) -> np.ndarray:
-        """Return the torque noise that held-out motions leave unexplained [N·m], at every step and constant, (G, 2)."""
-        widths = held_out_widths(exp, model.on(self.sim.plant), step=self.sim.step, seed=self.seed)
-        return np.array([widths.get(name, TorqueWidth(0.0, 0.0)) for name in model.groups])
+        """Return the torque noise that held-out motions leave unexplained [N·m], at every step and constant, (n, 2)."""
+        group = neutral(self.sim.plant, np.random.default_rng(0)).group  # of those that keep their servo, too
+        groups = {name: group[: len(exp.joints)] == g for g, name in enumerate(model.groups)}
+        widths = held_out_widths(exp, model.on(self.sim.plant), step=self.sim.step, seed=self.seed, groups=groups)
+        return np.array([widths[name] for name in model.groups])[group]
 
     def _write_world(self, folder: Path, learned: LearnedServo) -> None:
         place = destination(folder) / FILE
@@ -130,7 +136,11 @@ def problems(metrics: Mapping[str, Any]) -> list[str]:
     after, before = metrics["floors_after"], metrics["floors_before"]
     if after > FARTHEST:
         return [f"held out, the learned servo is {after:.1f} noise floors from the log, more than {FARTHEST:g}"]
-    return [f"held out, the gap is {after:.2f} noise floors, {before:.2f} without"] if after > before else []
+    if after > before:
+        return [f"held out, the gap is {after:.2f} noise floors, {before:.2f} without"]
+    if after > NEAR and not any(group["learned"] for group in metrics["groups"].values()):
+        return [f"nothing was learned: held out, the gap stays at {after:.1f} noise floors"]
+    return []
 
 
 def problems_of_members(metrics: Mapping[str, Any]) -> list[str]:
@@ -139,20 +149,23 @@ def problems_of_members(metrics: Mapping[str, Any]) -> list[str]:
     Args:
         metrics: Of its artifact.
     """
+    most = min(FARTHEST, max(NEAR, metrics["floors_before"]))
     return [
-        f"held out, member {k} is {floors:.1f} noise floors from the log, more than {FARTHEST:g}"
+        f"held out, member {k} is {floors:.1f} noise floors from the log, more than {most:.2g}"
         for k, floors in enumerate(metrics["members"])
-        if k and floors > FARTHEST
+        if k and floors > most
     ]
 
 
 def remarks(metrics: Mapping[str, Any]) -> list[str]:
-    """Return what a user should know of a learned servo: how near it is, and which groups kept their old servo."""
-    after, groups = metrics["floors_after"], metrics["groups"]
-    told = (
+    """Return what a user should know of a learned servo: how near it is, and which groups keep their old servo."""
+    after = metrics["floors_after"]
+    found = (
         [] if after <= NEAR else [f"held out, the learned servo is {after:.1f} noise floors from the log, not within 1"]
     )
-    for name, group in groups.items():
-        if not group["kept"]:
-            told.append(f"{name} keep their servo: what was learned made held-out motions worse")
-    return told
+    if not metrics["whole_motions"]:
+        found.append("the log is one motion, of which parts are held out: the figures are optimistic")
+    for name, group in metrics["groups"].items():
+        if not group["learned"]:
+            found.append(f"{name} keep their servo: nothing that was learned brought held-out motions nearer")
+    return found

@@ -23,6 +23,7 @@ from gsl.training.servo_members import ITERATIONS, Member, further
 from gsl.training.servo_network import Alike, Progress, fit_network
 from gsl.training.servo_replays import Replays
 from gsl.training.servo_walks import Walks
+from gsl.worlds.fits import fitting_step
 
 SHORT = (0.1, 0.4)  # warm-up and scored part of a window for a network [s]: errors stay small enough to be frozen
 MOST = 300  # iterations of the network's fit
@@ -59,6 +60,7 @@ class LearnedServo:
         windows: How many were fitted, judged and tested.
         further: Further members of an ensemble.
         walks: Gap of held-out walks before and after in noise floors, if there were some.
+        whole: Whether whole motions were held out; else parts of one, which is weaker.
     """
 
     model: ServoModel
@@ -69,6 +71,7 @@ class LearnedServo:
     windows: tuple[int, int, int]
     further: tuple[Member, ...] = ()
     walks: tuple[float, ...] | None = None
+    whole: bool = True
 
 
 def split(exp: Experiment, *, labelled: bool) -> Split:
@@ -103,7 +106,7 @@ def learn_servo(
     Args:
         exp: The log, of a robot in the air.
         plant: The robot with what is known of its servos.
-        step: Physics period of the simulator that it is for [s].
+        step: Physics period of the simulator that it is for [s]; replays take the nearest one that divides the log's.
         labelled: Whether the held-out motions were chosen by labels.
         seed: Of the first weights.
         threads: That replay side by side; the result does not depend on them.
@@ -114,6 +117,7 @@ def learn_servo(
         InputError: The log shows too little motion to learn from.
     """
     _check_motion(exp)
+    step = fitting_step(step, exp.period)
     parts, start = split(exp, labelled=labelled), neutral(plant, np.random.default_rng(seed))
     with ThreadPoolExecutor(threads) as pool:
         bench = ServoBench(exp, Replays(plant, step, exp.period, threads, pool), start)
@@ -134,10 +138,13 @@ def learn_servo(
                 judge=lambda model: bench.level(parts.judge, model), longest=bench.longest, iterations=iterations,
             )  # fmt: skip
 
+        def nearer(begun: ServoModel, index: np.ndarray, most: int) -> tuple[ServoModel, list[Progress]]:
+            network, way = fit(begun, index, most)
+            return bench.kept(held, begun, network, 1.0 - CHANCE, WORTH), way
+
         model, way = numbers, list[Progress]()
         if max(bench.by_group(parts.judge, numbers).values()) > LEFT:
-            network, way = fit(numbers, np.arange(len(some)), MOST)
-            model = bench.kept(held, numbers, network, 1.0 - CHANCE, WORTH)
+            model, way = nearer(numbers, np.arange(len(some)), MOST)
         change = bench.change(parts.test, start, model)
         worse = tuple(name for name, share in change.items() if np.quantile(share, CHANCE) > 0.0)
         for name in worse:
@@ -145,21 +152,25 @@ def learn_servo(
         gaps = [bench.by_group(parts.test, one) for one in (start, model)]
         others = further(
             members - 1, lambda rng: bench.numbers_of_some(parts.train, numbers, rng), worse,
-            lambda begun, index: fit(begun, index, ITERATIONS)[0] if way else begun,
+            lambda begun, index: nearer(begun, index, ITERATIONS)[0] if way else begun,
             lambda one: bench.level(parts.test, one), plant=plant, samples=some.samples, seed=seed,
         )  # fmt: skip
         sizes = len(some), len(parts.judge), len(parts.test)
         on_foot = tuple(walks.level(one) for one in (start, model)) if walks else None
-        return LearnedServo(model, gaps[0], gaps[1], worse, tuple(way), sizes, tuple(others), on_foot)
+        return LearnedServo(model, gaps[0], gaps[1], worse, tuple(way), sizes, tuple(others), on_foot, exp.by_record)
 
 
 def _check_motion(exp: Experiment) -> None:
     """Refuse a log that shows nothing of its servos.
 
     Raises:
-        InputError: Hardly a joint moves.
+        InputError: It is too short, or hardly a joint moves.
     """
     moved = np.ptp(exp.pieces.real[..., : len(exp.joints)], axis=1)
+    if len(moved) < LEAST_MOVING:
+        raise InputError(
+            f"the log has {len(moved)} windows of a second; {LEAST_MOVING} are the least: log longer motions"
+        )
     least = WIDE * np.maximum(exp.noise.sd[: len(exp.joints)], exp.robot.encoder_step)
     if (moved > least).any(axis=1).sum() < LEAST_MOVING:
         raise InputError(
@@ -175,13 +186,14 @@ def document(learned: LearnedServo) -> dict[str, Any]:
         "floors_before": learned.before["all"],
         "floors_after": learned.after["all"],
         "groups": {
-            name: {"floors_before": learned.before[name], "floors_after": value, "kept": name not in learned.worse}
+            name: {"floors_before": learned.before[name], "floors_after": value, "learned": learned.model.changes(name)}
             for name, value in learned.after.items()
             if name != "all"
         },
         "members": [learned.after["all"], *(member.floors for member in learned.further)],
         "windows": {"fitted": fitted, "judged": judged, "tested": tested},
         "iterations": len(learned.way),
+        "whole_motions": learned.whole,
         **(
             {"walks": dict(zip(("floors_before", "floors_after"), learned.walks, strict=True))} if learned.walks else {}
         ),

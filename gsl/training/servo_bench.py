@@ -128,7 +128,7 @@ class ServoBench:
 
 
 def cut_windows(exp: Experiment, index: np.ndarray, lengths: tuple[float, float]) -> Pieces:
-    """Return windows of another length of the same motions; the same ones where motions are short, or it is only one.
+    """Return windows of another length of the same motions; the same ones of motions that are short or shared.
 
     Args:
         exp: The log.
@@ -136,8 +136,9 @@ def cut_windows(exp: Experiment, index: np.ndarray, lengths: tuple[float, float]
         lengths: Warm-up and scored part [s].
     """
     chosen = np.unique(exp.pieces.record[index])
+    shared = np.isin(np.delete(exp.pieces.record, index), chosen).any()  # with windows that are not to be fitted
     warm_up, scored = (max(1, round(part / exp.period)) for part in lengths)
-    if not exp.by_record or any(len(exp.records[k]) < warm_up + scored for k in chosen):
+    if shared or any(len(exp.records[k]) < warm_up + scored for k in chosen):
         return exp.pieces.chosen(index)
     cut = pieces([exp.records[k] for k in chosen], exp.robot, exp.period, warm_up=warm_up, scored=scored)
     return cut.chosen(np.unique(np.linspace(0, len(cut) - 1, min(WINDOWS, len(cut))).round().astype(int)))

@@ -15,6 +15,7 @@ from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.experiment import Experiment, experiment
 from gsl.diagnosis.on_ground import Walking, model_error
+from gsl.errors import InputError
 from gsl.models.servo import ServoModel
 from gsl.worlds.fits import fitting_step
 
@@ -70,9 +71,11 @@ def walks(batch: Batch, robot: Robot, plant: Plant, step: float, workers: int) -
         workers: Processes that replay side by side.
 
     Raises:
-        GslError: No walk is long enough for a window.
+        GslError: No walk is long enough for a window, or they are too few to fit and to check.
     """
     exp = experiment(batch, robot, walking=True)
+    if not len(exp.train) or not len(exp.held_out):
+        raise InputError("the walks are too few to fit and to check: two of some seconds are the least")
     simulator = Walking(plant, fitting_step(step, exp.period), exp.period, workers=workers)
     some = exp.pieces.chosen(np.arange(0, len(exp.pieces), max(1, len(exp.pieces) // ERRORS)))
     error = model_error(simulator, some, np.random.default_rng(0))
