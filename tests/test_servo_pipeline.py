@@ -137,7 +137,7 @@ def test_a_further_member_is_as_near_and_leaves_the_first_as_it_is(air: tuple[Pa
     [
         (("real=nowhere",), "nowhere"),
         ((f"sim.servo={FIRST}/train_servo",), "learned servo already"),
-        (("real=ground",), "motions in the air"),
+        (("real=ground",), "needs the robot in the air"),
         (("sim=so101",), "another robot?"),
         (("tolerance=-1",), "tolerance"),
     ],
