@@ -16,7 +16,7 @@ from scenarios import AIR, QUIET, REACH
 from gsl.core.layout import Layout
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
-from gsl.stages.generations import Generation, GenerationLog, finalists
+from gsl.stages.generations import Generation, GenerationLog
 from gsl.stages.optimize import BEST, Optimize
 from gsl.storage.policies import read_policies
 from gsl.tasks.arm import Arm
@@ -85,30 +85,6 @@ def test_a_log_returns_its_values_to_the_bit(tmp_path: Path) -> None:
     GenerationLog(tmp_path).append(Generation(0, values, [0] * 5))
     assert GenerationLog(tmp_path).read(0) == Generation(0, values, [0] * 5)
     assert GenerationLog(tmp_path).read(1) is None
-
-
-def test_a_winner_is_the_best_of_those_with_further_episodes() -> None:
-    """Candidate 1 had luck in its first episodes; 2 and 3 were looked at again."""
-    generation = Generation(0, [0.1, 0.9, 0.5, 0.7, 0.2], [0] * 5, finalists=[2, 3])
-    assert generation.winner == 3
-    assert generation._replace(finalists=None).winner == 1
-    assert [finalists(count) for count in (2, 6, 16, 150)] == [1, 2, 4, 38]
-
-
-def test_the_best_quarter_of_a_generation_has_further_episodes(tmp_path: Path) -> None:
-    plain, more = tmp_path / "plain", tmp_path / "more"
-    for folder, count in ((plain, 0), (more, 3)):
-        folder.mkdir()
-        replace(_search(1), finalist_rollouts=count).run(folder, QUIET)
-    first, again = (GenerationLog(folder).read(0) for folder in (plain, more))
-    assert first and again and again.finalists
-    assert len(again.finalists) == finalists(len(first.values))
-    worst_kept = min(first.values[number] for number in again.finalists)
-    for number, (before, after) in enumerate(zip(first.values, again.values, strict=True)):
-        if number not in again.finalists:
-            assert after == before <= worst_kept
-    winner = read_policies(more / BEST).records[0]
-    assert winner.value_sim == max(again.values[number] for number in again.finalists)
 
 
 def test_a_search_told_the_same_values_asks_for_the_same_candidates() -> None:
