@@ -24,7 +24,6 @@ from gsl.stages.collect import Collect
 from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.diagnosis_plan import DiagnosisPlan
 from gsl.stages.evaluate import Evaluate, check_tolerated
-from gsl.stages.generations import FinalistRollouts
 from gsl.stages.headline import several
 from gsl.stages.link import built
 from gsl.stages.needed_model import as_needed, extra_ticks, looking_ahead
@@ -57,7 +56,6 @@ class Budget:
     check: Annotated[int, setting("real episodes the fastest stable policy has to walk without a fall", ge=1)]
     confirmation: Annotated[int, setting("fresh real episodes of the chosen policy", ge=2)]
     tolerated: Annotated[float, setting("share of falls up to which a policy counts as stable", ge=0, le=1)] = 0.0
-    finalist_rollouts: FinalistRollouts = 0
 
     def __post_init__(self) -> None:
         """Refuse a single episode as the check of a policy that may fall."""
@@ -270,7 +268,6 @@ class Chain:
             grounding=grounding,
             optimizer=self.optimizer,
             rollouts=self.budget.rollouts,
-            finalist_rollouts=self.budget.finalist_rollouts,
             objective=self.objective,
             quantile=self.quantile,
             initial=previous,

@@ -5,22 +5,9 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Annotated, NamedTuple
-
-from gsl.core.setting import setting
+from typing import NamedTuple
 
 FILE = "generations.jsonl"
-
-
-FINALISTS = 0.25  # share of a generation that has further episodes
-FinalistRollouts = Annotated[
-    int, setting("further episodes of each generation's best quarter, one of which is its winner", ge=0)
-]
-
-
-def finalists(candidates: int) -> int:
-    """Return how many of some candidates have further episodes."""
-    return max(1, round(FINALISTS * candidates))
 
 
 class Generation(NamedTuple):
@@ -31,20 +18,12 @@ class Generation(NamedTuple):
         values: What the search maximises.
         falls: How often each fell.
         means: Mean values of the episodes, where the search maximises something else.
-        finalists: Candidates that had further episodes, where some had.
     """
 
     number: int
     values: list[float]
     falls: list[int]
     means: list[float] | None = None
-    finalists: list[int] | None = None
-
-    @property
-    def winner(self) -> int:
-        """The best candidate; where some are finalists, the best of these."""
-        running = range(len(self.values)) if self.finalists is None else self.finalists
-        return max(running, key=lambda number: self.values[number])
 
 
 class GenerationLog:

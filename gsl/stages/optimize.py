@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -20,10 +20,10 @@ from gsl.stages.choices import FILE, PolicyChoice, policies, record, vector
 from gsl.stages.compliance_report import report_compliance
 from gsl.stages.drift import drifts, read_region
 from gsl.stages.generations import FILE as PROGRESS
-from gsl.stages.generations import FinalistRollouts, Generation, GenerationLog, finalists
+from gsl.stages.generations import Generation, GenerationLog
 from gsl.stages.grounding_gate import REPORT, Gate, grounding_parents
 from gsl.stages.objective import CVAR, Objective, Quantile, check_objective, objective_values
-from gsl.stages.population import Episode, Job, Workers, episodes
+from gsl.stages.population import Job, Workers, episodes
 from gsl.stages.rollout import Scenario
 from gsl.stages.simulator import GroundedSimulator
 from gsl.storage.models import model_file
@@ -60,7 +60,6 @@ class Optimize:
     grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
     optimizer: Annotated[CmaEs | Learner, setting("what improves the parameters")]
     rollouts: Annotated[int, setting("episodes of each candidate", ge=1)]
-    finalist_rollouts: FinalistRollouts = 0
     objective: Objective = "mean"
     quantile: Quantile = 0.25
     initial: Annotated[str | None, setting("policies file or artifact to start from; none for the start values")] = None
@@ -108,8 +107,7 @@ class Optimize:
     ) -> Iterator[Winner]:
         """Yield the best candidate of each generation of a search."""
         search = optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
-        each = optimizer.candidates * self.rollouts + finalists(optimizer.candidates) * self.finalist_rollouts
-        total = optimizer.generations * each
+        total = optimizer.generations * optimizer.candidates * self.rollouts
         with console.progress(total, "optimising in simulation") as progress:
             for index in range(optimizer.generations):
                 candidates = search.ask()
@@ -118,9 +116,9 @@ class Optimize:
                     generation = self._evaluated(scenario, candidates, index, progress)
                     log.append(generation)
                 else:
-                    progress.advance(each)
+                    progress.advance(len(candidates) * self.rollouts)
                 search.tell(generation.values)
-                best = generation.winner
+                best = int(np.argmax(generation.values))
                 means = generation.means or generation.values
                 yield Winner(self._record(index, candidates[best], means[best]), generation.values[best])
 
@@ -148,39 +146,18 @@ class Optimize:
         return {"drift": shares}
 
     def _evaluated(self, scenario: Scenario, candidates: list[np.ndarray], index: int, progress: Any) -> Generation:
-        """Return what candidates are worth; of a generation the best quarter has further episodes."""
-        rows = self._walked(scenario, dict(enumerate(candidates)), index, range(self.rollouts), progress)
-        best: list[int] | None = None
-        if self.finalist_rollouts and len(candidates) > 1:
-            judged = [self._judged(rows[number]) for number in range(len(candidates))]
-            best = sorted(np.argsort(judged)[-finalists(len(candidates)) :].tolist())
-            further = range(self.rollouts, self.rollouts + self.finalist_rollouts)
-            more = self._walked(scenario, {number: candidates[number] for number in best}, index, further, progress)
-            rows = {number: [*row, *more.get(number, [])] for number, row in rows.items()}
-        values = [self._judged(row) for row in rows.values()]
-        falls = [sum(episode.fell for episode in row) for row in rows.values()]
-        means = [_mean(row) for row in rows.values()] if self.objective == CVAR else None
-        return Generation(index, values, falls, means, best)
-
-    def _walked(
-        self, scenario: Scenario, candidates: Mapping[int, np.ndarray], index: int, numbers: range, progress: Any
-    ) -> dict[int, list[Episode]]:
-        """Return episodes of some candidates of a generation, by candidate."""
         jobs = [
             Job(candidate, derived_seed(self.seed, self.kind, index, number, rollout))
-            for number, candidate in candidates.items()
-            for rollout in numbers
+            for number, candidate in enumerate(candidates)
+            for rollout in range(self.rollouts)
         ]
         done = episodes(scenario, jobs, workers=self.workers, progress=progress)
-        return {number: done[k * len(numbers) : (k + 1) * len(numbers)] for k, number in enumerate(candidates)}
-
-    def _judged(self, row: Sequence[Episode]) -> float:
-        values = np.array([[episode.value for episode in row]])
-        return float(objective_values(values, self.objective, self.quantile)[0])
+        shape = (len(candidates), self.rollouts)
+        values = np.array([episode.value for episode in done]).reshape(shape)
+        falls = np.array([episode.fell for episode in done]).reshape(shape).sum(axis=1)
+        means = values.mean(axis=1).tolist() if self.objective == CVAR else None
+        judged = objective_values(values, self.objective, self.quantile)
+        return Generation(index, judged.tolist(), falls.tolist(), means)
 
     def _record(self, index: int, parameters: np.ndarray, value: float) -> PolicyRecord:
         return record(self.policy, f"generation_{index + 1:02d}", parameters, generation=index + 1, value_sim=value)
-
-
-def _mean(row: Sequence[Episode]) -> float:
-    return float(np.mean([episode.value for episode in row]))

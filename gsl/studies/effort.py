@@ -13,7 +13,6 @@ from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.servo import LearnedServo
 from gsl.optimizers.cma_es import CmaEs
-from gsl.stages.generations import finalists
 from gsl.stages.iterate import Iterate
 from gsl.stages.population import threads
 from gsl.stages.rollout import Scenario, rollout
@@ -56,9 +55,7 @@ def seconds(study: Compare, *, search: bool = True) -> float:
     searched = measured = 0
     if search:
         assert isinstance(iterate.optimizer, CmaEs), "check_search() has refused others"
-        count = iterate.optimizer.candidates
-        each = count * budget.rollouts + finalists(count) * budget.finalist_rollouts
-        searched = iterate.optimizer.generations * each
+        searched = iterate.optimizer.generations * iterate.optimizer.candidates * budget.rollouts
         measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
     workers = threads(iterate.workers)
     sims = study.simulators or {"": iterate.sim}

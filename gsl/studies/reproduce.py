@@ -81,8 +81,6 @@ def _sizes(study: Compare) -> str:
     searched = (
         f"{optimizer.generations} generations of {optimizer.candidates} candidates, {budget.rollouts} rollouts each"
     )
-    if budget.finalist_rollouts:
-        searched += f", {budget.finalist_rollouts} more of each generation's best quarter"
     measured = f"{budget.episodes} for the choice, {budget.check} for the check, {budget.confirmation} for the report"
     return f"{trials_of(study.first, study.trials)}; {searched}; {budget.learned}; {measured}."
 
