@@ -29,6 +29,7 @@ from gsl.stages.link import built
 from gsl.stages.needed_model import as_needed, extra_ticks, looking_ahead
 from gsl.stages.objective import Objective, Quantile
 from gsl.stages.optimize import BEST, Optimize
+from gsl.stages.screening import Screening
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import Method, TrainInverse
 from gsl.stages.train_states import refuse_robots
@@ -56,6 +57,7 @@ class Budget:
     check: Annotated[int, setting("real episodes the fastest stable policy has to walk without a fall", ge=1)]
     confirmation: Annotated[int, setting("fresh real episodes of the chosen policy", ge=2)]
     tolerated: Annotated[float, setting("share of falls up to which a policy counts as stable", ge=0, le=1)] = 0.0
+    screening: Screening = 0
 
     def __post_init__(self) -> None:
         """Refuse a single episode as the check of a policy that may fall."""
@@ -268,6 +270,7 @@ class Chain:
             grounding=grounding,
             optimizer=self.optimizer,
             rollouts=self.budget.rollouts,
+            screening=self.budget.screening,
             objective=self.objective,
             quantile=self.quantile,
             initial=previous,

@@ -23,11 +23,12 @@ from gsl.stages.choices import FILE, policies, record, records, vector
 from gsl.stages.compliance_report import SECTION, with_real
 from gsl.stages.diagnosis_plan import EXCITATION, DiagnosisPlan, flown
 from gsl.stages.grounding_gate import REPORT, settled
-from gsl.stages.iteration_pictures import draw_flight, draw_walk_and_joint, without_margins
+from gsl.stages.iteration_pictures import draw_flight, draw_walk_and_joint
 from gsl.stages.iteration_report import Rounds, write_curve, write_table
 from gsl.stages.objective import Objective, Quantile, check_objective
 from gsl.stages.population import Workers
 from gsl.stages.rollout import Scenario
+from gsl.stages.screening import without_margins
 from gsl.stages.train_forward import HELDOUT
 from gsl.stages.training import DATA, of_policy
 from gsl.storage import manifest

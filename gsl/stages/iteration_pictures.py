@@ -15,11 +15,8 @@ from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import actions
 from gsl.diagnosis.experiment import experiment
-from gsl.grounding.effects import innermost, with_innermost
 from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
-from gsl.grounding.servo import LearnedServo
-from gsl.grounding.torque_noise import TorqueNoise
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.render import walk_strip
 from gsl.stages.grounding_replay import PAST, Place, replay
@@ -38,14 +35,6 @@ class Way(NamedTuple):
 
     world: BulletWorld
     grounding: Grounding
-
-
-def without_margins(grounding: Grounding) -> Grounding:
-    """Return a grounding without the noise and the draws that a search has on top: a picture is of what was learned."""
-    inner = innermost(grounding)
-    if isinstance(inner, LearnedServo):
-        return with_innermost(grounding, replace(inner, torque_noise=0.0, noise=0.0, ensemble=False))
-    return with_innermost(grounding, NoGrounding()) if isinstance(inner, TorqueNoise) else grounding
 
 
 def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory) -> None:

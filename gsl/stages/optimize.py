@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -21,10 +22,11 @@ from gsl.stages.compliance_report import report_compliance
 from gsl.stages.drift import drifts, read_region
 from gsl.stages.generations import FILE as PROGRESS
 from gsl.stages.generations import Generation, GenerationLog
-from gsl.stages.grounding_gate import REPORT, Gate, grounding_parents
+from gsl.stages.grounding_gate import REPORT, Gate, grounding_parents, settled
 from gsl.stages.objective import CVAR, Objective, Quantile, check_objective, objective_values
 from gsl.stages.population import Job, Workers, episodes
 from gsl.stages.rollout import Scenario
+from gsl.stages.screening import Screening, foretells_falls, passing, screen, without_margins
 from gsl.stages.simulator import GroundedSimulator
 from gsl.storage.models import model_file
 from gsl.storage.policies import PolicyRecord, write_policies
@@ -48,6 +50,9 @@ class Optimize:
     With objective=cvar they are judged by the mean of their worst episodes (`quantile`). What is reported as a value in
     simulation is the mean of all episodes in any case, so that searches can be compared.
 
+    Where a servo or effects ground the simulator, winners walk `screening` more episodes in it, without noise on top.
+    Those that fall are left out of the policies.
+
     Of equally good generations the last one's is the best: its distribution has left the edge of what does as well.
     """
 
@@ -60,6 +65,7 @@ class Optimize:
     grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
     optimizer: Annotated[CmaEs | Learner, setting("what improves the parameters")]
     rollouts: Annotated[int, setting("episodes of each candidate", ge=1)]
+    screening: Screening = 0
     objective: Objective = "mean"
     quantile: Quantile = 0.25
     initial: Annotated[str | None, setting("policies file or artifact to start from; none for the start values")] = None
@@ -89,16 +95,19 @@ class Optimize:
             winners = [*self._searched(self.optimizer, scenario, first, GenerationLog(folder), console)]
         else:
             winners = [*self._learned(self.optimizer, scenario, first, console)]
+        searched = len(winners)
+        winners, screened = self._screened(bare, checked, winners, console)
         found += [winner.policy for winner in winners]
         write_policies(folder / FILE, policies(self.policy, self.task, found))
         best, worth = max(reversed(winners), key=lambda winner: winner.worth)
         write_policies(folder / BEST, policies(self.policy, self.task, [best]))
         return {
-            "generations": len(found) - 1,
+            "generations": searched,
             "best_value_sim": best.value_sim,
             **({"best_cvar_sim": worth} if self.objective == CVAR else {}),
             **checked,
             **yielding,
+            **screened,
             **self._drift(scenario, found, console),
         }
 
@@ -132,6 +141,23 @@ class Optimize:
             for index, parameters in enumerate(steps):
                 value = self._evaluated(scenario, [parameters], index, progress).values[0]
                 yield Winner(self._record(index, parameters, value), value)
+
+    def _screened(
+        self, bare: Scenario, checked: Mapping[str, Any], winners: list[Winner], console: Any
+    ) -> tuple[list[Winner], Mapping[str, Any]]:
+        """Return the winners that do not fall in the grounded simulator, and what to report of all."""
+        if not (self.screening and foretells_falls(self.grounding)):
+            return winners, {}
+        scenario = settled(replace(bare, grounding=without_margins(self.grounding)), checked)
+        parameters = {winner.policy.name: vector(self.policy, winner.policy) for winner in winners}
+        seed = derived_seed(self.seed, self.kind)
+        found = screen(scenario, parameters, self.screening, seed, workers=self.workers, console=console)
+        kept = passing(found)
+        if len(kept) < len(winners):
+            dropped = f"{len(winners) - len(kept)} of {len(winners)} winners fall in the grounded simulator"
+            console.status(f"{dropped} ({self.screening} episodes each): the robot does not try them")
+        falls = {name: {"falls": one.falls, "episodes": one.episodes} for name, one in found.items()}
+        return [winner for winner in winners if winner.policy.name in kept], {"screened": falls}
 
     def _drift(self, scenario: Scenario, found: Iterable[PolicyRecord], console: Any) -> Mapping[str, Any]:
         """Return and tell how far the policies have moved from what a learned grounding has seen."""

@@ -28,7 +28,7 @@ NUMBER = ("number", "trial")  # what rows call their trial
 LATER = {"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim", "rested": False,
          "multi_step": 1, "first": 1, "calibrated": True, "without": [],
          "objective": "mean", "quantile": 0.25, "servo": None, "motors": "servo",
-         "servo_member": 0, "draws": False, "ensemble": False}  # fmt: skip
+         "servo_member": 0, "draws": False, "ensemble": False, "screening": 0}  # fmt: skip
 
 GOES_ON = "goes on from the results that are there"  # what force=true does to a study
 LABELS = ("preset_name",)  # that tables tell, and no result depends on

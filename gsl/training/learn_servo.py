@@ -28,7 +28,6 @@ from gsl.worlds.fits import fitting_step
 SHORT = (0.1, 0.4)  # warm-up and scored part of a window for a network [s]: errors stay small enough to be frozen
 MOST = 300  # iterations of the network's fit
 WORTH = 0.1  # of the cost that a network has to take: for less it is not let loose on motions that nobody has logged
-LEFT = 0.5  # noise floors that numbers leave in a group, below which no network is tried: searches were right there
 WIDE = 10.0  # noise floors that a joint moves in a window, at least, to show what drives it: noise alone spans 6
 LEAST_MOVING = 4  # windows in which a joint moves so far, at least
 
@@ -142,9 +141,7 @@ def learn_servo(
             network, way = fit(begun, index, most)
             return bench.kept(held, begun, network, 1.0 - CHANCE, WORTH), way
 
-        model, way = numbers, list[Progress]()
-        if max(bench.by_group(parts.judge, numbers).values()) > LEFT:
-            model, way = nearer(numbers, np.arange(len(some)), MOST)
+        model, way = nearer(numbers, np.arange(len(some)), MOST)
         change = bench.change(parts.test, start, model)
         worse = tuple(name for name, share in change.items() if np.quantile(share, CHANCE) > 0.0)
         for name in worse:
@@ -152,7 +149,7 @@ def learn_servo(
         gaps = [bench.by_group(parts.test, one) for one in (start, model)]
         others = further(
             members - 1, lambda rng: bench.numbers_of_some(parts.train, numbers, rng), worse,
-            lambda begun, index: nearer(begun, index, ITERATIONS)[0] if way else begun,
+            lambda begun, index: nearer(begun, index, ITERATIONS)[0],
             lambda one: bench.level(parts.test, one), plant=plant, samples=some.samples, seed=seed,
         )  # fmt: skip
         sizes = len(some), len(parts.judge), len(parts.test)
