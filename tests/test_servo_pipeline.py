@@ -45,6 +45,8 @@ def test_iterate_learns_the_servo_by_itself_and_reports_the_gap(air: tuple[Path,
     assert metrics["servo"]["floors_after"] == servo["floors_after"]
     assert servo["floors_after"] < 0.1 * servo["floors_before"]
     assert metrics["excitation"]["episodes"] == 5
+    screened = loaded(folder / FIRST / "optimize/metrics.json")["screened"]
+    assert screened.keys() == {"generation_01", "generation_02"}
     told = f"from {servo['floors_before']:.1f} to {servo['floors_after']:.2f} noise floors"
     assert told in said.out and told in (folder / "runs/air/iterate/table.md").read_text()
     parents = loaded(folder / FIRST / "optimize/manifest.json")["parents"]
