@@ -30,7 +30,7 @@ real: xl330 so101 menagerie go2 ## Diagnose logs of three real robots (docs/real
 xl330: $(INSTALLED)
 	$(GSL) import mapping=xl330_pendulum name=xl330
 	$(GSL) diagnose real=xl330 sim=xl330_pendulum name=xl330 tolerance=0.0175
-	$(GSL) cross-validate real=xl330 sim=xl330_pendulum name=xl330 tolerance=0.0175 by=kp checks=values
+	$(GSL) cross-validate real=xl330 sim=xl330_pendulum name=xl330 tolerance=0.0175 by=kp checks=values servo=true
 
 CHECKED := chirp_sweep, coupled_joints, hold_under_gravity, single_joint_rotation, single_joint_wrist_roll, \
 	staircase_motion, step_response, velocity_ramp
