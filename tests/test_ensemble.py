@@ -55,7 +55,7 @@ REPORT = {
     "effects": EFFECTS,
     "shrinkage": {"before": 9.0, "after": 1.0},
 }
-FLOORS = {"floors_before": 9.0, "floors_after": 0.5, "groups": {}, "whole_motions": True}
+FLOORS = {"floors_before": 9.0, "floors_after": 0.5, "groups": {}, "learned": True, "whole_motions": True}
 
 
 def softer(member: int, plant: Plant = NAO.plant) -> Any:

@@ -138,7 +138,7 @@ def problems(metrics: Mapping[str, Any]) -> list[str]:
         return [f"held out, the learned servo is {after:.1f} noise floors from the log, more than {FARTHEST:g}"]
     if after > before:
         return [f"held out, the gap is {after:.2f} noise floors, {before:.2f} without"]
-    if after > NEAR and not any(group["learned"] for group in metrics["groups"].values()):
+    if after > NEAR and not metrics["learned"]:
         return [f"nothing was learned: held out, the gap stays at {after:.1f} noise floors"]
     return []
 

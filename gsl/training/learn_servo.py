@@ -191,6 +191,7 @@ def document(learned: LearnedServo) -> dict[str, Any]:
         "windows": {"fitted": fitted, "judged": judged, "tested": tested},
         "iterations": len(learned.way),
         "whole_motions": learned.whole,
+        "learned": any(map(learned.model.changes, learned.model.groups)),
         **(
             {"walks": dict(zip(("floors_before", "floors_after"), learned.walks, strict=True))} if learned.walks else {}
         ),
