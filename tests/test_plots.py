@@ -88,7 +88,7 @@ def test_a_learning_curve_tells_what_it_shows() -> None:
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["iteration 1", "no grounding"]
     beside = learning_curve_figure([SEARCH, SEARCH._replace(label="without grounding", bare=True)], unit="cm/s")
     assert beside.get_suptitle() == (
-        "On the real side: 20.5 cm/s with grounding, 20.5 without, π0 19.0; 1 and 1 of 2 winners gain"
+        "Real side: 20.5 cm/s with grounding, 20.5 without, π0 19.0; 1 and 1 of 2 winners gain"
     )
     head, right = beside._suptitle.get_window_extent(), beside.bbox.x1  # type: ignore[attr-defined]
     assert head.x1 < right

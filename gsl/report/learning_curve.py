@@ -223,7 +223,7 @@ def _finding(searches: Sequence[Search], unit: str) -> str:
         ours = f"{_number(_returned(grounded))} {unit}".rstrip()
         values = f"{ours} with grounding, {_number(_returned(bare))} without"
         stay = f"{better} and {gain} of {count}" if count == others else f"{better} of {count} and {gain} of {others}"
-        return f"On the real side: {values}, {grounded[0].start} {_number(start)}; {stay} winners gain"
+        return f"Real side: {values}, {grounded[0].start} {_number(start)}; {stay} winners gain"
     if stable == count:
         return f"{better} of {count} generation winners are above their start in real"
     return f"Of {count} generation winners {stable} stay on their feet in real, {better} are above their start"

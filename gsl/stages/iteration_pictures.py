@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -118,7 +117,7 @@ def _centre(world: World | EnsembleWorld | RandomisedWorld) -> BulletWorld | Non
 
 
 def _held_out(log: Batch, world: BulletWorld) -> Trajectory:
-    """Return the first motion of a log that a diagnosis or a learned servo was not fitted to."""
+    """Return the largest motion of a log that a diagnosis or a learned servo was not fitted to."""
     split = experiment(log, lumped(world.plant.robot))
-    episodes: Sequence[Trajectory] = log.episodes
-    return episodes[int(split.pieces.record[split.held_out[0]])]
+    held_out = [log.episodes[k] for k in np.unique(split.pieces.record[split.held_out])]
+    return max(held_out, key=lambda one: np.ptp(one.position, axis=0).max())
