@@ -18,3 +18,8 @@ def derived_seed(*parts: int | str) -> int:
 def grounding_generator(seed: int) -> np.random.Generator:
     """Return the randomness of a grounding in an episode, set apart from that of the world, whose seed is the same."""
     return np.random.default_rng([seed, _STREAM])
+
+
+def round_seed(seed: int, number: int) -> int:
+    """Return the seed of a round, the first being 1."""
+    return seed + 1000 * (number - 1)

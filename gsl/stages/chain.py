@@ -295,8 +295,3 @@ class Chain:
             seed=seed,
         )
         return built(stage, out, console)
-
-
-def round_seed(seed: int, number: int) -> int:
-    """Return the seed of a round, the first being 1."""
-    return seed + 1000 * (number - 1)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.core.layout import check_alike
+from gsl.core.seeds import round_seed
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError, Refused
 from gsl.grounding.effects import learned
@@ -18,7 +19,7 @@ from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.optimizer import Learner
 from gsl.policies.policy import Policy, sized
 from gsl.report.markdown import in_unit
-from gsl.stages.chain import Budget, Chain, round_seed
+from gsl.stages.chain import Budget, Chain
 from gsl.stages.choices import FILE, policies, record, records, vector
 from gsl.stages.compliance_report import SECTION, with_real
 from gsl.stages.diagnosis_plan import EXCITATION, DiagnosisPlan, flown

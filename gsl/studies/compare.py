@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from gsl.core.layout import check_alike
+from gsl.core.seeds import round_seed
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.grounding import Grounding
-from gsl.stages.chain import Chain, round_seed
+from gsl.stages.chain import Chain
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.headline import Unit
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable

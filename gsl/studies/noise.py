@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.console import Console
 from gsl.core.layout import check_alike
+from gsl.core.seeds import round_seed
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
@@ -24,7 +25,7 @@ from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.policy import sized
 from gsl.report.noise_bars import Bars, noise_bars
-from gsl.stages.chain import Chain, round_seed
+from gsl.stages.chain import Chain
 from gsl.stages.evaluate import TABLE as EVALUATION
 from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
