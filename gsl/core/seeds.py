@@ -20,6 +20,6 @@ def grounding_generator(seed: int) -> np.random.Generator:
     return np.random.default_rng([seed, _STREAM])
 
 
-def round_seed(seed: int, number: int) -> int:
+def seed_of_round(seed: int, number: int) -> int:
     """Return the seed of a round, the first being 1."""
     return seed + 1000 * (number - 1)

@@ -106,7 +106,7 @@ def _compared(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterato
     yield (
         f"The diagnosed simulator's mean error against the best of the others ({rival}): {100.0 * change.mean:+.0f} % "
         f"({100.0 * change.lower:+.0f} to {100.0 * change.upper:+.0f} %, bootstrap over folds and "
-        f"trajectories); it is smaller in {int((after < every[rival]).sum())} of {len(after)} trajectories."
+        f"trajectories). It is smaller in {int((after < every[rival]).sum())} of {len(after)} trajectories."
     )
 
 

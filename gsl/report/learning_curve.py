@@ -220,8 +220,8 @@ def _finding(searches: Sequence[Search], unit: str) -> str:
     if grounded and bare:
         others, _, gain = _counted(bare)
         start = grounded[0].points[0].real
-        ours = f"{_number(_returned(grounded))} {unit}".rstrip()
-        values = f"{ours} with grounding, {_number(_returned(bare))} without"
+        ours = f"{_number(_end_value(grounded))} {unit}".rstrip()
+        values = f"{ours} with grounding, {_number(_end_value(bare))} without"
         stay = f"{better} and {gain} of {count}" if count == others else f"{better} of {count} and {gain} of {others}"
         return f"Real side: {values}, {grounded[0].start} {_number(start)}; {stay} winners gain"
     if stable == count:
@@ -229,7 +229,7 @@ def _finding(searches: Sequence[Search], unit: str) -> str:
     return f"Of {count} generation winners {stable} stay on their feet in real, {better} are above their start"
 
 
-def _returned(searches: Sequence[Search]) -> float:
+def _end_value(searches: Sequence[Search]) -> float:
     """Return the real value of what searches end with: the last policy that was chosen, else their start."""
     chosen = [one.confirmed.real for one in searches if one.confirmed]
     return chosen[-1] if chosen else searches[0].points[0].real

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.core.layout import check_alike
-from gsl.core.seeds import round_seed
+from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError, Refused
 from gsl.grounding.effects import learned
@@ -108,7 +108,9 @@ class Iterate:
             for number in range(1, self.iterations + 1):
                 place = home / f"iteration_{number:02d}"
                 try:
-                    done = chain.round(place, grounding, rounds.last or start, round_seed(self.seed, number), console)
+                    done = chain.round(
+                        place, grounding, rounds.last or start, seed_of_round(self.seed, number), console
+                    )
                 except Refused as refusal:
                     if number == 1:
                         raise

@@ -69,7 +69,7 @@ def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parame
         return
     robot = grounded.plant.robot
     held, steady = (replace(world, floating=False) for world in (sim, grounded))
-    shown = _held_out(log, held)
+    shown = _largest_held_out(log, held)
     if not missing(shown, held.layout):
         draw_joint(folder, Way(held, NoGrounding()), Way(steady, NoGrounding()), shown)
     env = scenario.make()
@@ -93,7 +93,7 @@ def draw_joint(folder: Path, plain: Way, grounded: Way, real: Trajectory) -> Non
     sent = actions(real, carried_out=True)
     place = Place(observations(real, layout), sent, tick)
     ticks = min(round(SHOWN / period), len(real) - tick)
-    simulated = [_replayed(way, place, ticks) for way in (plain, grounded)]
+    simulated = [_observe(way, place, ticks) for way in (plain, grounded)]
     shown = slice(tick + 1, tick + 1 + ticks)
     joint = int(np.argmax(np.ptp(real.position[shown], axis=0)))
     command = sent[tick : tick + ticks, joint]
@@ -102,7 +102,7 @@ def draw_joint(folder: Path, plain: Way, grounded: Way, real: Trajectory) -> Non
     joint_trace(folder / TRACE, traces, layout.joints[joint])
 
 
-def _replayed(way: Way, place: Place, ticks: int) -> np.ndarray:
+def _observe(way: Way, place: Place, ticks: int) -> np.ndarray:
     """Return observations of a replay, shape (ticks, layout.size)."""
     env = way.world.make()
     seen = np.array(list(replay(env, way.grounding, place, np.random.default_rng(0), ticks)))
@@ -116,8 +116,8 @@ def _centre(world: World | EnsembleWorld | RandomisedWorld) -> BulletWorld | Non
     return inner if isinstance(inner, BulletWorld) else None
 
 
-def _held_out(log: Batch, world: BulletWorld) -> Trajectory:
+def _largest_held_out(log: Batch, world: BulletWorld) -> Trajectory:
     """Return the largest motion of a log that a diagnosis or a learned servo was not fitted to."""
     split = experiment(log, lumped(world.plant.robot))
-    held_out = [log.episodes[k] for k in np.unique(split.pieces.record[split.held_out])]
-    return max(held_out, key=lambda one: np.ptp(one.position, axis=0).max())
+    episodes = [log.episodes[k] for k in np.unique(split.pieces.record[split.held_out])]
+    return max(episodes, key=lambda episode: np.ptp(episode.position, axis=0).max())

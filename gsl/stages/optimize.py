@@ -96,7 +96,7 @@ class Optimize:
         else:
             winners = [*self._learned(self.optimizer, scenario, first, console)]
         searched = len(winners)
-        winners, screened = self._screened(bare, checked, winners, console)
+        winners, screened = self._screen(bare, checked, winners, console)
         found += [winner.policy for winner in winners]
         write_policies(folder / FILE, policies(self.policy, self.task, found))
         best, worth = max(reversed(winners), key=lambda winner: winner.worth)
@@ -142,7 +142,7 @@ class Optimize:
                 value = self._evaluated(scenario, [parameters], index, progress).values[0]
                 yield Winner(self._record(index, parameters, value), value)
 
-    def _screened(
+    def _screen(
         self, bare: Scenario, checked: Mapping[str, Any], winners: list[Winner], console: Any
     ) -> tuple[list[Winner], Mapping[str, Any]]:
         """Return the winners that do not fall in the grounded simulator, and what to report of all."""
@@ -151,12 +151,12 @@ class Optimize:
         scenario = settled(replace(bare, grounding=without_margins(self.grounding)), checked)
         parameters = {winner.policy.name: vector(self.policy, winner.policy) for winner in winners}
         seed = derived_seed(self.seed, self.kind)
-        found = screen(scenario, parameters, self.screening, seed, workers=self.workers, console=console)
-        kept = passing(found)
+        results = screen(scenario, parameters, self.screening, seed, workers=self.workers, console=console)
+        kept = passing(results)
         if len(kept) < len(winners):
             dropped = f"{len(winners) - len(kept)} of {len(winners)} winners fall in the grounded simulator"
             console.status(f"{dropped} ({self.screening} episodes each): the robot does not try them")
-        falls = {name: {"falls": one.falls, "episodes": one.episodes} for name, one in found.items()}
+        falls = {name: result._asdict() for name, result in results.items()}
         return [winner for winner in winners if winner.policy.name in kept], {"screened": falls}
 
     def _drift(self, scenario: Scenario, found: Iterable[PolicyRecord], console: Any) -> Mapping[str, Any]:

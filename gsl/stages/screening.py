@@ -77,23 +77,21 @@ def screen(
     first = min(FIRST, count)
     with console.progress(len(policies) * count, "walking the winners in simulation") as progress:
 
-        def walked(names: Sequence[str], numbers: range) -> dict[str, int]:
+        def count_falls(names: Sequence[str], numbers: range) -> dict[str, int]:
             jobs = [Job(policies[name], derived_seed(seed, "screening", name, n)) for name in names for n in numbers]
             fell = [episode.fell for episode in episodes(scenario, jobs, workers=workers, progress=progress)]
             return {name: sum(fell[k * len(numbers) : (k + 1) * len(numbers)]) for k, name in enumerate(names)}
 
-        early = walked(list(policies), range(first))
+        early = count_falls(list(policies), range(first))
         standing = [name for name, falls in early.items() if not falls]
         progress.advance((len(policies) - len(standing)) * (count - first))
-        late = walked(standing, range(first, count)) if count > first else {}
+        late = count_falls(standing, range(first, count)) if count > first else {}
     return {
         name: Screened(falls + late.get(name, 0), count if name in standing else first) for name, falls in early.items()
     }
 
 
-def passing(found: Mapping[str, Screened]) -> list[str]:
+def passing(screened: Mapping[str, Screened]) -> list[str]:
     """Return the policies that never fell; if every one did, the one that fell least."""
-    best = min(one.share for one in found.values())
-    return [name for name, one in found.items() if one.falls == 0] or [
-        next(name for name, one in found.items() if one.share == best)
-    ]
+    standing = [name for name, result in screened.items() if not result.falls]
+    return standing or [min(screened, key=lambda name: screened[name].share)]

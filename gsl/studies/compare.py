@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from gsl.core.layout import check_alike
-from gsl.core.seeds import round_seed
+from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
@@ -145,7 +145,7 @@ class Compare:
             apart = learned(grounding) or flight is not None or iteration > 1
             spent += sum(self.iterate.budget.real) if learned(grounding) else 0
             out = place if apart else below / "sim" / cell.method / name
-            at = round_seed(seed, iteration)
+            at = seed_of_round(seed, iteration)
             ready, found, measured = chain.round(place, grounding, previous, at, console, search=out)
             rank = self._ranked(chain, below / cell.world, out, ready, found, console) if iteration == 1 else None
             trial = Trial.of(

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.console import Console
 from gsl.core.layout import check_alike
-from gsl.core.seeds import round_seed
+from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
@@ -197,7 +197,7 @@ class NoiseStudy:
         for number in self._rounds:
             if number > 1:
                 first = place = home / f"iteration_{number:02d}"
-            at, only = round_seed(seed, number), BEST if self.choice == SIM else ""
+            at, only = seed_of_round(seed, number), BEST if self.choice == SIM else ""
             _, found, measured = chain.round(place, grounding, start, at, console, search=first, only=only)
             spent += _steps(chain.shared.get(REAL, place)) if learned(grounding) else 0
             told = measured.metrics

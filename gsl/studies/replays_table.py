@@ -26,10 +26,10 @@ MEANS = {"after_a_tick": ".2f", "pitch": ".2f", "forward": ".1f"}
 QUANTITIES = ("stiffness", "strength")
 UNKNOWN, SAME = "-", "no gap"
 ABOUT = (
-    "Stiffness and strength: compliance transferred, 0 as the simulator, 1 as the real robot; in brackets the share of "
-    "the gap that is closed joint by joint (of stiffness with phase), below 0 where it grew. "
-    '"no gap" where simulator and robot do not differ, "-" where nobody measured. Stiffness is of a joint whose load '
-    "swings, strength the load at which it gives way, both in the air."
+    "Stiffness and strength are compliance transferred: 0 as the simulator, 1 as the real robot. "
+    "In brackets is the share of the gap that is closed joint by joint, below 0 where it grew; stiffness counts phase. "
+    '"no gap" stands where simulator and robot do not differ, "-" where nobody measured. '
+    "Stiffness is of a joint whose load swings in the air, strength the load at which it gives way."
 )
 
 
