@@ -18,6 +18,7 @@ from gsl.models.servo import ServoModel, neutral, with_group, without_group
 from gsl.robots.go2 import go2
 from gsl.robots.pendulum import pendulum
 from gsl.training.learn_servo import LearnedServo, document, learn_servo
+from gsl.training.servo_split import left_out, split
 from gsl.worlds.bullet import BulletEnv, BulletWorld
 from gsl.worlds.fits import fitting_step
 from gsl.worlds.held import Held
@@ -164,6 +165,38 @@ def test_known_conditions_are_no_news() -> None:
     assert found.after["all"] < 1.3 < found.before["all"]
     assert found.model.numbers["delay"][0] == pytest.approx(0.03, abs=0.005)
     assert found.model.numbers["kp"][0] == pytest.approx(0.0, abs=0.1)
+
+
+def at_gains(*friction: float) -> Batch:
+    """What one robot logs at three firmware gains, with another friction at each [N·m]."""
+    parts, labels = [], []
+    for k, (kp, torque) in enumerate(zip((0.5, 1.0, 2.0), friction, strict=True)):
+        known = {"servo_gain": {"kp": kp}}
+        parts.append(log(real(known | {"coulomb_friction": {"torque": torque}}), motions=4, seed=k))
+        labels += [{**one, "conditions": known, "kp": kp} for one in about(parts[-1])]
+    episodes = tuple(one for part in parts for one in part.episodes)
+    return replace(parts[0], episodes=episodes, metadata={"episodes": labels})
+
+
+@pytest.mark.parametrize(("friction", "holds"), [((0.04, 0.04, 0.04), True), ((0.0, 0.08, 0.0), False)])
+def test_what_does_not_hold_at_a_gain_that_is_left_out_is_not_learned(
+    friction: tuple[float, float, float], holds: bool
+) -> None:
+    found = learned(experiment(at_gains(*friction), ROBOT))
+    assert document(found)["learned"] is holds
+
+
+def test_each_condition_is_left_out_in_turn() -> None:
+    exp = experiment(at_gains(0.0, 0.0, 0.0), ROBOT)
+    parts = split(exp, labelled=False)
+    folds = left_out(exp, parts)
+    assert [set(exp.pieces.record[one.test]) for one in folds] == [set(range(k, k + 4)) for k in (0, 4, 8)]
+    for one in folds:
+        assert sorted(np.concatenate([one.train, one.judge, one.test])) == list(range(len(exp.pieces)))
+    labelled = experiment(at_gains(0.0, 0.0, 0.0), ROBOT, held_out={"kp": 2.0})
+    last = left_out(labelled, split(labelled, labelled=False))[2]
+    assert last.judge.size
+    assert not np.isin(exp.pieces.record[last.judge], exp.pieces.record[last.test]).any()
 
 
 @pytest.mark.parametrize("period", [0.05, 0.005, 0.001])

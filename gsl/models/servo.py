@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
@@ -171,6 +171,13 @@ def with_group(model: ServoModel, other: ServoModel, name: str) -> ServoModel:
         values[g] = other.network[key][g]
     lag, group = np.where(own[:, None], other.lag, model.lag), np.where(own, other.group, model.group)
     return replace(model, numbers=numbers, lag=lag, group=group, network=network)
+
+
+def with_groups(model: ServoModel, other: ServoModel, names: Iterable[str]) -> ServoModel:
+    """Return the model with the joints of some groups as in another model of the same robot."""
+    for name in names:
+        model = with_group(model, other, name)
+    return model
 
 
 def without_group(model: ServoModel, name: str) -> ServoModel:

@@ -2,11 +2,12 @@
 
 A group of joints takes a step only if held-out motions say so: numbers, which are few, if these come nearer, a network
 if they come nearer by a good share, significantly. Half of them also say when to stop, the others are for the report.
+Where a log knows of three conditions or more, such as gains, the same has to hold under each one that is left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -16,12 +17,12 @@ import numpy as np
 from gsl.core.plant import Plant
 from gsl.diagnosis.experiment import Experiment
 from gsl.errors import InputError
-from gsl.models.servo import ServoModel, neutral, without_group
-from gsl.training.frozen import freeze
-from gsl.training.servo_bench import CHANCE, LIKELY, ServoBench, cut_windows
+from gsl.models.servo import ServoModel, neutral, with_groups, without_group
+from gsl.training.servo_bench import CHANCE, LIKELY, Duel, ServoBench, cut_windows
 from gsl.training.servo_members import ITERATIONS, Member, further
-from gsl.training.servo_network import Alike, Progress, fit_network
+from gsl.training.servo_network import Progress
 from gsl.training.servo_replays import Replays
+from gsl.training.servo_split import Split, left_out, split
 from gsl.training.servo_walks import Walks
 from gsl.worlds.fits import fitting_step
 
@@ -30,21 +31,6 @@ MOST = 300  # iterations of the network's fit
 WORTH = 0.1  # of the cost that a network has to take: for less it is not let loose on motions that nobody has logged
 WIDE = 10.0  # noise floors that a joint moves in a window, at least, to show what drives it: noise alone spans 6
 LEAST_MOVING = 4  # windows in which a joint moves so far, at least
-
-
-@dataclass(frozen=True)
-class Split:
-    """Which windows of an experiment are for what; each an array of indices.
-
-    Attributes:
-        train: Fitted.
-        judge: Choose when to stop.
-        test: Are for the report; with the judge they also say whether a group takes a step (`ServoBench.kept`).
-    """
-
-    train: np.ndarray
-    judge: np.ndarray
-    test: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -71,22 +57,6 @@ class LearnedServo:
     further: tuple[Member, ...] = ()
     walks: tuple[float, ...] | None = None
     whole: bool = True
-
-
-def split(exp: Experiment, *, labelled: bool) -> Split:
-    """Divide a log: held-out motions judge and test in turn; where labels chose them, all test and others judge.
-
-    Args:
-        exp: The log.
-        labelled: Whether the held-out windows were chosen by labels.
-    """
-    part = exp.train if labelled else exp.held_out
-    names = np.unique(exp.pieces.record[part])
-    every = 4 if labelled else 2
-    of_motions = np.isin(exp.pieces.record[part], names[::every])
-    judge = part[of_motions] if len(names) >= every else part[::every]
-    rest = np.setdiff1d(part, judge)
-    return Split(rest, judge, exp.held_out) if labelled else Split(exp.train, judge, rest)
 
 
 def learn_servo(
@@ -118,43 +88,46 @@ def learn_servo(
     _check_motion(exp)
     step = fitting_step(step, exp.period)
     parts, start = split(exp, labelled=labelled), neutral(plant, np.random.default_rng(seed))
+    splits = [parts, *left_out(exp, parts)]
     with ThreadPoolExecutor(threads) as pool:
         bench = ServoBench(exp, Replays(plant, step, exp.period, threads, pool), start)
-        held = np.concatenate([parts.judge, parts.test])
-        numbers = bench.kept(held, start, bench.numbers(parts.train), LIKELY, 0.0)
+
+        def refused(old: Sequence[ServoModel], new: Sequence[ServoModel], likely: float, worth: float) -> set[str]:
+            pairs = zip(splits[1:], old[1:], new[1:], strict=True)
+            unseen = [Duel(part.test, before, after) for part, before, after in pairs]
+            seen = Duel(parts.held, old[0], new[0])
+            return bench.refused([seen], likely, worth) | bench.refused(unseen, likely, worth)
+
+        def network(part: Split, begun: ServoModel) -> tuple[ServoModel, list[Progress]]:
+            return bench.network(cut_windows(exp, part.train, SHORT), part.judge, begun, MOST)
+
+        begun, fitted = [start] * len(splits), [bench.numbers(part.train) for part in splits]
+        unfit = refused(begun, fitted, LIKELY, 0.0)
+        numbers = [with_groups(*pair, unfit) for pair in zip(fitted, begun, strict=True)]
         if walks:
-            numbers = bench.kept_on_foot(walks, held, numbers, bench.numbers_with(walks, parts.train, numbers))
-        some = cut_windows(exp, parts.train, SHORT)
-
-        def fit(begun: ServoModel, index: np.ndarray, iterations: int) -> tuple[ServoModel, list[Progress]]:
-            chosen = some.chosen(index)
-            alike = [
-                Alike(known, freeze(known, chosen.chosen(part), bench.floor, exp.period))
-                for known, part in bench.replays.known(chosen)
-            ]
-            return fit_network(
-                plant, begun, alike, step, exp.period, pool,
-                judge=lambda model: bench.level(parts.judge, model), longest=bench.longest, iterations=iterations,
-            )  # fmt: skip
-
-        def nearer(begun: ServoModel, index: np.ndarray, most: int) -> tuple[ServoModel, list[Progress]]:
-            network, way = fit(begun, index, most)
-            return bench.kept(held, begun, network, 1.0 - CHANCE, WORTH), way
-
-        model, way = nearer(numbers, np.arange(len(some)), MOST)
-        change = bench.change(parts.test, start, model)
+            on_both = bench.numbers_with(walks, parts.train, numbers[0])
+            numbers[0] = bench.kept_on_foot(walks, parts.held, numbers[0], on_both)
+        networks, ways = zip(*map(network, splits, numbers), strict=True)
+        bare = refused(numbers, networks, 1.0 - CHANCE, WORTH)
+        model = with_groups(networks[0], numbers[0], bare)
+        change = bench.change(Duel(parts.test, start, model))
         worse = tuple(name for name, share in change.items() if np.quantile(share, CHANCE) > 0.0)
         for name in worse:
             model = without_group(model, name)
         gaps = [bench.by_group(parts.test, one) for one in (start, model)]
+        some = cut_windows(exp, parts.train, SHORT)
+
+        def member(begun: ServoModel, index: np.ndarray) -> ServoModel:
+            new = bench.network(some.chosen(index), parts.judge, begun, ITERATIONS)[0]
+            return with_groups(new, begun, bare | bench.refused([Duel(parts.held, begun, new)], 1.0 - CHANCE, WORTH))
+
         others = further(
-            members - 1, lambda rng: bench.numbers_of_some(parts.train, numbers, rng), worse,
-            lambda begun, index: nearer(begun, index, ITERATIONS)[0],
+            members - 1, lambda rng: bench.numbers_of_some(parts.train, numbers[0], rng), worse, member,
             lambda one: bench.level(parts.test, one), plant=plant, samples=some.samples, seed=seed,
         )  # fmt: skip
-        sizes = len(some), len(parts.judge), len(parts.test)
+        sizes, way = (len(some), len(parts.judge), len(parts.test)), tuple(ways[0])
         on_foot = tuple(walks.level(one) for one in (start, model)) if walks else None
-        return LearnedServo(model, gaps[0], gaps[1], worse, tuple(way), sizes, tuple(others), on_foot, exp.by_record)
+        return LearnedServo(model, gaps[0], gaps[1], worse, way, sizes, tuple(others), on_foot, exp.by_record)
 
 
 def _check_motion(exp: Experiment) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.records import Pieces, pieces
 from gsl.diagnosis.residual import Comparison
 from gsl.models.servo import ServoModel, with_group
+from gsl.training.frozen import freeze
 from gsl.training.held_out_change import levels, relative_changes
+from gsl.training.servo_network import Alike, Progress, fit_network
 from gsl.training.servo_numbers import fit_numbers
 from gsl.training.servo_replays import Replays
 from gsl.training.servo_walks import Walks
@@ -21,6 +24,14 @@ LONG = (0.4, 1.6)  # warm-up and scored part of a window for numbers [s]: what a
 WINDOWS = 160  # that are fitted, at most
 CHANCE = 0.025  # of a bootstrap, on either side
 LIKELY = 0.9  # share of bootstraps in which numbers have to help: they are few, and each means something
+
+
+class Duel(NamedTuple):
+    """Two servos, and windows that the new one was not fitted to."""
+
+    windows: np.ndarray
+    old: ServoModel
+    new: ServoModel
 
 
 @dataclass(frozen=True)
@@ -62,6 +73,26 @@ class ServoBench:
 
         return fit_numbers(self.replays.plant, begun, residual, longest=self.longest, rounds=1)
 
+    def network(
+        self, some: Pieces, judge: np.ndarray, begun: ServoModel, iterations: int
+    ) -> tuple[ServoModel, list[Progress]]:
+        """Return a model with lags, network and joints' own numbers fitted, and the way there.
+
+        Args:
+            some: What it is fitted to.
+            judge: Windows that say when to stop.
+            begun: Where to begin.
+            iterations: At most.
+        """
+        replays, period = self.replays, self.exp.period
+        alike = [
+            Alike(known, freeze(known, some.chosen(part), self.floor, period)) for known, part in replays.known(some)
+        ]
+        return fit_network(
+            replays.plant, begun, alike, replays.step, period, replays.pool,
+            judge=lambda model: self.level(judge, model), longest=self.longest, iterations=iterations,
+        )  # fmt: skip
+
     def fitted_residual(self, index: np.ndarray) -> Callable[[ServoModel], np.ndarray]:
         """Return what numbers are fitted by: residuals of long windows [floors], by model."""
         some, floor = cut_windows(self.exp, index, LONG), self.floor
@@ -87,26 +118,23 @@ class ServoBench:
         """Group of each joint, shape (n_joints,)."""
         return self.start.group[: len(self.floor)]
 
-    def change(self, index: np.ndarray, old: ServoModel, new: ServoModel) -> dict[str, np.ndarray]:
+    def change(self, *duels: Duel) -> dict[str, np.ndarray]:
         """Return the relative change of the robust cost in bootstraps over motions, by group, shape (SAMPLES,) each."""
-        sample = self.exp.pieces.chosen(index).samples
-        before, after = (self.residuals(index, one) for one in (old, new))
-        return relative_changes(before, after, sample, self.group, old.groups)
+        sample = self.exp.pieces.chosen(np.concatenate([one.windows for one in duels])).samples
+        before = np.concatenate([self.residuals(one.windows, one.old) for one in duels])
+        after = np.concatenate([self.residuals(one.windows, one.new) for one in duels])
+        return relative_changes(before, after, sample, self.group, self.start.groups)
 
-    def kept(self, index: np.ndarray, old: ServoModel, new: ServoModel, sure: float, worth: float) -> ServoModel:
-        """Return the new servo, and the old one in groups whose cost does not fall by a share.
+    def refused(self, duels: Sequence[Duel], likely: float, worth: float) -> set[str]:
+        """Return the groups whose cost does not fall by a share.
 
         Args:
-            index: Of windows that the new one was not fitted to.
-            old: What it shall be better than.
-            new: The new one.
-            sure: Share of the bootstraps in which the cost has to fall.
+            duels: Looked at together; without any nothing is refused.
+            likely: Share of the bootstraps in which the cost has to fall.
             worth: Share of the cost by which it has to.
         """
-        for name, share in self.change(index, old, new).items():
-            if np.quantile(share, sure) >= -worth:
-                new = with_group(new, old, name)
-        return new
+        changes = self.change(*duels) if duels else {}
+        return {name for name, share in changes.items() if np.quantile(share, likely) >= -worth}
 
     def kept_on_foot(self, walks: Walks, index: np.ndarray, old: ServoModel, new: ServoModel) -> ServoModel:
         """Return the new servo, and the old one in groups that walks or motions in the air speak against.
@@ -117,7 +145,7 @@ class ServoBench:
             old: What it shall be better than.
             new: The new one.
         """
-        test, air = walks.exp.held_out, self.change(index, old, new)
+        test, air = walks.exp.held_out, self.change(Duel(index, old, new))
         before, after = (walks.residuals(test, one) for one in (old, new))
         sample = walks.exp.pieces.chosen(test).samples
         ground = relative_changes(before, after, sample, self.group, old.groups)
