@@ -15,8 +15,8 @@ from typer.core import TyperCommand
 from gsl import __version__
 from gsl.commandline.completion import CONFIG_DIR, complete, name_of, user_folder
 from gsl.commandline.failure import INTERRUPTED, leave_quietly, report
-from gsl.console import Console
 from gsl.core.interruption import ignore, listen
+from gsl.report.console import Console
 
 TYPED = "gsl.typed"
 
@@ -174,7 +174,7 @@ def robot(
     json: Json = False,
 ) -> None:
     """Write the robot's URDF and a picture of it standing."""
-    from gsl.stages.robot import write_robot
+    from gsl.commandline.robot_files import write_robot
 
     write_robot(name, Path(out.removeprefix("out=")), Console(json=json))
 
@@ -189,7 +189,7 @@ def init(
 ) -> None:
     """Write the configuration of your own robot from its URDF."""
     from gsl.commandline.composer import configuration_folder
-    from gsl.stages.init import write_configuration
+    from gsl.commandline.init import write_configuration
 
     worlds = [path.stem for path in (configuration_folder() / "world").glob("*.yaml")]
     write_configuration(settings or [], worlds, Console(json=json))
@@ -198,7 +198,7 @@ def init(
 @app.command()
 def bench(json: Json = False) -> None:
     """Measure what a step costs, as ratios of CPU time."""
-    from gsl.stages.bench import run_bench
+    from gsl.benchmarks.bench import run_bench
 
     run_bench(Console(json=json))
 

@@ -9,10 +9,10 @@ from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from gsl.console import Console
 from gsl.core.setting import component, setting
 from gsl.core.validation import make
 from gsl.errors import GslError
+from gsl.report.console import Console
 
 
 @component

@@ -12,14 +12,13 @@ import numpy as np
 from scenarios import QUIET
 
 from gsl.core.body import Robot
+from gsl.core.interfaces import REAL, Policy, Task
 from gsl.errors import Waiting
 from gsl.grounding.ane import ActionNoise
-from gsl.policies.policy import Policy
+from gsl.real_robot.errand import Errand, Order, asked
 from gsl.robots.catalogue import robot
-from gsl.stages.population import Job
-from gsl.stages.real_robot import Errand, Order, asked
-from gsl.stages.rollout import Scenario
-from gsl.tasks.task import REAL, Task
+from gsl.rollout.parallel import Job
+from gsl.rollout.rollout import Scenario
 from gsl.worlds.external import ExternalRobot
 
 

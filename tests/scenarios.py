@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from gsl.console import Console
 from gsl.grounding.none import NoGrounding
 from gsl.policies.linear import Linear
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.rollout import Scenario
+from gsl.report.console import Console
+from gsl.rollout.rollout import Scenario
 from gsl.tasks.arm import HANGING, JOINTS, Arm
 from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld

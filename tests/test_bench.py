@@ -2,8 +2,8 @@
 
 import time
 
-from gsl.stages.bench import FIGURES, _row
-from gsl.stages.bench_loop import StepClock
+from gsl.benchmarks.bench import FIGURES, _row
+from gsl.benchmarks.loop import StepClock
 
 
 def test_a_clock_counts_what_happens_inside_and_nothing_else() -> None:

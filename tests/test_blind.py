@@ -25,11 +25,11 @@ from gsl.blind.mix import Mix, Slot, slots
 from gsl.blind.programmes import Programme, drawn_programmes
 from gsl.blind.same import SETTLE, STEP, play_same
 from gsl.blind.strength import BANDS, Yardstick, turned_up
-from gsl.console import Console
 from gsl.core.plant import Plant, nominal
 from gsl.core.statistics import quantile_interval, wilson
 from gsl.effects.effect import applied, built
 from gsl.policies.excitation import Excitation
+from gsl.report.console import Console
 from gsl.robots.nao import nao
 from gsl.stages.blind_answer import BlindAnswer
 from gsl.worlds.held import Held, Windows

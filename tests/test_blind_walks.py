@@ -19,9 +19,9 @@ from gsl.blind.on_foot import Track, Yardstick
 from gsl.blind.seals import files_below
 from gsl.blind.walks import Individual, Walks
 from gsl.core.plant import nominal
+from gsl.diagnosis.logs import on_ground
 from gsl.effects.effect import names
 from gsl.robots.nao import nao
-from gsl.stages.logs import on_ground
 from gsl.storage.trajectories import read
 from gsl.worlds.bullet import BulletWorld
 

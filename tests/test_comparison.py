@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gsl.stages.headline import Unit
+from gsl.core.unit import Unit
 from gsl.studies.comparison import differences, orders, summaries
 from gsl.studies.comparison_table import markdown
 from gsl.studies.paper_cells import every_trial, one_by_one, worth

@@ -23,8 +23,8 @@ from gsl.grounding.none import NoGrounding
 from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Solver
 from gsl.models.network import Network
-from gsl.stages.compliance import AMPLITUDE, FREQUENCY, MOST, Compliance, measure, rounds, stance
-from gsl.stages.compliance_report import SECTION, ComplianceReport, report_compliance, transferred, with_real
+from gsl.validation.compliance import AMPLITUDE, FREQUENCY, MOST, Compliance, measure, rounds, stance
+from gsl.validation.compliance_transfer import SECTION, ComplianceReport, report_compliance, transferred, with_real
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.held import Held
 from gsl.worlds.servo import BRISTLE

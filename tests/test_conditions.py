@@ -19,6 +19,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.diagnose import diagnosed
 from gsl.diagnosis.document import document
 from gsl.diagnosis.experiment import experiment
+from gsl.diagnosis.logs import other_clocks, read_logs, synchronised
 from gsl.diagnosis.nuisance import none
 from gsl.diagnosis.records import records
 from gsl.diagnosis.replay import InTheAir
@@ -31,9 +32,8 @@ from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Solver
 from gsl.models.linear import fit_linear
 from gsl.report.cross_validation import AS_IT_WAS, DIAGNOSED, Fold, table
-from gsl.stages.learned_replay import LearnedReplay, Simulated
-from gsl.stages.logs import other_clocks, read_logs, synchronised
 from gsl.storage.trajectories import write
+from gsl.validation.learned_replay import LearnedReplay, Simulated
 from gsl.worlds.bullet import BulletWorld
 
 SOFT = {"servo_gain": {"kp": 0.5}}

@@ -10,8 +10,8 @@ from example_stage import ExampleWorld
 
 from gsl.cli import call
 from gsl.commandline.composer import compose, configuration_folder, opened
+from gsl.commandline.config import prepared, resolved
 from gsl.commandline.multirun import job_level
-from gsl.config import prepared, resolved
 from gsl.core.described import described, rebuilt
 from gsl.errors import ConfigError
 
@@ -295,23 +295,23 @@ def test_every_option_of_ours_composes_and_builds(line: tuple[str, ...]) -> None
 
 
 def test_a_saved_component_is_built_again() -> None:
-    saved = {"_target_": "gsl.config.CommandSettings", "name": "mine"}
+    saved = {"_target_": "gsl.commandline.config.CommandSettings", "name": "mine"}
     assert rebuilt(saved).name == "mine"
 
 
 def test_a_saved_text_is_no_reference() -> None:
     text = "${oc.create:'{_target_: os.getcwd}'}"
-    assert rebuilt({"_target_": "gsl.config.CommandSettings", "name": text}).name == text
+    assert rebuilt({"_target_": "gsl.commandline.config.CommandSettings", "name": text}).name == text
 
 
 @pytest.mark.parametrize(
     "saved",
     [
         {"_target_": "os.getcwd"},
-        {"_target_": "gsl.config.inspect.isclass", "object": 3},
-        {"_target_": "gsl.config.prepared", "config": {}},
-        {"_target_": "gsl.config.CommandSettings", "name": {"_target_": "os.getcwd"}},
-        {"_target_": "gsl.config.CommandSettings", "name": [{"_target_": "os.getcwd"}]},
+        {"_target_": "gsl.commandline.config.inspect.isclass", "object": 3},
+        {"_target_": "gsl.commandline.config.prepared", "config": {}},
+        {"_target_": "gsl.commandline.config.CommandSettings", "name": {"_target_": "os.getcwd"}},
+        {"_target_": "gsl.commandline.config.CommandSettings", "name": [{"_target_": "os.getcwd"}]},
         {"_target_": "${oc.env:HOME}"},
         {"_target_": "gsl.no_such.Thing"},
         {"_target_": 3},

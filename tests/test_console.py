@@ -7,8 +7,8 @@ from contextlib import suppress
 import pytest
 from rich.console import Console as RichConsole
 
-from gsl.commandline.tables import fitting
-from gsl.console import Console
+from gsl.report.console import Console
+from gsl.report.tables import fitting
 
 
 def test_results_go_to_stdout_and_talk_to_stderr(capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import diagnosis_document as made
 import pytest
 
-from gsl.console import Console
+from gsl.report.console import Console
 from gsl.report.diagnosis import report_html
 from gsl.report.diagnosis_bars import Bar, bar_chart
 from gsl.report.diagnosis_curves import Curve, line_chart, ticks

@@ -19,6 +19,7 @@ from scipy import stats
 from gsl.core.checkpoint import read_checkpoint
 from gsl.core.described import described
 from gsl.core.plant import Plant
+from gsl.diagnosis.files import read_diagnosis, uncertain_causes
 from gsl.errors import ConfigError
 from gsl.grounding.draws import DRAWS, UncertainCause, around, drawings, hypercube, within
 from gsl.grounding.effects import DiagnosedEffects, switched_on
@@ -29,14 +30,13 @@ from gsl.models.servo import NUMBERS, neutral
 from gsl.models.servo_file import FILE, read_servo
 from gsl.models.servo_members import ServoMembers
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.diagnosis_files import read_diagnosis, uncertain_causes
-from gsl.stages.grounding_gate import Gate, settled
-from gsl.stages.rollout import Scenario
-from gsl.stages.train_servo import problems_of_members
+from gsl.rollout.rollout import Scenario
 from gsl.storage.artifact import build
 from gsl.storage.models import write_model
 from gsl.tasks.walk import Walk
 from gsl.training.servo_members import bootstrap
+from gsl.training.servo_verdict import problems_of_members
+from gsl.validation.gate import Gate, settled
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
 

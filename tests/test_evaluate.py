@@ -13,10 +13,10 @@ from scenarios import GROUND, QUIET
 from gsl.errors import ArtifactError, ConfigError
 from gsl.policies.linear import Linear
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.choices import policies, record
+from gsl.rollout.parallel import Episode
 from gsl.stages.evaluate import Evaluate
-from gsl.stages.population import Episode
 from gsl.storage.policies import read_policies, write_policies
+from gsl.storage.policy_choice import policies, record
 from gsl.tasks.walk import Walk
 
 WALK, TASK = WalkEngine(), Walk(duration=1.4)

@@ -9,7 +9,7 @@ import pytest
 from bodies import STANCE, followed, held, walked
 
 from gsl.commandline.composer import compose, opened
-from gsl.config import resolved
+from gsl.commandline.config import resolved
 from gsl.core.described import rebuilt
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import Setting, settings_of

@@ -17,11 +17,11 @@ from gsl.models.free_run import TICKS
 from gsl.models.inverse import Solver
 from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.grounding_check import ALPHAS, allowed_falls, check, largest_stable
-from gsl.stages.grounding_replay import PAST, Deviations, Place, places, replay
-from gsl.stages.grounding_report import BARE, GROUNDED, OFF, PI0, STILL, GroundingReport
-from gsl.stages.rollout import Scenario, rollout
+from gsl.rollout.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
+from gsl.validation.check import ALPHAS, allowed_falls, check, largest_stable
+from gsl.validation.replay import PAST, Deviations, Place, places, replay
+from gsl.validation.report import BARE, GROUNDED, OFF, PI0, STILL, GroundingReport
 from gsl.worlds.bullet import BulletWorld
 
 POLICY = WalkEngine()

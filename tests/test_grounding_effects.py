@@ -23,10 +23,10 @@ from gsl.grounding.effects import DiagnosedEffects, Diagnosis, innermost, switch
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import RandomisedEffects
-from gsl.stages.effects_check import check_effects
-from gsl.stages.grounding_gate import Gate, grounding_parents
-from gsl.stages.rollout import Scenario, rollout
+from gsl.rollout.rollout import Scenario, rollout
 from gsl.storage.policies import read_policies
+from gsl.validation.effects import check_effects
+from gsl.validation.gate import Gate, grounding_parents
 
 LATE = {"command_latency": {"delay": 0.02}}
 DRY = {"coulomb_friction": [{"torque": 0.1, "joints": "legs"}, {"torque": 0.05, "joints": "arms"}]}

@@ -15,10 +15,10 @@ from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Solver
 from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.grounding_joints import fewest
-from gsl.stages.grounding_replay import Place, places
-from gsl.stages.rollout import Scenario, rollout
+from gsl.rollout.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
+from gsl.validation.fewest_joints import fewest
+from gsl.validation.replay import Place, places
 from gsl.worlds.bullet import BulletWorld
 
 SIM = BulletWorld(robot="nao", effects={}, floating=False, settle=0.1)

@@ -22,9 +22,9 @@ from gsl.grounding.torque_noise import TorqueNoise, torque_limits, with_torque_n
 from gsl.models.servo import neutral
 from gsl.models.servo_members import ServoMembers
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.grounding_gate import Gate, settled
-from gsl.stages.rollout import Scenario
+from gsl.rollout.rollout import Scenario
 from gsl.storage.models import write_model
+from gsl.validation.gate import Gate, settled
 from gsl.worlds.bullet import BulletWorld
 
 WORLD = BulletWorld(robot="nao", effects={"torque_limit": {"factor": 0.5, "joints": "arms"}})

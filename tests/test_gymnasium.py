@@ -17,7 +17,7 @@ import pytest
 from commands import done, gsl, refused
 
 from gsl.commandline.composer import compose, opened
-from gsl.config import prepared, resolved
+from gsl.commandline.config import prepared, resolved
 from gsl.core.layout import check_alike
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
@@ -32,16 +32,16 @@ from gsl.models.states import NearestChoice, StateForward, StateInverse
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.mlp import Mlp
 from gsl.policies.policy import sized
-from gsl.stages.grounding_states import ValueReport, value_report
-from gsl.stages.rollout import Scenario, rollout
-from gsl.stages.simulator import GroundedSimulator
-from gsl.stages.train_states import forward_of_states, inverse_of_states
-from gsl.stages.training import Parts
-from gsl.stages.uncharged import uncharged
+from gsl.rollout.rl_env import GroundedSimulator
+from gsl.rollout.rollout import Scenario, rollout
 from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.storage.trajectories import read, write
 from gsl.studies.noise_table import Point
 from gsl.tasks.own_reward import OwnReward
+from gsl.training.data import Parts
+from gsl.training.states import forward_of_states, inverse_of_states
+from gsl.validation.uncharged import uncharged
+from gsl.validation.values_of_states import ValueReport, value_report
 from gsl.worlds.control_cost import Charged, Quadratic
 from gsl.worlds.environments import own_module
 from gsl.worlds.gymnasium import GymnasiumWorld

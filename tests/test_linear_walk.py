@@ -14,7 +14,7 @@ from gsl.core.layout import Layout
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.linear_walk import LinearWalk
-from gsl.stages.rollout import Scenario, rollout
+from gsl.rollout.rollout import Scenario, rollout
 from gsl.tasks.distance import Distance
 from gsl.worlds.bullet import BulletWorld
 

@@ -9,9 +9,9 @@ import pytest
 
 from gsl.core.body import lumped
 from gsl.core.trajectory import Batch, Trajectory
+from gsl.diagnosis.logs import check_log, log_files, on_ground, read_logs
 from gsl.errors import GslError
 from gsl.robots.nao import nao
-from gsl.stages.logs import check_log, log_files, on_ground, read_logs
 from gsl.storage.trajectories import write
 
 NAO = lumped(nao())

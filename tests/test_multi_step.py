@@ -22,12 +22,12 @@ from gsl.models.free_run import TICKS as FREE
 from gsl.models.free_run import predicted_error, segments
 from gsl.models.multi_step import MultiStep, travelled
 from gsl.models.network import Network
-from gsl.stages.needed_model import as_needed, looking_ahead
 from gsl.stages.train_forward import TrainForward, fitted
 from gsl.stages.train_inverse import TrainInverse
-from gsl.stages.training import Parts
 from gsl.storage.models import FILES, FORWARD, INVERSE, read_forward_model, read_inverse_model
 from gsl.storage.trajectories import write
+from gsl.training.data import Parts
+from gsl.validation.model_requirements import as_needed, looking_ahead
 
 QUIET: Any = SimpleNamespace(status=lambda text: None, table=lambda title, columns, rows: None)
 TICKS = 4

@@ -6,7 +6,7 @@ import pytest
 
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import ModelConfig
-from gsl.stages.needed_model import as_needed, extra_ticks, looking_ahead
+from gsl.validation.model_requirements import as_needed, extra_ticks, looking_ahead
 from gsl.worlds.bullet import BulletWorld
 
 

@@ -13,10 +13,10 @@ from scenarios import AIR, QUIET, REACH
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
+from gsl.optimizers.objective import check_objective, objective_values, worst_mean
 from gsl.optimizers.trpo import Trpo
-from gsl.stages.generations import FILE, Generation, GenerationLog
-from gsl.stages.objective import check_objective, objective_values, worst_mean
 from gsl.stages.optimize import BEST, Optimize
+from gsl.storage.generation_log import FILE, Generation, GenerationLog
 from gsl.storage.policies import read_policies
 from gsl.tasks.arm import Arm
 

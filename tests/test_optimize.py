@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from scenarios import AIR, QUIET, REACH
 
+from gsl.core.interfaces import Step
 from gsl.core.layout import Layout
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.cma_es import CmaEs
-from gsl.stages.generations import Generation, GenerationLog
 from gsl.stages.optimize import BEST, Optimize
+from gsl.storage.generation_log import Generation, GenerationLog
 from gsl.storage.policies import read_policies
 from gsl.tasks.arm import Arm
-from gsl.tasks.task import Step
 
 SETTINGS = [
     *("name=kill", "grounding=none", "task=arm", "policy=linear", "world.floating=false", "world.settle=0.1"),

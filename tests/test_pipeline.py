@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from commands import SMALL, Said, done, gsl, started
 
-from gsl.stages.grounding_gate import Gate
-from gsl.stages.iteration_report import Rounds
+from gsl.report.iteration import Rounds
+from gsl.validation.gate import Gate
 
 NAMED = (*SMALL, "name=chain")
 STAGES = ("collect_real", "collect_sim", "train_forward", "train_inverse", "optimize", "evaluate")

@@ -19,17 +19,16 @@ from test_bad_input import refused
 from gsl.core.described import described, rebuilt
 from gsl.core.seeds import derived_seed
 from gsl.core.statistics import bootstrap_interval, rank_correlation
+from gsl.diagnosis.policy_gap import Effort, policy_gap
+from gsl.diagnosis.real_returns import MOST, measured_parents, real_returns
 from gsl.effects.effect import names
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
-from gsl.stages.choices import policies, record
-from gsl.stages.evaluate import TABLE
-from gsl.stages.policy_gap import Effort, policy_gap
-from gsl.stages.population import Job, episodes
-from gsl.stages.real_returns import MOST, measured_parents, real_returns
-from gsl.stages.rollout import Scenario
+from gsl.rollout.parallel import Job, episodes
+from gsl.rollout.rollout import Scenario
 from gsl.storage.manifest import inventory
 from gsl.storage.policies import write_policies
+from gsl.storage.policy_choice import EVALUATION, policies, record
 from gsl.tasks.arm import Arm
 from gsl.worlds.bullet import BulletWorld
 
@@ -147,7 +146,7 @@ def test_a_policy_that_fell_in_all_its_episodes_was_not_stopped(
 ) -> None:
     shutil.copytree(arms, tmp_path / "copy")
     monkeypatch.chdir(tmp_path / "copy")
-    path = Path("runs/arm/evaluate") / TABLE
+    path = Path("runs/arm/evaluate") / EVALUATION
     table = json.loads(path.read_text())
     chosen = {row["name"] for row in table["confirmation"]}
     row = next(row for row in table["policies"] if row["name"] not in chosen)

@@ -14,9 +14,9 @@ from scenarios import QUIET, arm, walk
 
 from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
-from gsl.stages import population
-from gsl.stages.population import Job, episodes, trajectories
-from gsl.stages.rollout import Scenario, rollout
+from gsl.rollout import parallel
+from gsl.rollout.parallel import Job, episodes, trajectories
+from gsl.rollout.rollout import Scenario, rollout
 
 
 def _jobs(scenario: Scenario, count: int = 4) -> list[Job]:
@@ -73,7 +73,7 @@ def _dies(marker: Path, frozen: bytes, job: Job) -> int:
 def _in_parallel(function: Callable[..., int], tmp_path: Path) -> list[int]:
     jobs = [Job(np.zeros(1), seed) for seed in range(10, 16)]
     with QUIET.progress(len(jobs), "") as progress:
-        return population.in_parallel(partial(function, tmp_path / "died"), arm(), jobs, 2, progress)
+        return parallel.in_parallel(partial(function, tmp_path / "died"), arm(), jobs, 2, progress)
 
 
 def test_a_killed_worker_costs_only_its_own_jobs(tmp_path: Path) -> None:

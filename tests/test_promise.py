@@ -9,14 +9,14 @@ from typing import Any, cast
 import pytest
 from scenarios import GROUND, QUIET
 
+from gsl.core.unit import Unit
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.choices import policies, record
+from gsl.report.iteration import Rounds
+from gsl.rollout.promise import ROOM, promise
 from gsl.stages.evaluate import Evaluate
-from gsl.stages.headline import Unit
-from gsl.stages.iteration_report import Rounds
-from gsl.stages.promise import ROOM, promise
 from gsl.storage.artifact import Artifact
 from gsl.storage.policies import PolicyRecord, write_policies
+from gsl.storage.policy_choice import policies, record
 from gsl.tasks.walk import Walk
 
 WALK, CM = WalkEngine(), Unit(100.0, "cm/s")

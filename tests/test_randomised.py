@@ -16,7 +16,7 @@ from gsl.errors import ConfigError, Refused
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import Draw, RandomisedEffects, randomised
 from gsl.robots.catalogue import robot
-from gsl.stages.grounding_gate import Gate
+from gsl.validation.gate import Gate
 from gsl.worlds.bullet import BulletWorld
 
 WORLD = BulletWorld(robot="nao", effects={"coulomb_friction": {"torque": 0.1}}, floating=False, settle=0.0)

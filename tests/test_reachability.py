@@ -17,12 +17,12 @@ from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Solver
 from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.drift import drifts
-from gsl.stages.grounding_check import asked
-from gsl.stages.grounding_replay import places
-from gsl.stages.reachability import FLOOR, TOLERANCE, missed_by, reachability
-from gsl.stages.rollout import Scenario, rollout
+from gsl.rollout.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
+from gsl.validation.check import asked
+from gsl.validation.drift import drifts
+from gsl.validation.reachability import FLOOR, TOLERANCE, missed_by, reachability
+from gsl.validation.replay import places
 from gsl.worlds.bullet import BulletWorld
 
 SIM = BulletWorld(robot="nao", effects={}, settle=0.1)

@@ -8,14 +8,14 @@ import pytest
 from bodies import world
 from PIL import Image
 
-from gsl.console import Console
+from gsl.commandline.robot_files import write_robot
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.walk_engine import WalkEngine
+from gsl.report.console import Console
 from gsl.report.render import portrait, walk_strip
 from gsl.robots.nao import nao
-from gsl.stages.robot import write_robot
-from gsl.stages.rollout import Scenario, rollout
+from gsl.rollout.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
 
 

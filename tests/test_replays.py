@@ -12,16 +12,16 @@ from commands import gsl
 from scipy.stats import spearmanr
 
 from gsl.commandline.composer import compose, opened
-from gsl.config import prepared, resolved
+from gsl.commandline.config import prepared, resolved
 from gsl.errors import ArtifactError
 from gsl.report.style import GAT, UNINFORMED
-from gsl.stages.compliance import Compliance
-from gsl.stages.compliance_report import transferred
 from gsl.studies.gain_predictors import points, predictors, rank_correlations, searched
 from gsl.studies.ledger_file import read
 from gsl.studies.replay import Replay
 from gsl.studies.replays_table import Shown
 from gsl.studies.yielding import closed_strength
+from gsl.validation.compliance import Compliance
+from gsl.validation.compliance_transfer import transferred
 
 COMMITTED = Path(__file__).parents[1] / "docs/results"
 STIFF = "stiffness, legs (joint by joint)"

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from gsl.commandline.composer import compose, opened
-from gsl.config import prepared, resolved
-from gsl.stages.headline import Unit
+from gsl.commandline.config import prepared, resolved
+from gsl.core.unit import Unit
 from gsl.studies import budget, noise_table
 from gsl.studies.budget import Budget
 from gsl.studies.compare import Compare

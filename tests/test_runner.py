@@ -14,11 +14,12 @@ from omegaconf import OmegaConf
 from robots_elsewhere import requested, run
 
 from gsl.core.described import described, rebuilt
+from gsl.core.interfaces import Policy
 from gsl.core.seeds import grounding_generator
 from gsl.errors import ArtifactError, ConfigError, GslError
 from gsl.grounding.ane import ActionNoise
 from gsl.policies.excitation import Excitation
-from gsl.policies.policy import Policy, neighbour
+from gsl.policies.policy import neighbour
 from gsl.policies.walk_engine import WalkEngine
 from gsl.runner import journal, preflight
 from gsl.runner.acting import Actor

@@ -15,7 +15,7 @@ from gsl.grounding.none import NoGrounding
 from gsl.grounding.servo import LearnedServo
 from gsl.grounding.torque_noise import TorqueNoise
 from gsl.policies.walk_engine import WalkEngine
-from gsl.stages.screening import FIRST, Screened, foretells_falls, passing, screen, without_margins
+from gsl.validation.screening import FIRST, Screened, foretells_falls, passing, screen, without_margins
 
 GIVEN = {"command_latency": {"delay": 0.02}}
 

@@ -16,9 +16,9 @@ from commands import SMALL, Said, done, refused
 from gsl.core.checkpoint import read_checkpoint
 from gsl.models.servo import ServoModel
 from gsl.models.servo_file import FILE, read_servo
-from gsl.stages.train_servo import problems, remarks
 from gsl.storage.checkpoints import write_checkpoint
 from gsl.storage.trajectories import read
+from gsl.training.servo_verdict import problems, remarks
 from gsl.worlds.bullet import BulletWorld
 
 SOFT = ("real=nao_ideal", "real.effects.servo_gain.kp=0.6", "real.effects.command_latency.delay=0.02")

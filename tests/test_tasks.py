@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from bodies import world
 
+from gsl.core.interfaces import REAL, SIM
 from gsl.core.trajectory import Trajectory
 from gsl.tasks.arm import Arm
-from gsl.tasks.task import REAL, SIM
 from gsl.tasks.walk import Walk
 
 LAYOUT = world(floating=False).layout

@@ -7,11 +7,13 @@ from typing import Any, cast
 
 import pytest
 
-from gsl.stages.account import returned
-from gsl.stages.headline import Unit, _optimize
-from gsl.stages.iteration_report import Rounds
-from gsl.stages.measured import cells, gain, summary
-from gsl.stages.population import Episode
+from gsl.core.unit import Unit
+from gsl.report.account import returned
+from gsl.report.evaluation_cells import cells
+from gsl.report.headline import _optimize
+from gsl.report.iteration import Rounds
+from gsl.rollout.parallel import Episode
+from gsl.rollout.returns import gain, summary
 from gsl.storage.artifact import Artifact
 from gsl.tasks.own_reward import OwnReward
 from gsl.tasks.walk import Walk

@@ -16,11 +16,11 @@ from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.models.config import HISTORIES, ModelConfig
 from gsl.models.ensemble import Ensemble
 from gsl.models.linear import fit_linear
-from gsl.stages.train_forward import HELDOUT, TrainForward
+from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import TrainInverse
-from gsl.stages.training import labels
 from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.storage.trajectories import read, write
+from gsl.training.data import HELDOUT, labels
 from gsl.worlds.grounded import GroundedEnv
 
 QUIET: Any = SimpleNamespace(status=lambda text: None, table=lambda title, columns, rows: None)

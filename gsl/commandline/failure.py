@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import sys
 
-from gsl.console import Console
 from gsl.core.interruption import asked
 from gsl.errors import GslError, Waiting
+from gsl.report.console import Console
 
 INTERRUPTED = 130
 

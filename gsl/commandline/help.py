@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from gsl.commandline.composer import camel_case, compose, effects, groups, opened, options
+from gsl.commandline.config import CommandSettings, resolved
 from gsl.commandline.known_settings import declared, plain
 from gsl.commandline.overrides import OPTIONAL_GROUPS
-from gsl.config import CommandSettings, resolved
 from gsl.core.setting import REQUIRED, Setting, settings_of
 from gsl.errors import ConfigError, GslError
 

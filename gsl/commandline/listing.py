@@ -9,10 +9,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from gsl.console import Console
 from gsl.errors import ArtifactError
-from gsl.stages.account import account, flat, plain
-from gsl.stages.headline import headline
+from gsl.report.account import account, flat, plain
+from gsl.report.console import Console
+from gsl.report.headline import headline
 from gsl.storage.artifact import Artifact
 from gsl.storage.identity import content_hash
 from gsl.storage.manifest import Manifest, Parent, damaged_file, read

@@ -17,10 +17,10 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
 from gsl.commandline.composer import Composition
+from gsl.commandline.config import RUNS, execute, resolved
 from gsl.commandline.failure import described, report
 from gsl.commandline.overrides import file_of, key_of
-from gsl.config import RUNS, execute, resolved
-from gsl.console import Console
+from gsl.report.console import Console
 from gsl.storage.documents import write_json
 
 RESULT = "result.json"

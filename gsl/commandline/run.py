@@ -10,9 +10,9 @@ from typing import Any
 from omegaconf import OmegaConf
 
 from gsl.commandline.composer import compose, opened
+from gsl.commandline.config import execute, prepared, resolved
 from gsl.commandline.multirun import run_jobs
-from gsl.config import execute, prepared, resolved
-from gsl.console import Console
+from gsl.report.console import Console
 
 
 def run(

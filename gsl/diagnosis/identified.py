@@ -18,7 +18,7 @@ from gsl.diagnosis.attribute import Arena
 from gsl.diagnosis.candidates import Candidate, switched_on
 from gsl.diagnosis.replay import Bench, Effects
 from gsl.diagnosis.residual import loss
-from gsl.optimizers.cma_es import CmaEs
+from gsl.optimizers.box_search import box_search
 
 LEFT_OUT = ("action_noise", "encoder_noise", "joint_limit", "backlash")  # random, where hardly any log comes, play
 SIGMA = 0.15  # first step, as a share of a range
@@ -56,11 +56,11 @@ def identified(arena: Arena, *, evaluations: int, seed: int, tick: Callable[[], 
         np.array([one.neutral[0] for one in chosen]),
         np.array([one.documented[:, 0] for one in chosen]).T,
     )
-    settings = CmaEs(candidates=CANDIDATES, generations=max(1, evaluations // CANDIDATES), sigma=SIGMA)
-    search = settings.start(start, high - low, seed, bounds=(low, high))
+    generations = max(1, evaluations // CANDIDATES)
+    search = box_search(start, low, high, seed, candidates=CANDIDATES, generations=generations, sigma=SIGMA)
     bench, best = arena.glance, start
     least = _cost(bench, Identified(chosen, start))
-    for _ in range(settings.generations):
+    for _ in range(generations):
         asked, costs = search.ask(), []
         for values in asked:
             costs.append(_cost(bench, Identified(chosen, values)))

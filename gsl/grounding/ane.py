@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from gsl.core.action_noise import ActionNoiseRun
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
@@ -26,16 +27,3 @@ class ActionNoise:
         if layout.choices:
             raise ConfigError("grounding", "its noise is for actions that are numbers; random_choice is for choices")
         return ActionNoiseRun(self.sd, rng)
-
-
-class ActionNoiseRun:
-    """The noise in one episode."""
-
-    def __init__(self, sd: float, rng: np.random.Generator) -> None:
-        self._sd, self._rng = sd, rng
-
-    def transform(self, observation: np.ndarray, action: np.ndarray) -> np.ndarray:
-        """Return the noisy action."""
-        if self._sd == 0.0:
-            return action
-        return action + self._sd * self._rng.standard_normal(len(action))

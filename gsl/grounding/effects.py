@@ -13,18 +13,17 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from gsl.core.described import described
+from gsl.core.interfaces import Grounding, GroundingRun, World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.effects.effect import together
 from gsl.errors import ConfigError
 from gsl.grounding.draws import UncertainCause, around
 from gsl.grounding.gat import ActionTransformation
-from gsl.grounding.grounding import Grounding, GroundingRun
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import RandomisedEffects
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
-from gsl.worlds.world import World
 
 MANY = 6  # effects, more of which are counted and not named
 DOUBT = "In the task that may be no nearer: compare with grounding=ane and grounding=gat."  # docs/results/withheld.md

@@ -13,11 +13,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.interfaces import GroundingRun
 from gsl.core.layout import Layout
 from gsl.core.setting import Setting, component, setting, settings_of
 from gsl.effects.effect import documented, effect_class
 from gsl.errors import ConfigError
-from gsl.grounding.grounding import GroundingRun
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.randomised import RandomisedWorld
 

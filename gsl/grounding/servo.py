@@ -11,11 +11,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from gsl.core.interfaces import Grounding, GroundingRun
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
-from gsl.grounding.grounding import Grounding, GroundingRun
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.torque_noise import with_torque_noise
 from gsl.models.servo import other_base

@@ -14,11 +14,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from gsl.core.described import described
+from gsl.core.interfaces import GroundingRun
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.effects.effect import together
 from gsl.errors import ConfigError
-from gsl.grounding.grounding import GroundingRun
 from gsl.worlds.bullet import BulletWorld
 
 EFFECT = "torque_noise"

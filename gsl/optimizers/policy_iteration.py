@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from gsl.core.interfaces import Policy, Simulator
 from gsl.core.setting import component
 from gsl.errors import ConfigError
-from gsl.optimizers.optimizer import Simulator
-from gsl.policies.policy import Policy
 from gsl.policies.table import ActionTable
 
 

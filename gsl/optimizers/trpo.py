@@ -7,12 +7,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from gsl.core.interfaces import Policy, Simulator
 from gsl.core.interruption import held
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.optimizers.optimizer import Simulator
 from gsl.policies.mlp import Mlp, vector_of
-from gsl.policies.policy import Policy
 
 
 @component

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from gsl.core.interfaces import Policy
 from gsl.core.layout import Layout
-from gsl.policies.policy import Policy
 
 
 class Piece(NamedTuple):

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from gsl.report.markdown import in_unit
+from gsl.core.words import in_unit
 from gsl.report.style import COMMAND, INK, REAL, SIMULATION, figure, headline, label_ends, look, save
 
 if TYPE_CHECKING:

@@ -1,29 +1,10 @@
-"""Tables as markdown, and numbers for them."""
+"""Tables as markdown."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table, one line a row, with a line end after the last."""
     return "".join(f"| {' | '.join(line)} |\n" for line in (columns, ["---"] * len(columns), *rows))
-
-
-def significant(value: float, *, sign: bool = False, size: float | None = None) -> str:
-    """Return a number of any size with one decimal, with two below 1, with two digits that count below .01.
-
-    Args:
-        value: The number.
-        sign: Whether a plus is told.
-        size: What decides instead of the value, of two bounds the larger.
-    """
-    size = abs(value if size is None else size)
-    places = 1 if not 0.0 < size < 1.0 else 2 if size >= 0.01 else 1 - math.floor(math.log10(size))
-    return f"{value:{'+' if sign else ''}.{places}f}"
-
-
-def in_unit(title: str, unit: str) -> str:
-    """Return a title with its unit in brackets, if it has one."""
-    return f"{title} [{unit}]" if unit else title

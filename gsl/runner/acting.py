@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.action_noise import ActionNoiseRun
 from gsl.core.seeds import grounding_generator
 from gsl.errors import GslError
-from gsl.grounding.ane import ActionNoise
 from gsl.runner.request import layout_of
 
 
@@ -29,8 +29,7 @@ class Actor:
         if self._table is None:
             with _told(episode):
                 self._run = policy_of(request).start(np.array(episode["parameters"], dtype=float), layout)
-        noise = ActionNoise(sd=request["action_noise"])
-        self._noise = noise.start(layout, grounding_generator(episode["seed"]))
+        self._noise = ActionNoiseRun(request["action_noise"], grounding_generator(episode["seed"]))
 
     def act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what the policy wants and what is to be sent: with noise [rad], shape (n_joints,) each."""

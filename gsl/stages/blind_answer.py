@@ -12,11 +12,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from gsl.blind.answer import Question, answered, answered_by_baselines
-from gsl.blind.seals import VERSION, files_below, total
-from gsl.core.setting import component, setting
-from gsl.core.validation import make
-from gsl.diagnosis.options import Options
-from gsl.stages.blind_files import (
+from gsl.blind.files import (
     ANSWERS,
     BASELINES,
     CASE,
@@ -30,8 +26,12 @@ from gsl.stages.blind_files import (
     read_case,
     seals_of,
 )
-from gsl.stages.logs import check_log, on_ground
-from gsl.stages.population import Workers, in_parallel
+from gsl.blind.seals import VERSION, files_below, total
+from gsl.core.setting import component, setting
+from gsl.core.validation import make
+from gsl.diagnosis.logs import check_log, on_ground
+from gsl.diagnosis.options import Options
+from gsl.rollout.parallel import Workers, in_parallel
 from gsl.storage import documents
 from gsl.storage.hashing import file_hash
 from gsl.storage.trajectories import read

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
+from gsl.blind.files import CASES, LABELS, SEALS, SECRET, write_case
 from gsl.blind.label import WALK
 from gsl.blind.make import Workshop, rng_of
 from gsl.blind.mix import Mix, Slot, slots, walk_slots
@@ -19,8 +20,7 @@ from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.errors import GslError
 from gsl.policies.excitation import Excitation
-from gsl.stages.blind_files import CASES, LABELS, SEALS, SECRET, write_case
-from gsl.stages.population import Workers, in_parallel
+from gsl.rollout.parallel import Workers, in_parallel
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.velocity_motors import check_servos

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from gsl.blind.figures import figures
+from gsl.blind.files import ANSWERS, BASELINES, LABELS, SEAL, SEALS, document, found, seals_of
 from gsl.blind.label import WALK, Label
 from gsl.blind.mark import Mark, marked
 from gsl.blind.results import OURS, markdown, results
 from gsl.blind.seals import check_label, files_below
 from gsl.core.setting import component, setting
 from gsl.errors import GslError
-from gsl.stages.blind_files import ANSWERS, BASELINES, LABELS, SEAL, SEALS, document, found, seals_of
 from gsl.storage import documents
 from gsl.storage.hashing import file_hash
 

@@ -7,38 +7,34 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
+from gsl.core.interfaces import REAL, SIM, Grounding, Learner, Policy, Search, Task, World
 from gsl.core.setting import component, setting
+from gsl.core.words import several
+from gsl.diagnosis.files import read_diagnosis
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, having_effects, innermost, switched_on, with_innermost
 from gsl.grounding.gat import ActionTransformation, check_known
-from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import RandomisedEffects
 from gsl.grounding.servo import LearnedServo
 from gsl.grounding.torque_noise import TorqueNoise, torque_limits
 from gsl.models.config import ModelConfig
-from gsl.optimizers.cma_es import CmaEs
-from gsl.optimizers.optimizer import Learner
-from gsl.policies.policy import Policy
+from gsl.optimizers.objective import Objective, Quantile
 from gsl.stages.collect import Collect
-from gsl.stages.diagnosis_files import read_diagnosis
 from gsl.stages.diagnosis_plan import DiagnosisPlan
 from gsl.stages.evaluate import Evaluate, check_tolerated
-from gsl.stages.headline import several
 from gsl.stages.link import built
-from gsl.stages.needed_model import as_needed, extra_ticks, looking_ahead
-from gsl.stages.objective import Objective, Quantile
 from gsl.stages.optimize import BEST, Optimize
-from gsl.stages.screening import Screening
 from gsl.stages.train_forward import TrainForward
-from gsl.stages.train_inverse import Method, TrainInverse
-from gsl.stages.train_states import refuse_robots
-from gsl.stages.training import FEWEST, WHY
+from gsl.stages.train_inverse import TrainInverse
 from gsl.stages.values import Values
 from gsl.storage.artifact import Artifact
-from gsl.tasks.task import REAL, SIM, Task
+from gsl.training.data import FEWEST, WHY
+from gsl.training.inverse import Method
+from gsl.training.states import refuse_robots
+from gsl.validation.model_requirements import as_needed, extra_ticks, looking_ahead
+from gsl.validation.screening import Screening
 from gsl.worlds.external import asking
-from gsl.worlds.world import World
 
 
 @component
@@ -98,7 +94,7 @@ class Chain:
     forward_model: ModelConfig
     inverse_model: ModelConfig
     inverse_method: Literal["regression", "solve"]
-    optimizer: CmaEs | Learner
+    optimizer: Search | Learner
     budget: Budget
     diagnosis: DiagnosisPlan
     accept: bool

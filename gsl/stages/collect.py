@@ -10,22 +10,21 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from gsl.core.described import described
+from gsl.core.interfaces import SIM, Policy, Task, World
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ConfigError
 from gsl.grounding.random_choice import exploration
-from gsl.policies.policy import Policy, neighbour, sized
+from gsl.policies.policy import neighbour, sized
 from gsl.policies.programme import Piece, Programmed
-from gsl.stages.choices import PolicyChoice
-from gsl.stages.population import Job, Workers, trajectories
-from gsl.stages.programme import command_file, playing
-from gsl.stages.real_robot import Errand, Order, answer_parents, asked
-from gsl.stages.rollout import Scenario
+from gsl.real_robot.errand import Errand, Order, answer_parents, asked
+from gsl.rollout.parallel import Job, Workers, trajectories
+from gsl.rollout.programme import command_file, playing
+from gsl.rollout.rollout import Scenario
+from gsl.storage.policy_choice import PolicyChoice
 from gsl.storage.trajectories import write
-from gsl.tasks.task import SIM, Task
 from gsl.worlds.external import ExternalRobot
-from gsl.worlds.world import World
 
 FILE = "trajectories.parquet"
 

@@ -19,8 +19,10 @@ from gsl.diagnosis.attribute import Hypothesis
 from gsl.diagnosis.candidates import library
 from gsl.diagnosis.diagnose import Findings, diagnosed, prepared
 from gsl.diagnosis.experiment import Experiment
+from gsl.diagnosis.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.records import Record
+from gsl.diagnosis.settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
 from gsl.diagnosis.shrinkage import ceiling, removed
 from gsl.diagnosis.whole import mean_errors
 from gsl.effects.effect import applied, built, effect_class
@@ -36,12 +38,10 @@ from gsl.report.cross_validation import (
     Fold,
     table,
 )
-from gsl.stages.diagnosis_settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
-from gsl.stages.learned_replay import LearnedReplay, Simulated
-from gsl.stages.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
-from gsl.stages.population import Workers, threads
-from gsl.stages.servo_folds import servo_errors
+from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
+from gsl.training.servo_folds import servo_errors
+from gsl.validation.learned_replay import LearnedReplay, Simulated
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.velocity_motors import check_servos
 

@@ -15,22 +15,22 @@ from gsl.core.body import lumped
 from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
+from gsl.diagnosis.command_file import write_next_experiment
 from gsl.diagnosis.diagnose import Findings, diagnosed
 from gsl.diagnosis.document import document
 from gsl.diagnosis.limits import limits
+from gsl.diagnosis.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
 from gsl.diagnosis.options import Options
+from gsl.diagnosis.policy_gap import Effort, policy_gap
+from gsl.diagnosis.real_returns import RealReturns, measured_parents, real_returns
+from gsl.diagnosis.settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
 from gsl.diagnosis.verify import in_bullet
 from gsl.diagnosis.world_file import diagnosed_effects, joined
 from gsl.errors import InputError
 from gsl.report.diagnosis import report_html
-from gsl.stages.diagnosis_files import PAGE, REPORT, SIMULATOR, WORLD, report_of
-from gsl.stages.diagnosis_settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
-from gsl.stages.experiment_file import write_next_experiment
-from gsl.stages.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
-from gsl.stages.policy_gap import Effort, policy_gap
-from gsl.stages.population import Workers, threads
-from gsl.stages.real_returns import RealReturns, measured_parents, real_returns
+from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
+from gsl.storage.diagnosis_report import PAGE, REPORT, SIMULATOR, WORLD, report_of
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.velocity_motors import check_servos
 

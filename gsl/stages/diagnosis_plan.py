@@ -2,32 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
+from gsl.core.interfaces import REAL, Grounding, World
 from gsl.core.setting import component, setting
+from gsl.diagnosis.files import read_diagnosis
+from gsl.diagnosis.settings import Without
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, Diagnosis, innermost, switched_on
-from gsl.grounding.grounding import Grounding
 from gsl.grounding.servo import LearnedServo
 from gsl.policies.excitation import Excitation
+from gsl.report.flight import Flight
 from gsl.stages.collect import Collect
 from gsl.stages.diagnose import Diagnose
-from gsl.stages.diagnosis_files import read_diagnosis
-from gsl.stages.diagnosis_settings import Without
 from gsl.stages.identify import Identify
 from gsl.stages.link import built
 from gsl.stages.train_servo import TrainServo
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.tasks.excite import Excite
-from gsl.tasks.task import REAL
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot, asking
 from gsl.worlds.velocity_motors import check_servos
-from gsl.worlds.world import World
 
 EXCITATION = "collect_excitation"
 ROBOTS_ONLY = "only robots in Bullet worlds are excited in the air; take another grounding"
@@ -110,44 +108,6 @@ class DiagnosisPlan:
             seed=seed,
         )
         return built(played, home / EXCITATION, console)
-
-
-class Flight(NamedTuple):
-    """What an excitation in the air cost, and what came of it: a diagnosis, a learned servo, or both.
-
-    Attributes:
-        episodes: Motions.
-        seconds: Their duration.
-        diagnosis: What was found, None where nothing was diagnosed.
-        servo: Metrics of the learned servo, None where none was learned.
-    """
-
-    episodes: int
-    seconds: float
-    diagnosis: Diagnosis | None = None
-    servo: Mapping[str, Any] | None = None
-
-    @property
-    def findings(self) -> tuple[str, ...]:
-        """What was found, and what is done with it: of the diagnosis, then of the servo."""
-        return tuple(filter(None, (self.verdict, self.gap)))
-
-    @property
-    def verdict(self) -> str:
-        """What a diagnosis says, nothing where there is none."""
-        if self.diagnosis is None:
-            return ""
-        verdict = self.diagnosis.verdict.replace("_", " ")
-        return f"Diagnosis: {verdict}. {self.diagnosis.summary} {self.diagnosis.told}"
-
-    @property
-    def gap(self) -> str:
-        """How near a learned servo is, nothing where none was learned."""
-        if self.servo is None:
-            return ""
-        before, after = self.servo["floors_before"], self.servo["floors_after"]
-        fell = f"on held-out motions the gap fell from {before:.1f} to {after:.2f} noise floors"
-        return f"Learned servo: {fell}. It acts on every joint's torque in the simulator."
 
 
 def flown(home: Path, asked: Grounding, ready: Grounding) -> Flight | None:

@@ -10,28 +10,26 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from scipy import stats
 
+from gsl.core.interfaces import REAL, Policy, Task, World
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import difference_interval
+from gsl.core.unit import Unit
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
-from gsl.policies.policy import Policy, sized
-from gsl.stages.choices import FILE, policies, records, vector
-from gsl.stages.headline import Unit
-from gsl.stages.measured import falls, gain, mean, row, summary
-from gsl.stages.population import Episode, Job, Workers, episodes
-from gsl.stages.promise import promise
-from gsl.stages.real_robot import Errand, Order, answer_parents, asked
-from gsl.stages.rollout import Scenario
-from gsl.stages.uncharged import warn_uncharged
+from gsl.policies.policy import sized
+from gsl.real_robot.errand import Errand, Order, answer_parents, asked
+from gsl.rollout.parallel import Episode, Job, Workers, episodes
+from gsl.rollout.promise import promise
+from gsl.rollout.returns import falls, gain, mean, row, summary
+from gsl.rollout.rollout import Scenario
 from gsl.storage.documents import write_json
 from gsl.storage.policies import PolicyRecord, write_policies
+from gsl.storage.policy_choice import EVALUATION, FILE, policies, records, vector
 from gsl.storage.references import resolve
-from gsl.tasks.task import REAL, Task
+from gsl.validation.uncharged import warn_uncharged
 from gsl.worlds.external import ExternalRobot
-from gsl.worlds.world import World
 
-TABLE = "evaluation.json"
 _CHOICE, _CHECK, _REPORT = "choice", "check", "report"  # their seeds never meet
 CHALLENGERS = 2  # that are checked, at most, where falls are tolerated
 SURE = 0.95  # that a policy is ahead, one-sided
@@ -93,7 +91,7 @@ class Evaluate:
         fresh = dict(zip(reported, measure([found[i] for i in reported], _REPORT, self.confirmation), strict=True))
         rows = [row(theta, done) for theta, done in zip(found, tried, strict=True)]
         again = [[row(found[index], done) for index, done in phase.items()] for phase in (checked, fresh)]
-        write_json(folder / TABLE, {"policies": rows, "check": again[0], "confirmation": again[1]})
+        write_json(folder / EVALUATION, {"policies": rows, "check": again[0], "confirmation": again[1]})
         write_policies(folder / FILE, policies(self.policy, self.task, [found[best]]))
         stable = [done for done in tried[1:] if self._stable(done)]
         promised = promise(found, best, summary(fresh[best]), Unit.of(self.task))

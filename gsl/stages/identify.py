@@ -17,14 +17,14 @@ from gsl.core.setting import component, setting
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.arena import arena_of
 from gsl.diagnosis.identified import identified
+from gsl.diagnosis.logs import log_parents, read_motions
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.replay import Bench, Effects
+from gsl.diagnosis.settings import Without
 from gsl.diagnosis.world_file import joined
-from gsl.stages.diagnosis_files import REPORT
-from gsl.stages.diagnosis_settings import Without
-from gsl.stages.logs import log_parents, read_motions
-from gsl.stages.population import Workers, threads
+from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
+from gsl.storage.diagnosis_report import REPORT
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.velocity_motors import check_servos
 

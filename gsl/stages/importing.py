@@ -10,7 +10,7 @@ from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError, InputError, TrajectoryError
-from gsl.stages.import_report import report, tables
+from gsl.report.importing import report, tables
 from gsl.storage import documents
 from gsl.storage.importers.assembly import Episode, episodes, unmatched
 from gsl.storage.importers.mapping import Mapping as LogMapping

@@ -6,40 +6,35 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
+from gsl.core.words import in_unit
 from gsl.errors import ConfigError, Refused
 from gsl.grounding.effects import learned
 from gsl.grounding.gat import ActionTransformation
-from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.models.config import ModelConfig
-from gsl.optimizers.cma_es import CmaEs
-from gsl.optimizers.optimizer import Learner
-from gsl.policies.policy import Policy, sized
-from gsl.report.markdown import in_unit
+from gsl.optimizers.objective import Objective, Quantile, check_objective
+from gsl.policies.policy import sized
+from gsl.report.iteration import Rounds, write_curve, write_table
+from gsl.rollout.parallel import Workers
+from gsl.rollout.rollout import Scenario
 from gsl.stages.chain import Budget, Chain
-from gsl.stages.choices import FILE, policies, record, records, vector
-from gsl.stages.compliance_report import SECTION, with_real
 from gsl.stages.diagnosis_plan import EXCITATION, DiagnosisPlan, flown
-from gsl.stages.grounding_gate import REPORT, settled
-from gsl.stages.iteration_pictures import draw_flight, draw_walk_and_joint
-from gsl.stages.iteration_report import Rounds, write_curve, write_table
-from gsl.stages.objective import Objective, Quantile, check_objective
-from gsl.stages.population import Workers
-from gsl.stages.rollout import Scenario
-from gsl.stages.screening import without_margins
-from gsl.stages.train_forward import HELDOUT
-from gsl.stages.training import DATA, of_policy
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policies import write_policies
-from gsl.storage.trajectories import read
-from gsl.tasks.task import SIM, Task
+from gsl.storage.policy_choice import FILE, policies, record, records, vector
+from gsl.storage.trajectories import DATA, read
+from gsl.training.data import HELDOUT, of_policy
+from gsl.validation.compliance_transfer import SECTION, with_real
+from gsl.validation.gate import REPORT, settled
+from gsl.validation.iteration_pictures import draw_flight, draw_walk_and_joint
+from gsl.validation.screening import without_margins
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.gymnasium import try_out
-from gsl.worlds.world import World
 
 FIRST = "iteration_01"
 
@@ -64,7 +59,7 @@ class Iterate:
     inverse_model: Annotated[ModelConfig, setting("how the simulator's inverse is learned")]
     inverse_method: Annotated[Literal["regression", "solve"], setting("what the inverse is (train-inverse --help)")]
     grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
-    optimizer: Annotated[CmaEs | Learner, setting("what improves the parameters")]
+    optimizer: Annotated[Search | Learner, setting("what improves the parameters")]
     budget: Annotated[Budget, setting("episodes of each part")]
     diagnosis: Annotated[DiagnosisPlan, setting("how grounding=effects finds the effects")]
     objective: Objective = "mean"

@@ -7,7 +7,7 @@ from typing import Any
 
 from gsl.core.described import described
 from gsl.errors import ArtifactError
-from gsl.stages.headline import headline
+from gsl.report.headline import headline
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact, Stage, build
 

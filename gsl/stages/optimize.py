@@ -2,36 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, World
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
-from gsl.grounding.grounding import Grounding
-from gsl.optimizers.cma_es import CmaEs
-from gsl.optimizers.optimizer import Learner
-from gsl.policies.policy import Policy, sized
-from gsl.stages.choices import FILE, PolicyChoice, policies, record, vector
-from gsl.stages.compliance_report import report_compliance
-from gsl.stages.drift import drifts, read_region
-from gsl.stages.generations import FILE as PROGRESS
-from gsl.stages.generations import Generation, GenerationLog
-from gsl.stages.grounding_gate import REPORT, Gate, grounding_parents, settled
-from gsl.stages.objective import CVAR, Objective, Quantile, check_objective, objective_values
-from gsl.stages.population import Job, Workers, episodes
-from gsl.stages.rollout import Scenario
-from gsl.stages.screening import Screening, foretells_falls, passing, screen, without_margins
-from gsl.stages.simulator import GroundedSimulator
+from gsl.optimizers.objective import CVAR, Objective, Quantile, check_objective, objective_values
+from gsl.policies.policy import sized
+from gsl.rollout.parallel import Job, Workers, episodes
+from gsl.rollout.rl_env import GroundedSimulator
+from gsl.rollout.rollout import Scenario
+from gsl.storage.generation_log import FILE as PROGRESS
+from gsl.storage.generation_log import Generation, GenerationLog
 from gsl.storage.models import model_file
 from gsl.storage.policies import PolicyRecord, write_policies
-from gsl.tasks.task import SIM, Task
-from gsl.worlds.world import World
+from gsl.storage.policy_choice import FILE, PolicyChoice, policies, record, vector
+from gsl.validation.compliance_transfer import report_compliance
+from gsl.validation.drift import drifts, read_region
+from gsl.validation.gate import REPORT, Gate, grounding_parents, settled
+from gsl.validation.screening import Screening, foretells_falls, passing, screen, without_margins
 
 BEST = "best_in_simulation.json"
 
@@ -63,7 +59,7 @@ class Optimize:
     task: Annotated[Task, setting("what is to be maximised")]
     policy: Annotated[Policy, setting("what is to be improved")]
     grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
-    optimizer: Annotated[CmaEs | Learner, setting("what improves the parameters")]
+    optimizer: Annotated[Search | Learner, setting("what improves the parameters")]
     rollouts: Annotated[int, setting("episodes of each candidate", ge=1)]
     screening: Screening = 0
     objective: Objective = "mean"
@@ -91,7 +87,7 @@ class Optimize:
             bare.world, scenario.world, scenario.grounding, folder / REPORT, console, self.seed
         )
         found = [record(self.policy, "pi0" if self.initial is None else "start", first)]
-        if isinstance(self.optimizer, CmaEs):
+        if isinstance(self.optimizer, Search):
             winners = [*self._searched(self.optimizer, scenario, first, GenerationLog(folder), console)]
         else:
             winners = [*self._learned(self.optimizer, scenario, first, console)]
@@ -112,7 +108,7 @@ class Optimize:
         }
 
     def _searched(
-        self, optimizer: CmaEs, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Any
+        self, optimizer: Search, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Any
     ) -> Iterator[Winner]:
         """Yield the best candidate of each generation of a search."""
         search = optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
@@ -171,7 +167,7 @@ class Optimize:
         console.status(f"{told} ({first[0]}: {100 * first[1]:.0f} %)")
         return {"drift": shares}
 
-    def _evaluated(self, scenario: Scenario, candidates: list[np.ndarray], index: int, progress: Any) -> Generation:
+    def _evaluated(self, scenario: Scenario, candidates: Sequence[np.ndarray], index: int, progress: Any) -> Generation:
         jobs = [
             Job(candidate, derived_seed(self.seed, self.kind, index, number, rollout))
             for number, candidate in enumerate(candidates)

@@ -14,15 +14,15 @@ from typing import Annotated, Any, ClassVar
 import gymnasium
 import numpy as np
 
+from gsl.core.interfaces import World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.errors import ArtifactError, ConfigError, GslError
+from gsl.real_robot.errand import REHEARSAL
 from gsl.runner import bridge
 from gsl.runner.journal import ANSWER, RETURNS, add_return, ends
 from gsl.runner.request import HELD, NAME, read_request
-from gsl.stages.real_robot import REHEARSAL
 from gsl.storage.requests import files_of
-from gsl.worlds.world import World
 
 _BODY = ("base.position", "base.orientation", "base.velocity")
 

@@ -8,20 +8,18 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gsl.core.interfaces import REAL, Policy, Search, Task, World
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import rank_correlation
 from gsl.grounding.none import NoGrounding
-from gsl.optimizers.cma_es import CmaEs
-from gsl.policies.policy import Policy, neighbour
+from gsl.policies.policy import neighbour
 from gsl.report.markdown import table
-from gsl.stages.choices import FILE, vector
+from gsl.rollout.parallel import Episode, Job, Workers, episodes
+from gsl.rollout.rollout import Scenario
 from gsl.stages.optimize import Optimize
-from gsl.stages.population import Episode, Job, Workers, episodes
-from gsl.stages.rollout import Scenario
 from gsl.storage.policies import read_policies
-from gsl.tasks.task import REAL, Task
-from gsl.worlds.world import World
+from gsl.storage.policy_choice import FILE, vector
 
 TABLE = "table.md"
 COLUMNS = (
@@ -44,7 +42,7 @@ class Survey:
     worlds: Annotated[Mapping[str, World], setting("the worlds to survey, by name")]
     task: Annotated[Task, setting("what is measured")]
     policy: Annotated[Policy, setting("family of the policies")]
-    optimizer: Annotated[CmaEs, setting("what finds sim-optimal policies")]
+    optimizer: Annotated[Search, setting("what finds sim-optimal policies")]
     rollouts: Annotated[int, setting("simulated episodes of a candidate", ge=1)]
     searches: Annotated[int, setting("searches in the simulator", ge=1)] = 3
     repeats: Annotated[int, setting("episodes of π0", ge=2)] = 10

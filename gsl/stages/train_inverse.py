@@ -4,34 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
-import numpy as np
-
-from gsl.core.angles import encode
+from gsl.core.interfaces import REAL
 from gsl.core.setting import component, setting
-from gsl.core.trajectory import Batch
-from gsl.core.transitions import Transitions, transitions
 from gsl.errors import ConfigError
-from gsl.models.choice import Choice, best, fit_network
 from gsl.models.config import ModelConfig
-from gsl.models.forward import ForwardModel
 from gsl.models.free_run import recovered_error, segments, shortest
-from gsl.models.inverse import InverseModel, Regression, Solver
-from gsl.models.linear import fit_linear
-from gsl.models.network import Samples
-from gsl.stages.train_states import inverse_of_states
-from gsl.stages.training import Parts, checked, data_file, degrees, degrees_by_joint, parts, summary
 from gsl.storage.models import write_model
-from gsl.tasks.task import REAL
-
-Method = Annotated[
-    Literal["regression", "solve"],
-    setting("fit the action (the paper), or solve a model of the simulator for it, the identity where sim = real"),
-]
-Damping = Annotated[
-    float, setting("of solve: what a change of action costs, in units of the squared sensitivity", gt=0, upper=1.0)
-]
+from gsl.storage.trajectories import data_file
+from gsl.training.data import checked, degrees, degrees_by_joint, parts, summary
+from gsl.training.inverse import Damping, Method, fit_inverse
+from gsl.training.states import inverse_of_states
 
 
 @component
@@ -68,49 +52,9 @@ class TrainInverse:
         data = data.only(self.model.joints_of_interest(data.training.joints, "model"))
         for part in data:
             checked(path, part.episodes, shortest(self.model.of_joints, self.model.horizon))
-        model, choice = fitted(self.model, data, self.seed, self.method, self.damping)
+        model, choice = fit_inverse(self.model, data, self.seed, self.method, self.damping)
         write_model(folder, model)
         errors = recovered_error(model, segments(data.heldout.episodes, self.model.of_joints, carried_out=True))
         by_joint = degrees_by_joint(errors, model.joints)
         measured = {"recovered_action_deg": degrees(errors), "recovered_action_by_joint_deg": by_joint}
         return {**summary(choice, data), "method": self.method, "heldout": measured}
-
-
-def fitted(config: ModelConfig, data: Parts, seed: int, method: Method, damping: float) -> tuple[InverseModel, Choice]:
-    """Return the inverse model that a configuration allows and that best recovers the actions of validation."""
-    pieces = segments(data.validation.episodes, config.of_joints, carried_out=True)
-
-    def fit(one: ModelConfig, whole: bool) -> InverseModel:
-        if method == "regression":
-            return _regression(one, data, seed, whole)
-        return _solver(one, data, seed, damping, whole)
-
-    return best(config, fit, lambda model: degrees(recovered_error(model, pieces)))
-
-
-def _regression(config: ModelConfig, data: Parts, seed: int, whole: bool) -> InverseModel:
-    n = len(data.training.joints)
-    known, unseen = (_turned(_rows(config, part), n, config) for part in (data.training, data.validation))
-    network = fit_network(known, unseen, config, seed=seed, whole=whole)
-    return Regression(network, config.of_joints, data.training.joints, config.encoding, config.horizon)
-
-
-def _solver(config: ModelConfig, data: Parts, seed: int, damping: float, whole: bool) -> InverseModel:
-    joints = data.training.joints
-    rows = [_rows(config, part) for part in (data.training, data.validation)]
-    known, unseen = ((part.windows, encode(part.change, config.encoding)) for part in rows)
-    network = fit_network(known, unseen, config, seed=seed, whole=whole)
-    simulator = ForwardModel(network, config.of_joints, joints, config.encoding, config.horizon)
-    plain = fit_linear(rows[0].windows, rows[0].change, ridge=config.ridge)
-    sensitivity = plain.layers[0][0][:, : len(joints)].astype(float)
-    return Solver(simulator, sensitivity, damping)
-
-
-def _turned(data: Transitions, n: int, config: ModelConfig) -> Samples:
-    """Let the wanted change take the place of the action in the inputs, and the action become the target."""
-    inputs = np.concatenate([data.change, data.windows[:, n:]], axis=1)
-    return inputs, encode(data.windows[:, :n], config.encoding)
-
-
-def _rows(config: ModelConfig, part: Batch) -> Transitions:
-    return transitions(part.episodes, config.of_joints, config.horizon, carried_out=True)

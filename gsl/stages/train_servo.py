@@ -14,26 +14,26 @@ from gsl.core.body import lumped
 from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.diagnosis.experiment import Experiment
+from gsl.diagnosis.logs import check_log, log_parents, on_ground, read_logs, read_motions
+from gsl.diagnosis.settings import Tolerance
 from gsl.diagnosis.torque_width import held_out_widths
 from gsl.errors import ConfigError, InputError
 from gsl.models.servo import ServoModel, neutral
 from gsl.models.servo_file import FILE
 from gsl.models.servo_members import ServoMembers
 from gsl.report.servo_curves import servo_curves
-from gsl.stages.diagnosis_settings import Tolerance
-from gsl.stages.logs import check_log, log_parents, on_ground, read_logs, read_motions
-from gsl.stages.population import Workers, threads
+from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.models import write_model
 from gsl.storage.workplace import destination
 from gsl.training.learn_servo import LearnedServo, document, learn_servo
+from gsl.training.servo_verdict import problems, remarks
 from gsl.training.servo_walks import Walks, walks
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.fits import fitting_step
 from gsl.worlds.velocity_motors import check_servos
 
 WORLD, CURVES = "world/learned.yaml", "servo.png"
-NEAR, FARTHEST = 1.0, 3.0  # noise floors: up to the first it is as good as the log can tell, beyond the second useless
 
 
 @component
@@ -125,47 +125,3 @@ class TrainServo:
         gap = f"held out, {learned.before['all']:.2f} noise floors became {learned.after['all']:.2f}"
         (folder / WORLD).parent.mkdir()
         (folder / WORLD).write_text(f"# The simulator with a learned servo: {gap}.\n{text}", encoding="utf-8")
-
-
-def problems(metrics: Mapping[str, Any]) -> list[str]:
-    """Return why nothing should be searched with a learned servo, if there is a reason.
-
-    Args:
-        metrics: Of its artifact.
-    """
-    after, before = metrics["floors_after"], metrics["floors_before"]
-    if after > FARTHEST:
-        return [f"held out, the learned servo is {after:.1f} noise floors from the log, more than {FARTHEST:g}"]
-    if after > before:
-        return [f"held out, the gap is {after:.2f} noise floors, {before:.2f} without"]
-    if after > NEAR and not metrics["learned"]:
-        return [f"nothing was learned: held out, the gap stays at {after:.1f} noise floors"]
-    return []
-
-
-def problems_of_members(metrics: Mapping[str, Any]) -> list[str]:
-    """Return why nothing should be searched with all members of a learned servo, if there is a reason.
-
-    Args:
-        metrics: Of its artifact.
-    """
-    most = min(FARTHEST, max(NEAR, metrics["floors_before"]))
-    return [
-        f"held out, member {k} is {floors:.1f} noise floors from the log, more than {most:.2g}"
-        for k, floors in enumerate(metrics["members"])
-        if k and floors > most
-    ]
-
-
-def remarks(metrics: Mapping[str, Any]) -> list[str]:
-    """Return what a user should know of a learned servo: how near it is, and which groups keep their old servo."""
-    after = metrics["floors_after"]
-    found = (
-        [] if after <= NEAR else [f"held out, the learned servo is {after:.1f} noise floors from the log, not within 1"]
-    )
-    if not metrics["whole_motions"]:
-        found.append("the log is one motion, of which parts are held out: the figures are optimistic")
-    for name, group in metrics["groups"].items():
-        if not group["learned"]:
-            found.append(f"{name} keep their servo: nothing that was learned brought held-out motions nearer")
-    return found

@@ -9,19 +9,17 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gsl.core.interfaces import REAL, Grounding, Policy, Task, World
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import rank_correlation
 from gsl.grounding.gat import ActionTransformation
-from gsl.grounding.grounding import Grounding
-from gsl.policies.policy import Policy, neighbour
-from gsl.stages.grounding_gate import grounding_parents, settled
-from gsl.stages.population import Job, Workers, episodes
-from gsl.stages.rollout import Scenario
+from gsl.policies.policy import neighbour
+from gsl.rollout.parallel import Job, Workers, episodes
+from gsl.rollout.rollout import Scenario
 from gsl.storage.artifact import Artifact
 from gsl.storage.documents import write_json
-from gsl.tasks.task import REAL, Task
-from gsl.worlds.world import World
+from gsl.validation.gate import grounding_parents, settled
 
 FILE = "values.json"
 

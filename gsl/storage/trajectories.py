@@ -13,6 +13,7 @@ from gsl.core.trajectory import Batch
 from gsl.errors import TrajectoryError
 from gsl.storage import documents
 from gsl.storage.parquet import check_declared
+from gsl.storage.references import resolve
 from gsl.storage.trajectory_columns import batch_of, columns_of, metadata_of
 from gsl.storage.trajectory_contract import BOOLEANS, INTEGERS, check_metadata, check_names, check_rows
 from gsl.storage.whole import replacing
@@ -20,7 +21,14 @@ from gsl.storage.whole import replacing
 if TYPE_CHECKING:
     import pyarrow as pa
 
+DATA = "trajectories.parquet"
 METADATA_KEY = b"gsl"
+
+
+def data_file(reference: str) -> Path:
+    """Return the trajectory file that a path, an artifact of `collect` or `import`, or a run's name stands for."""
+    found = resolve(reference, kind=("collect", "import"))
+    return found / DATA if found.is_dir() else found
 
 
 def write(path: Path, batch: Batch) -> None:

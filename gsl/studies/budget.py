@@ -10,28 +10,27 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from gsl.core.interfaces import REAL, SIM, Grounding
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
-from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.models.free_run import TICKS
 from gsl.report.budget_curve import Line, budget_curve
 from gsl.report.markdown import table
-from gsl.stages.grounding_gate import settled
-from gsl.stages.grounding_replay import replayed
+from gsl.rollout.rollout import Scenario
 from gsl.stages.iterate import Iterate, check_trainable
-from gsl.stages.rollout import Scenario
-from gsl.stages.training import FEWEST, degrees
 from gsl.studies.compare import Compare
 from gsl.studies.comparison_table import bounds, finely, told_difference
 from gsl.studies.effort import check_search, seconds
 from gsl.studies.held_out import MEASURED, check_first_iteration, check_robot, held_out, starts
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
-from gsl.tasks.task import REAL, SIM
+from gsl.training.data import FEWEST, degrees
+from gsl.validation.gate import settled
+from gsl.validation.replay import replayed
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
 NONE = "none"

@@ -14,11 +14,11 @@ from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval
 from gsl.core.table import Table
 from gsl.core.table_episodes import played
+from gsl.core.words import several
 from gsl.grounding.states import TableTransformation
 from gsl.models.counts import Counts
 from gsl.report.markdown import table as markdown
 from gsl.report.noise_curve import Curve, noise_curve
-from gsl.stages.headline import several
 from gsl.storage.documents import write_json
 from gsl.studies.sizes import PresetName, check_rising, sizes_of
 from gsl.worlds.gymnasium import GymnasiumWorld

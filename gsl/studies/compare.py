@@ -8,16 +8,16 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from gsl.core.interfaces import REAL, SIM, Grounding, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
+from gsl.core.unit import Unit
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
 from gsl.grounding.gat import ActionTransformation
-from gsl.grounding.grounding import Grounding
 from gsl.stages.chain import Chain
 from gsl.stages.diagnosis_plan import flown
-from gsl.stages.headline import Unit
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
@@ -27,10 +27,8 @@ from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl.studies.trial import Cell, Trial
 from gsl.studies.tried import foretelling, read_tried
-from gsl.tasks.task import REAL, SIM
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.gymnasium import try_out
-from gsl.worlds.world import World
 
 TABLE, DATA = "table.md", "trials.json"
 

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
 
 from gsl.core.statistics import Interval
-from gsl.report.markdown import in_unit, table
-from gsl.stages.headline import Unit
+from gsl.core.unit import Unit
+from gsl.core.words import in_unit
+from gsl.report.markdown import table
 from gsl.studies.comparison import Summary, differences
 from gsl.studies.trial import Cell, Trial
 

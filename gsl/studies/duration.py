@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gsl.stages.headline import several
+from gsl.core.words import several
 
 
 def duration_told(duration: float) -> str:

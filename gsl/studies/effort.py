@@ -6,19 +6,16 @@ import time
 from itertools import chain
 from typing import TYPE_CHECKING
 
+from gsl.core.interfaces import REAL, SIM, Grounding, Search, World
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, innermost, learned
 from gsl.grounding.gat import ActionTransformation
-from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.servo import LearnedServo
-from gsl.optimizers.cma_es import CmaEs
+from gsl.rollout.parallel import threads
+from gsl.rollout.rollout import Scenario, rollout
 from gsl.stages.iterate import Iterate
-from gsl.stages.population import threads
-from gsl.stages.rollout import Scenario, rollout
 from gsl.stages.values import Values
-from gsl.tasks.task import REAL, SIM
-from gsl.worlds.world import World
 
 if TYPE_CHECKING:
     from gsl.studies.compare import Compare
@@ -42,7 +39,7 @@ def check_search(iterate: Iterate, where: str) -> None:
     Raises:
         ConfigError: It is another.
     """
-    if not isinstance(iterate.optimizer, CmaEs):
+    if not isinstance(iterate.optimizer, Search):
         raise ConfigError(f"{where}.optimizer", "studies of robots search: take cma_es")
 
 
@@ -54,7 +51,7 @@ def seconds(study: Compare, *, search: bool = True) -> float:
     iterate, budget = study.iterate, study.iterate.budget
     searched = measured = 0
     if search:
-        assert isinstance(iterate.optimizer, CmaEs), "check_search() has refused others"
+        assert isinstance(iterate.optimizer, Search), "check_search() has refused others"
         searched = iterate.optimizer.generations * iterate.optimizer.candidates * budget.rollouts
         measured = (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
     workers = threads(iterate.workers)

@@ -5,20 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from gsl.core.interfaces import REAL, World
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError, GslError
 from gsl.models.free_run import TICKS
 from gsl.stages.chain import Chain
 from gsl.stages.collect import FILE, Collect
-from gsl.stages.grounding_check import REPLAYS
-from gsl.stages.grounding_replay import PAST, Place, places
 from gsl.stages.iterate import Iterate
 from gsl.stages.link import built
-from gsl.stages.training import of_policy
 from gsl.storage.trajectories import read
-from gsl.tasks.task import REAL
-from gsl.worlds.world import World
+from gsl.training.data import of_policy
+from gsl.validation.check import REPLAYS
+from gsl.validation.replay import PAST, Place, places
 
 HELD_OUT = 12  # trajectories of neighbours, on which errors are measured
 MEASURED = f"Joints are measured on at most {HELD_OUT} further real trajectories off π0, the same for all of a trial."

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from gsl.core.interfaces import Grounding
 from gsl.grounding.effects import DiagnosedEffects, innermost
 from gsl.grounding.gat import ActionTransformation
-from gsl.grounding.grounding import Grounding
 from gsl.grounding.servo import LearnedServo
 from gsl.report.style import EFFECTS, GAT, SERVO, SGAT, UNINFORMED
 

@@ -11,32 +11,29 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from gsl.console import Console
+from gsl.core.interfaces import REAL, SIM, Grounding, Search, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
+from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
 from gsl.grounding.effects import learned
 from gsl.grounding.gat import ActionTransformation
-from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
-from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.policy import sized
+from gsl.report.console import Console
 from gsl.report.noise_bars import Bars, noise_bars
+from gsl.rollout.parallel import Workers, arriving
 from gsl.stages.chain import Chain
-from gsl.stages.evaluate import TABLE as EVALUATION
-from gsl.stages.headline import several
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.optimize import BEST
-from gsl.stages.population import Workers, arriving
+from gsl.storage.policy_choice import EVALUATION
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl.studies.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
-from gsl.tasks.task import REAL, SIM
 from gsl.worlds.gymnasium import GymnasiumWorld, try_out
-from gsl.worlds.world import World
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "figure.png"
 
@@ -61,7 +58,7 @@ class NoiseStudy:
         setting("standard deviations of the real worlds' noise", min_length=1),
     ]
     methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name", min_length=1)]
-    further: Annotated[CmaEs | Trpo, setting("how it goes on from π0")]
+    further: Annotated[Search | Trpo, setting("how it goes on from π0")]
     trials: Annotated[int, setting("trials of each method", ge=1)]
     sims: Annotated[Mapping[str, GymnasiumWorld], setting("simulators of worlds that have one of their own")] = field(
         default_factory=dict

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
+from gsl.core.interfaces import Task
 from gsl.core.statistics import Interval
+from gsl.core.unit import Unit
 from gsl.report.markdown import table
-from gsl.stages.headline import Unit
 from gsl.studies.comparison import Summary, summaries
 from gsl.studies.comparison_table import bounds, places, starred
 from gsl.studies.trial import Trial
-from gsl.tasks.task import Task
 
 
 class Drawn(NamedTuple):

@@ -7,13 +7,13 @@ from typing import Annotated
 
 import numpy as np
 
+from gsl.core.interfaces import Task
 from gsl.core.setting import component, setting
 from gsl.report.markdown import table
 from gsl.studies.comparison import Summary, differences, orders, summaries
 from gsl.studies.comparison_table import places, told_difference
 from gsl.studies.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, worth
 from gsl.studies.trial import Cell, Trial
-from gsl.tasks.task import Task
 
 TABLE_2 = {"none": ("11.1", "7 of 10", "1.3"), "ane": ("18.9", "5 of 10", "6.6"), "gat": ("22.5", "1 of 10", "2.7")}
 LEAST = 0.001  # probability that is told

@@ -12,6 +12,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from gsl.core.interfaces import Task
 from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval, wilson
 from gsl.report.markdown import table
@@ -20,7 +21,6 @@ from gsl.studies.comparison_table import bounds, places, told_difference
 from gsl.studies.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, value_cells, worth
 from gsl.studies.trial import Trial
 from gsl.tasks.arm import Arm
-from gsl.tasks.task import Task
 
 TABLE_3 = {1: ("26.3 and 26.9", "34.6 and 37.8"), 2: ("28.0", "43.3")}  # cm/s, %; SimSpark and Gazebo as simulators
 TABLE_4 = {("gat", 1): ("15.7 ± 3.0", "6 of 10"), ("sgat", 1): ("16.9 ± 0.7", "0 of 10"),

@@ -8,23 +8,18 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from gsl.core.interfaces import REAL, SIM, Grounding, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, innermost
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
-from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.servo import LearnedServo
 from gsl.models.free_run import TICKS
-from gsl.stages.compliance import joint_groups
-from gsl.stages.grounding_check import asked
-from gsl.stages.grounding_gate import Gate
-from gsl.stages.grounding_replay import replayed
+from gsl.rollout.rollout import Scenario
 from gsl.stages.iterate import Iterate, check_trainable
-from gsl.stages.rollout import Scenario
-from gsl.stages.training import degrees, of_policy
 from gsl.studies.compare import Compare
 from gsl.studies.effort import seconds
 from gsl.studies.gain_predictors import TRIALS, predictors, searched
@@ -35,9 +30,12 @@ from gsl.studies.replay import Replay
 from gsl.studies.replays_table import FIGURE, TABLE, Shown
 from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl.studies.yielding import Loads
-from gsl.tasks.task import REAL, SIM
+from gsl.training.data import degrees, of_policy
+from gsl.validation.check import asked
+from gsl.validation.compliance import joint_groups
+from gsl.validation.gate import Gate
+from gsl.validation.replay import replayed
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.world import World
 
 DATA = "replays.json"
 

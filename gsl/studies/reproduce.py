@@ -7,9 +7,9 @@ from dataclasses import field, fields
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 
+from gsl.core.interfaces import Search, Task
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.optimizers.cma_es import CmaEs
 from gsl.report.trial_dots import Dots, trial_dots
 from gsl.studies.compare import TABLE, Compare
 from gsl.studies.comparison import summaries
@@ -19,7 +19,6 @@ from gsl.studies.paper_cells import Drawn, one_by_one
 from gsl.studies.sizes import sizes_of, trials_of
 from gsl.studies.trial import Trial
 from gsl.studies.tried import foretelling
-from gsl.tasks.task import Task
 
 FIGURE, TRIALS = "trials.png", "trials.md"
 
@@ -77,7 +76,7 @@ def _named(table: PaperTable) -> set[str]:
 def _sizes(study: Compare) -> str:
     """Return the sizes behind a table."""
     budget, optimizer = study.iterate.budget, study.iterate.optimizer
-    assert isinstance(optimizer, CmaEs), "check_search() has refused others"
+    assert isinstance(optimizer, Search), "check_search() has refused others"
     searched = (
         f"{optimizer.generations} generations of {optimizer.candidates} candidates, {budget.rollouts} rollouts each"
     )

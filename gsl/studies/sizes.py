@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Annotated
 
 from gsl.core.setting import setting
+from gsl.core.words import several
 from gsl.errors import ConfigError
-from gsl.stages.headline import several
 
 PresetName = Annotated[str, setting("preset that the sizes come from, as the table tells it; empty of none")]
 

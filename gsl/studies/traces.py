@@ -11,28 +11,26 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from gsl.core.history import windows
+from gsl.core.interfaces import REAL, Grounding, World
 from gsl.core.observation import observations, sensed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation, check_known
-from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
 from gsl.models.ensemble import Forward
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.markdown import table
-from gsl.stages.grounding_replay import PAST, Place, replay
+from gsl.rollout.rollout import Scenario, rollout
 from gsl.stages.iterate import Iterate, check_trainable
-from gsl.stages.needed_model import extra_ticks
-from gsl.stages.rollout import Scenario, rollout
-from gsl.stages.training import degrees
 from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.studies.duration import duration_told
 from gsl.studies.effort import seconds_of_models
 from gsl.studies.sizes import PresetName, sizes_of
-from gsl.tasks.task import REAL
+from gsl.training.data import degrees
+from gsl.validation.model_requirements import extra_ticks
+from gsl.validation.replay import PAST, Place, replay
 from gsl.worlds.grounded import GroundedEnv
-from gsl.worlds.world import World
 
 TABLE = "table.md"
 TITLES = ("joint", "simulator", "RMS distance from real [°]")

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from gsl.stages.headline import Unit, telling
+from gsl.core.unit import Unit, telling
 
 
 class Cell(NamedTuple):

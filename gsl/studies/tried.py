@@ -9,8 +9,8 @@ from typing import Any
 
 from gsl.core.statistics import concordance, mean_interval
 from gsl.report.markdown import table
-from gsl.stages.evaluate import TABLE
 from gsl.storage.artifact import Artifact
+from gsl.storage.policy_choice import EVALUATION
 from gsl.studies.trial import Cell, Trial, Tried
 
 DIGITS = 6  # of a value that is kept
@@ -30,7 +30,7 @@ def read_tried(found: Mapping[str, Any], measured: Artifact) -> list[Tried]:
         measured: Evaluation of its policies.
     """
     drift = found.get("drift", {})
-    rows = json.loads((measured.folder / TABLE).read_text(encoding="utf-8"))["policies"]
+    rows = json.loads((measured.folder / EVALUATION).read_text(encoding="utf-8"))["policies"]
     return [
         Tried(
             row["generation"] or 0,

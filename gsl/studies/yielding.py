@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from gsl.core.impedance import closed
+from gsl.core.interfaces import Grounding, World
 from gsl.core.seeds import derived_seed
-from gsl.grounding.grounding import Grounding
 from gsl.grounding.none import NoGrounding
-from gsl.stages.compliance import Compliance, measure
-from gsl.stages.compliance_report import RESOLUTION, SECTION, transferred
+from gsl.validation.compliance import Compliance, measure
+from gsl.validation.compliance_transfer import RESOLUTION, SECTION, transferred
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.world import World
 
 
 class Yielding(NamedTuple):

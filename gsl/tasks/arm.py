@@ -8,10 +8,10 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from gsl.core.interfaces import Step
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
-from gsl.tasks.task import Step
 
 JOINTS = ("LShoulderPitch", "RShoulderPitch")
 HANGING = 0.5 * math.pi  # shoulder pitch of an arm that hangs down [rad]

@@ -7,10 +7,10 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from gsl.core.interfaces import Step
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
-from gsl.tasks.task import Step
 
 
 @component

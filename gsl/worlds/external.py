@@ -12,13 +12,13 @@ import gymnasium
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.interfaces import World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.policies.limits import SPEED_SHARE, WINDOW, limits, narrowest
 from gsl.robots.catalogue import read_files, robot
 from gsl.worlds.fits import check_base
-from gsl.worlds.world import World
 
 _SIZES = {"gyro": 3, "base.position": 3, "base.orientation": 4, "base.velocity": 3}
 Sensor = Literal["gyro", "foot_force", "base.position", "base.orientation", "base.velocity"]

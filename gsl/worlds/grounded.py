@@ -7,9 +7,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from gsl.core.interfaces import Grounding
 from gsl.core.layout import Layout
 from gsl.core.seeds import grounding_generator
-from gsl.grounding.grounding import Grounding
 
 
 class GroundedEnv(gymnasium.Wrapper):

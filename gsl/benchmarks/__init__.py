@@ -1,0 +1,1 @@
+"""What gsl costs, and what a coarser engine changes."""

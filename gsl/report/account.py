@@ -1,0 +1,267 @@
+"""The account of an artifact: its results as tables for a person, read from its files."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from gsl.core.unit import Unit
+from gsl.core.words import in_unit, several
+from gsl.models.free_run import TICKS
+from gsl.report.diagnosis_text import summary_lines
+from gsl.report.evaluation_cells import cells, columns
+from gsl.report.headline import unit_of
+from gsl.storage.artifact import Artifact
+from gsl.storage.diagnosis_report import report_of
+
+
+class Told(NamedTuple):
+    """A table with its title and what is said below it."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    caption: str | None = None
+
+
+def account(artifact: Artifact) -> list[Told]:
+    """Return the results of an artifact; of an unknown kind or of another version's, its metrics by name."""
+    tell = _TELLERS.get(artifact.manifest.kind)
+    try:
+        told = tell(artifact.folder, artifact.metrics, unit_of(artifact)) if tell else _plain(artifact)
+        return [told] if isinstance(told, Told) else told
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return [_plain(artifact)]
+
+
+def _collect(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    row = {"episodes": metrics["episodes"], "steps": f"{metrics['steps']:,}"}
+    if unit.falls:
+        row["falls"] = metrics["falls"]
+    if metrics["value"] is not None:
+        value = f"value of π0{' with noise' * bool(metrics.get('action_noise'))}"
+        row[in_unit(value, unit.name)] = unit.bare(metrics["value"])
+    return Told("trajectories", tuple(row), [tuple(map(str, row.values()))])
+
+
+def _import(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    row = {
+        "episodes": metrics["episodes"],
+        "files": metrics["files"],
+        "joints": len(metrics["joints"]),
+        "seconds": f"{metrics['seconds']:.1f}",
+        "control period [s]": f"{metrics['control_period']:g}",
+    }
+    caption = "; ".join([metrics["time"], f"velocities {metrics['velocity']}", *metrics["warnings"]])
+    return Told("imported trajectories", tuple(row), [tuple(map(str, row.values()))], caption)
+
+
+def _of_states(metrics: Mapping[str, Any], what: str) -> Told | None:
+    """Return how a model of states does on held-out steps; none for one of joints."""
+    found = metrics["heldout"]
+    if "space" not in metrics or not {"r2", "action_r2"} & found.keys():
+        return None
+    each = [(f"state.{name}", value) for name, value in found.get("r2_by_variable", {}).items()]
+    rows = [*each, ("all", found["r2"])] if "r2" in found else [("actions", found["action_r2"])]
+    shown = [(name, f"{100.0 * value:.1f} %") for name, value in rows]
+    return Told(f"{what} ({metrics['family']}) on held-out trajectories", ("of", "variance explained"), shown)
+
+
+def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    if told := _of_states(metrics, "forward model"):
+        return told
+    names = {
+        "one_step_deg": "one tick [°]",
+        "one_step_no_change_deg": "no change, one tick [°]",
+        "r2": "R²",
+        "free_run_deg": f"{TICKS} ticks [°]",
+        "free_run_no_change_deg": f"no change, {TICKS} ticks [°]",
+    }
+    rows = [
+        (
+            {"pi0": "of π0", "off_pi0": "off π0"}[group],
+            str(measured["trajectories"]),
+            *(_number(measured.get(name)) for name in names),
+            _worst(measured.get("free_run_by_joint_deg") or measured["one_step_by_joint_deg"]),
+        )
+        for group, measured in metrics["heldout"].items()
+    ]
+    title = f"forward model ({metrics['family']}) on held-out real trajectories"
+    return Told(title, ("policy", "trajectories", *names.values(), "worst joint"), rows)
+
+
+def _train_inverse(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    if told := _of_states(metrics, "inverse model"):
+        return told
+    measured = metrics["heldout"]
+    title = f"inverse model ({metrics['method']}, {metrics['family']}) on held-out simulated trajectories"
+    row = (_number(measured["recovered_action_deg"]), _worst(measured["recovered_action_by_joint_deg"]))
+    return Told(title, ("action error [°]", "worst joint"), [row])
+
+
+def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    groups = {"all": metrics, **metrics["groups"]}
+    rows = [
+        (name, f"{one['floors_before']:.2f}", f"{one['floors_after']:.2f}", "yes" if one["learned"] else "no")
+        for name, one in groups.items()
+    ]
+    titles = ("joints", "simulator", "with the learned servo", "learned")
+    below = f"what it has learned: {folder.as_posix()}/servo.png"
+    return Told("distance from held-out motions [noise floors]", titles, rows, below)
+
+
+def _optimize(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    document = json.loads((folder / "policies.json").read_text(encoding="utf-8"))
+    rows = [
+        (str(one["generation"]), str(one["name"]), unit.bare(one["value_sim"]))
+        for one in document["policies"]
+        if one["generation"]
+    ]
+    titles = ("generation", "policy", in_unit("in simulation", unit.name))
+    problems = _problems(folder)
+    return Told("best of each generation", titles, rows, f"the grounding: {problems}" if problems else None)
+
+
+def _problems(folder: Path) -> str:
+    report = folder / "grounding.json"
+    return "; ".join(json.loads(report.read_text(encoding="utf-8"))["problems"]) if report.is_file() else ""
+
+
+def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    document = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
+    phases = {"policies": "", "check": ", checked", "confirmation": ", fresh"}
+    found = [(one, f"{one['name']}{purpose}") for phase, purpose in phases.items() for one in document[phase]]
+    told = list(dict.fromkeys(name for one, _ in found for name in one["outcome"]))
+    rows = [tuple(cells(one | {"interval": _bounds(one["interval"])}, name, unit, told)) for one, name in found]
+    return Told("policies in the real world", tuple(columns(told, unit)), rows, returned(metrics, unit))
+
+
+def _bounds(interval: list[float | None]) -> list[float]:
+    return [math.inf if bound is None else bound for bound in interval]
+
+
+def returned(metrics: Mapping[str, Any], unit: Unit) -> str:
+    """Return in a line what an evaluation chose, what that is worth beside π0, and what it cost."""
+    spent = f"{metrics['real_episodes']} real episodes"
+    if not metrics["best_generation"]:
+        faster = "stable policy was faster" if unit.falls else "policy was better"
+        better = "faster policy passed its check" if metrics["failed_check"] else faster
+        return f"no {better}: {metrics['best']} is returned; {spent}"
+    gain, after, before = metrics["gain"], metrics["returned"], metrics["baseline"]
+    bounds = unit.interval(gain["interval"], sign=True)
+    values = f"{unit.shown(after['value'])}, {unit.ended(after)}; π0 {unit.shown(before['value'])}"
+    told = f"on fresh episodes {values}; gain {unit.shown(gain['value'], sign=True)}, 95 % interval {bounds}"
+    doubt = "" if gain["interval"][0] > 0.0 else ", not surely a gain" if gain["value"] > 0.0 else ": worse than π0"
+    return f"{metrics['best']} is returned: {told}{doubt}; {spent}"
+
+
+def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    titles, rows = _markdown(folder / "table.md")
+    spent, learned, flight = metrics["real_episodes"], metrics["learned_from"], metrics.get("excitation")
+    why = "to diagnose" if metrics.get("diagnosis") else "to learn the servo from"
+    air = f"{flight['episodes']} motions in the air ({flight['real_seconds']:.0f} s) {why}, " if flight else ""
+    measured = spent - learned - (flight["episodes"] if flight else 0)
+    beside = metrics.get("ungrounded")
+    more = f"; {beside['real_episodes']} more to measure the search without grounding" if beside else ""
+    plots = ", ".join(sorted(path.name for path in folder.glob("*.png")))
+    below = [
+        *(metrics[key]["told"] for key in ("diagnosis", "servo") if metrics.get(key)),
+        metrics["verdict"],
+        *(f"warning: {line}" for line in metrics.get("broken_promises", [])),
+        f"real data: {air}{learned} episodes to learn from, {measured} to measure, {spent} in all{more}",
+        f"plots: {folder.as_posix()}/ ({plots})",
+    ]
+    return Told(in_unit("grounded simulation learning", unit.name), titles, rows, "\n".join(below))
+
+
+def _compare(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    below = f"differences and every trial: {folder.as_posix()}/table.md"
+    trials = several(metrics["summaries"][0]["trials"], "trial")
+    return Told(f"{trials} of each method", *_markdown(folder / "table.md"), below)
+
+
+def _reproduce(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    if "trials" not in metrics:  # figures alone
+        figures = ", ".join(sorted(path.name for path in folder.glob("*.png")))
+        return Told("what came out", *_markdown(folder / "table.md"), f"figures: {folder.as_posix()}/ ({figures})")
+    below = f"every trial: {folder.as_posix()}/trials.json, tables: {folder.as_posix()}/table.md"
+    return Told(
+        f"ours, and the paper's ({several(metrics['trials'], 'trial')})", *_markdown(folder / "table.md"), below
+    )
+
+
+def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    return Told(in_unit("worlds", unit.name), *_markdown(folder / "table.md"))
+
+
+def _blind_reveal(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    met = f"{metrics['met']} of {metrics['judged']} thresholds are met"
+    below = f"{met}; every wrong answer, by truth and strength: {folder.as_posix()}/results.md"
+    return Told(f"blind benchmark, {metrics['cases']} cases", *_markdown(folder / "results.md"), below)
+
+
+def _markdown(path: Path) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return the titles and rows of the first table of a file."""
+    below_title = itertools.dropwhile(lambda line: line[:1] != "|", path.read_text(encoding="utf-8").splitlines())
+    lines = itertools.takewhile(lambda line: line.startswith("|"), below_title)
+    titles, _, *rows = (tuple(cell.strip() for cell in line[1:-1].split("|")) for line in lines)
+    return titles, rows
+
+
+def _plain(artifact: Artifact) -> Told:
+    return Told("metrics", ("metric", "value"), list(flat(artifact.metrics)))
+
+
+def flat(values: Any, path: str = "") -> Iterator[tuple[str, str]]:
+    """Yield one row a value, with its dotted name."""
+    if isinstance(values, dict) and values:
+        for key, value in values.items():
+            yield from flat(value, f"{path}.{key}".lstrip("."))
+    else:
+        yield path, plain(values)
+
+
+def plain(value: Any) -> str:
+    """Return a value as a person writes it."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(plain, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key}: {plain(entry)}' for key, entry in value.items())}}}"
+    if isinstance(value, bool) or value is None:
+        return {True: "true", False: "false", None: "none"}[value]
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
+
+
+def _worst(by_joint: Mapping[str, float]) -> str:
+    joint = max(by_joint, key=lambda name: by_joint[name])
+    return f"{joint} {by_joint[joint]:.2f}°"
+
+
+def _diagnose(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> list[Told]:
+    parts = summary_lines(report_of(folder))
+    return [Told(part[0], tuple(part[1]), [tuple(row) for row in part[2]], part[3]) for part in parts]
+
+
+_TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told | list[Told]]] = {
+    "collect": _collect,
+    "import": _import,
+    "diagnose": _diagnose,
+    "train_forward": _train_forward,
+    "train_inverse": _train_inverse,
+    "train_servo": _train_servo,
+    "optimize": _optimize,
+    "evaluate": _evaluate,
+    "iterate": _iterate,
+    "compare": _compare,
+    "reproduce": _reproduce,
+    "survey": _survey,
+    "blind_reveal": _blind_reveal,
+}

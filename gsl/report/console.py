@@ -1,0 +1,179 @@
+"""The console is the only place that prints: people read progress on stderr, results go to stdout."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+from gsl.core.interruption import checkpoint
+from gsl.report.tables import LineTable, RichLiveTable, drawn, fitting, total
+
+if TYPE_CHECKING:
+    import rich.console
+
+_log = logging.getLogger("gsl")
+
+SECONDS_BETWEEN_LINES = 10.0
+WIDTH_WITHOUT_TERMINAL = 200
+
+
+class Progress(Protocol):
+    """What a long loop tells how far it is."""
+
+    def advance(self, steps: int = 1) -> None:
+        """Say that `steps` more are done."""
+
+
+class LiveTable(Protocol):
+    """A table that grows while a person watches."""
+
+    def row(self, *cells: object) -> None:
+        """Add a row."""
+
+
+class Console:
+    """Prints for a person, or exactly one JSON document on stdout."""
+
+    def __init__(self, *, json: bool = False) -> None:
+        self.json = json
+        self._live: RichLiveTable | None = None
+        self._lines: LineTable | None = None
+        self._part = ""
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Within, tables belong to a part of the work that has this name: progress, not results."""
+        before, self._part = self._part, name
+        try:
+            yield
+        finally:
+            self._part = before
+
+    def status(self, text: str) -> None:
+        """Say what is going on, on stderr."""
+        checkpoint()
+        _log.info("%s", text)
+        if self._lines is not None:
+            self._lines.interrupted = True
+        self._stderr.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def table(
+        self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
+    ) -> None:
+        """Print a table of results on stdout, of a `part` on stderr; with JSON it is left to `result`."""
+        title = self._titled(title)
+        _log.info("%s", "\n".join([title, *("\t".join(map(str, row)) for row in [columns, *rows]), caption or ""]))
+        if self.json:
+            return
+        above_live_table = self._live is not None and self._stdout.is_terminal
+        place = self._stderr if above_live_table or self._part else self._stdout
+        place.print(title, style="bold", markup=False, highlight=False, soft_wrap=True)
+        widths = fitting(columns, rows, place.width, leave_out=place.is_terminal)
+        if not place.is_terminal:
+            place.width = max(WIDTH_WITHOUT_TERMINAL, total(widths))
+        place.print(drawn(columns, rows, widths))
+        left = columns[len(widths) :]
+        more = f"{len(left)} more in a wider window: {', '.join(left)}" if left else ""
+        if below := "\n".join(filter(None, [more, caption])):
+            place.print(below + "\n", markup=False, highlight=False, soft_wrap=True)
+
+    def result(self, document: Mapping[str, Any], *, text: str = "") -> None:
+        """Print the outcome: the document as JSON, or `text` for a person."""
+        if self.json:
+            from gsl.storage.documents import text as strict_json
+
+            sys.stdout.write(strict_json(document, indent=2) + "\n")
+        elif text:
+            sys.stdout.write(text.rstrip("\n") + "\n")
+        sys.stdout.flush()
+
+    def error(self, message: str, exit_code: int, *, command: str = "gsl") -> int:
+        """Say in one line why the command ends, and return the exit code."""
+        _log.info("%s", message)
+        if self.json:
+            self.result({"error": message, "exit_code": exit_code})
+        else:
+            sys.stdout.flush()
+            sys.stderr.write(f"{command}: {message}\n")
+        return exit_code
+
+    @contextmanager
+    def progress(self, total: int, description: str) -> Iterator[Progress]:
+        """Show how far a loop of `total` steps is: a bar on a terminal, else a line every ten seconds."""
+        if self._live is not None:
+            yield _Lines(total, description, self._live.caption, seconds=0.5)
+        elif not self._stderr.is_terminal:
+            yield _Lines(total, description, self.status, seconds=SECONDS_BETWEEN_LINES)
+        else:
+            from rich.progress import Progress as Bars
+            from rich.progress import TimeElapsedColumn
+
+            with Bars(*Bars.get_default_columns(), TimeElapsedColumn(), console=self._stderr, transient=True) as bars:
+                task = bars.add_task(description, total=total)
+                yield _Bar(lambda steps: bars.advance(task, steps))
+
+    @contextmanager
+    def live_table(self, title: str, columns: Sequence[str]) -> Iterator[LiveTable]:
+        """Show a growing table on a terminal, else each row as a line; the final table is for `table`."""
+        title = self._titled(title)
+        if not self._stderr.is_terminal or self._live is not None:
+            self._lines = LineTable(title, columns, self.status)
+            try:
+                yield self._lines
+            finally:
+                self._lines = None
+            return
+        from rich.live import Live
+
+        with Live(console=self._stderr, transient=True) as live:
+            self._live = RichLiveTable(title, columns, live)
+            try:
+                yield self._live
+            finally:
+                self._live = None
+
+    def _titled(self, title: str) -> str:
+        return f"{self._part}: {title}" if self._part else title
+
+    @cached_property
+    def _stdout(self) -> rich.console.Console:
+        return _rich_console(sys.stdout.isatty(), stderr=False)
+
+    @cached_property
+    def _stderr(self) -> rich.console.Console:
+        return _rich_console(sys.stderr.isatty(), stderr=True)
+
+
+class _Bar:
+    def __init__(self, draw: Callable[[int], None]) -> None:
+        self.draw = draw
+
+    def advance(self, steps: int = 1) -> None:
+        checkpoint()
+        self.draw(steps)
+
+
+class _Lines:
+    """Progress as lines of text, not more often than every so many seconds."""
+
+    def __init__(self, total: int, description: str, say: Callable[[str], None], *, seconds: float) -> None:
+        self.total, self.description, self.say, self.seconds = total, description, say, seconds
+        self.done, self.said = 0, time.monotonic()
+
+    def advance(self, steps: int = 1) -> None:
+        checkpoint()
+        self.done += steps
+        if time.monotonic() - self.said >= self.seconds:
+            self.said = time.monotonic()
+            self.say(f"{self.description}: {self.done} of {self.total}")
+
+
+def _rich_console(is_terminal: bool, *, stderr: bool) -> rich.console.Console:
+    from rich.console import Console as RichConsole
+
+    return RichConsole(stderr=stderr, width=None if is_terminal else WIDTH_WITHOUT_TERMINAL)

@@ -1,0 +1,153 @@
+"""The headline of an artifact: what came out of a stage, in a few words with units."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from gsl.core.unit import Unit, gained
+from gsl.core.words import falls, several
+from gsl.grounding.effects import named
+from gsl.storage.artifact import Artifact
+
+Metrics = Mapping[str, Any]
+
+
+def unit_of(artifact: Artifact) -> Unit:
+    """Return the unit of the task that an artifact's settings name; the bare value if the task is not gsl's."""
+    config = artifact.config
+    task = config.get("task") or config.get("iterate", {}).get("task") or {}
+    name = task.get("_target_", "") if isinstance(task, Mapping) else ""
+    if not str(name).startswith("gsl.tasks."):
+        return Unit()
+    try:
+        module, _, attribute = str(name).rpartition(".")
+        kind = getattr(importlib.import_module(module), attribute)
+        return Unit.of(kind)
+    except (ImportError, ValueError, AttributeError):
+        return Unit()
+
+
+def headline(artifact: Artifact) -> str:
+    """Return what came out, nothing for an artifact of an unknown kind or of another version's metrics."""
+    tell = _TELLERS.get(artifact.manifest.kind)
+    try:
+        return tell(artifact.metrics, unit_of(artifact)) if tell else ""
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
+
+
+def _collect(metrics: Metrics, unit: Unit) -> str:
+    told = several(metrics["episodes"], "episode") + (f", {falls(metrics['falls'])}" if unit.falls else "")
+    if metrics["value"] is None:
+        return told
+    return f"{told}, π0 {'with noise ' * bool(metrics.get('action_noise'))}{unit.shown(metrics['value'])}"
+
+
+def _import(metrics: Metrics, unit: Unit) -> str:
+    return f"{several(metrics['episodes'], 'episode')}, {metrics['seconds']:.0f} s, {metrics['time']}"
+
+
+def _diagnose(metrics: Metrics, unit: Unit) -> str:
+    causes, verdict = ", ".join(metrics["causes"]), metrics["verdict"].replace("_", " ")
+    share = metrics["fraction"]
+    gone = "" if share is None else f"; {100 * share:.0f} % of the held-out gap is gone"
+    return f"{verdict}: {causes}{gone}" if causes else f"{verdict}{gone}"
+
+
+def _identify(metrics: Metrics, unit: Unit) -> str:
+    return f"{metrics['effects']} effects; {metrics['before']:.1f} noise floors became {metrics['after']:.1f}"
+
+
+def _train_forward(metrics: Metrics, unit: Unit) -> str:
+    if metrics.get("space"):
+        return _of_states(metrics)
+    names = {"pi0": "of π0", "off_pi0": "off π0"}
+    errors = {
+        names[group]: measured.get("free_run_deg", measured["one_step_deg"])
+        for group, measured in metrics["heldout"].items()
+    }
+    return f"{metrics['family']}, held out: " + ", ".join(f"{error:.2f}° {group}" for group, error in errors.items())
+
+
+def _of_states(metrics: Metrics) -> str:
+    if metrics["space"] == "counts":
+        return f"{metrics['steps']:,} steps counted, {100 * metrics['visited']:.0f} % of all states and actions visited"
+    found = metrics["heldout"]
+    shown = {"r2": "of the variance", "action_r2": "of the variance", "recovered_choices": "of the choices"}
+    told = next(f"{100 * found[name]:.1f} % {what}" for name, what in shown.items() if name in found)
+    return f"{metrics['family']}, held out: {told}"
+
+
+def _train_servo(metrics: Metrics, unit: Unit) -> str:
+    return f"held out, {metrics['floors_before']:.1f} noise floors became {metrics['floors_after']:.2f}"
+
+
+def _train_inverse(metrics: Metrics, unit: Unit) -> str:
+    if metrics.get("space"):
+        return _of_states(metrics)
+    return f"{metrics['family']}, held out: {metrics['heldout']['recovered_action_deg']:.2f}° of action"
+
+
+def _optimize(metrics: Metrics, unit: Unit) -> str:
+    best = unit.shown(metrics["best_value_sim"])
+    told = f"{several(metrics['generations'], 'generation')}, best {best} in simulation"
+    if "effects" in metrics:
+        told += f"; {named(metrics['effects'])} switched on" if metrics["effects"] else "; joints calibrated"
+    alpha, passed = metrics.get("alpha"), metrics.get("grounding_acceptable", True)
+    if alpha is None and passed:
+        return told
+    far = "" if alpha is None else f" (alpha {alpha:g})"
+    verdict = "passed" if metrics.get("grounding_compared", True) else "passed, by the falls of π0 alone"
+    return f"{told}; grounding{far} {verdict if passed else 'failed its check'}"
+
+
+def _evaluate(metrics: Metrics, unit: Unit) -> str:
+    after, gain = metrics["returned"], metrics["gain"]
+    told = f"{metrics['best']} {unit.shown(after['value'])}, {unit.ended(after)}"
+    share = gained(gain["share"]) if gain["share"] else ""
+    return f"{told}; {share} over the start" if share else told
+
+
+def _iterate(metrics: Metrics, unit: Unit) -> str:
+    before, after = metrics["baseline"], metrics["returned"]
+    told = f"π0 {unit.shown(before['value'])} -> {unit.shown(after['value'])}"
+    return f"{told}, {unit.ended(after)}; {metrics['real_episodes']} real episodes"
+
+
+def _compare(metrics: Metrics, unit: Unit) -> str:
+    methods = dict.fromkeys(one["method"] for one in metrics["summaries"])
+    return f"{several(metrics['trials'], 'trial')} of {', '.join(methods)}"
+
+
+def _values(metrics: Metrics, unit: Unit) -> str:
+    return f"{metrics['policies']} policies, {falls(metrics['falls'])}"
+
+
+def _survey(metrics: Metrics, unit: Unit) -> str:
+    return ", ".join(f"{name}: π0 {unit.shown(one['pi0'])}, rank {one['rank']:.2f}" for name, one in metrics.items())
+
+
+def _answer(metrics: Metrics, unit: Unit) -> str:
+    return f"{metrics['episodes']} of {metrics['asked']} episodes, {falls(metrics['falls'])}"
+
+
+_TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
+    "collect": _collect,
+    "import": _import,
+    "diagnose": _diagnose,
+    "identify": _identify,
+    "train_forward": _train_forward,
+    "train_inverse": _train_inverse,
+    "train_servo": _train_servo,
+    "optimize": _optimize,
+    "evaluate": _evaluate,
+    "iterate": _iterate,
+    "compare": _compare,
+    "reproduce": _compare,
+    "survey": _survey,
+    "values": _values,
+    "answer": _answer,
+    "rehearse": _answer,
+}

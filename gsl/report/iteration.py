@@ -1,0 +1,196 @@
+"""What a person reads after `iterate`: table, verdict, learning curve."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gsl.core.interfaces import Task
+from gsl.core.unit import Unit, gained
+from gsl.report.evaluation_cells import ended, ends
+from gsl.report.flight import Flight
+from gsl.report.learning_curve import Search, learning_curve, search
+from gsl.report.markdown import table
+from gsl.storage.artifact import Artifact
+from gsl.storage.policy_choice import EVALUATION
+
+CURVE, MARKDOWN = "learning_curve.png", "table.md"
+BEGUN = {"pi0": "π0", "start": "where it began"}  # what a search without a better policy returns
+
+
+class Rounds:
+    """The iterations so far: which policy is the best, what it cost, and what to tell."""
+
+    def __init__(self, task: Task) -> None:
+        self._unit = Unit.of(task)
+        self._done: list[Artifact] = []
+        self._beside: Artifact | None = None
+        self._flight: Flight | None = None
+        self._spent = 0
+        self._collected = 0
+        self._refusal = ""
+        self.rows: list[tuple[str, ...]] = []
+        self.best: Artifact | None = None
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Titles of the rows."""
+        places = ("in simulation", "in real", "95 % interval", ends(self._unit))
+        return ("iteration", "policy", *places, "gain over the last", "real episodes")
+
+    @property
+    def rising(self) -> bool:
+        """The paper's stop rule, with the interval: is v(pi_i) - v(pi_i-1) surely above 0?"""
+        return bool(self._done[-1].metrics["gain"]["interval"][0] > 0.0)
+
+    @property
+    def last(self) -> str | None:
+        """Where the policy is that the next iteration goes on from, none while π0 is the best."""
+        return None if self.best is None else str(self.best.folder)
+
+    def diagnosed(self, flight: Flight) -> None:
+        """Take in the diagnosis on which the iterations stand; what it cost goes into the first one's row."""
+        self._flight = flight
+        self._spent += flight.episodes
+
+    def add(self, evaluation: Artifact, collected: int) -> list[tuple[str, ...]]:
+        """Take in an iteration that has collected some real episodes, and return its rows."""
+        self._done.append(evaluation)
+        cost = collected + evaluation.metrics["real_episodes"]
+        self._spent += cost
+        self._collected += collected
+        first = len(self._done) == 1
+        if self.rising or (first and evaluation.metrics["gain"]["value"] > 0.0):
+            self.best = evaluation
+        in_the_air = f" + {self._flight.episodes} in the air" if first and self._flight else ""
+        return self._added(str(len(self._done)), evaluation.metrics, f"{cost}{in_the_air}", first=first)
+
+    def refused(self, why: str, collected: int) -> tuple[str, ...]:
+        """Take in an iteration that ended at its grounding, after some real episodes, and return its row."""
+        self._spent += collected
+        self._collected += collected
+        number = len(self._done) + 1
+        self._refusal = f"The grounding of iteration {number} was refused: {why}. "
+        row = (str(number), "grounding refused", *[""] * (len(self.columns) - 3), str(collected))
+        self.rows.append(row)
+        return row
+
+    def add_beside(self, evaluation: Artifact) -> list[tuple[str, ...]]:
+        """Take in what is shown for comparison, and return its rows."""
+        self._beside = evaluation
+        return self._added("no grounding", evaluation.metrics, str(evaluation.metrics["real_episodes"]), first=False)
+
+    @property
+    def verdict(self) -> str:
+        """The result in a sentence or two, with what it cost."""
+        air = self._flight.episodes if self._flight else 0
+        flown = f" and {air} motions in the air" if air else ""
+        cost = f"{self._spent - air} real episodes{flown} were spent."
+        if self.best is None:
+            return f"No improvement over π0 was found: π0 is returned. {cost}"
+        after, before = self.best.metrics["returned"], self._done[0].metrics["baseline"]
+        unit = self._unit
+        bounds, name = unit.interval(self.best.metrics["gain"]["interval"], sign=True), unit.name
+        if before["interval"][0] > 0.0:
+            low, high = (100.0 * bound / before["value"] for bound in self.best.metrics["gain"]["interval"])
+            bounds, name = f"{low:+.0f} to {high:+.0f}", "% of π0"
+        last = " ".join(filter(None, ["gain of the last step", bounds, name, "(95 %)"]))
+        of = f" by iteration {1 + self._done.index(self.best)}" if len(self._done) > 1 else ""
+        fell = f"{after['falls']} falls in " if unit.falls else ""
+        end = f"{fell}{after['episodes']} fresh episodes. {self._ended}{cost}"
+        return f"In real: π0 {unit.bare(before['value'])}, returned{of} {unit.shown(after['value'])}, {last}, {end}"
+
+    @property
+    def _ended(self) -> str:
+        """Why no iteration followed: the last one's gain is not sure, or the next one's grounding was refused."""
+        unsure = f"The gain of iteration {len(self._done)} is not sure: no other follows. "
+        return self._refusal if self.rising else unsure
+
+    def metrics(self) -> Mapping[str, Any]:
+        """Return the figures of all rounds."""
+        best = self._done[0] if self.best is None else self.best
+        gain = best.metrics["gain"]
+        if self.best is None:
+            gain = {"value": 0.0, "interval": [0.0, 0.0], "share": None if gain["share"] is None else 0.0}
+        return {
+            "iterations": len(self._done),
+            "returned_iteration": 0 if self.best is None else 1 + self._done.index(self.best),
+            "returned": best.metrics["baseline" if self.best is None else "returned"],
+            "baseline": self._done[0].metrics["baseline"],
+            "gain": gain,
+            "real_episodes": self._spent,
+            "learned_from": self._collected,
+            **self._of_the_flight(),
+            "stopped_by_itself": not self.rising or bool(self._refusal),
+            "verdict": self.verdict,
+            "broken_promises": self.broken_promises,
+            "ungrounded": None if self._beside is None else self._beside.metrics,
+        }
+
+    @property
+    def diagnosis(self) -> list[str]:
+        """What was diagnosed and what was done with it, in a line; none if nothing was."""
+        return list(self._flight.findings) if self._flight else []
+
+    @property
+    def broken_promises(self) -> list[str]:
+        """What searches promised and the real world did not give, a line each."""
+        promises = {k: evaluation.metrics.get("promise") for k, evaluation in enumerate(self._done, 1)}
+        return [f"Iteration {k}: {kept['warning']}." for k, kept in promises.items() if kept and kept["warning"]]
+
+    def _of_the_flight(self) -> Mapping[str, Any]:
+        if self._flight is None:
+            return {"excitation": None, "diagnosis": None, "servo": None}
+        flight = self._flight
+        found, servo = flight.diagnosis, flight.servo
+        diagnosis = gap = None
+        if found is not None:
+            diagnosis = {"verdict": found.verdict, "causes": list(found.causes), "told": flight.verdict}
+        if servo is not None:
+            gap = {"floors_before": servo["floors_before"], "floors_after": servo["floors_after"], "told": flight.gap}
+        excitation = {"episodes": flight.episodes, "real_seconds": flight.seconds}
+        return {"excitation": excitation, "diagnosis": diagnosis, "servo": gap}
+
+    def searches(self) -> list[Search]:
+        """Return the panels of the learning curve."""
+        found = [self._search(f"iteration {k + 1}", one, f"π{k}") for k, one in enumerate(self._done)]
+        if self._beside is not None:
+            found.append(self._search("without grounding", self._beside, "π0")._replace(bare=True))
+        return found
+
+    @property
+    def unit(self) -> str:
+        """Of what people are shown."""
+        return self._unit.name
+
+    def _search(self, label: str, evaluation: Artifact, start: str) -> Search:
+        document = json.loads((evaluation.folder / EVALUATION).read_text(encoding="utf-8"))
+        return search(label, document, shown=self._unit.factor, returned=evaluation.metrics["best"], start=start)
+
+    def _added(self, label: str, metrics: Mapping[str, Any], cost: str, *, first: bool) -> list[tuple[str, ...]]:
+        simulated, gain = metrics["returned_value_sim"], metrics["gain"]
+        expected = "" if simulated is None else self._unit.bare(simulated)
+        told = gained(gain["share"]) or self._unit.shown(gain["value"], sign=True)
+        zero: tuple[str, ...] = ("0", "π0", "", *self._measured(metrics["baseline"]), "", "")
+        rows = [zero] if first else []
+        name = BEGUN.get(metrics["best"], metrics["best"])
+        rows.append((label, name, expected, *self._measured(metrics["returned"]), told, cost))
+        self.rows += rows
+        return rows
+
+    def _measured(self, summary: Mapping[str, Any]) -> tuple[str, str, str]:
+        return self._unit.bare(summary["value"]), self._unit.interval(summary["interval"]), ended(summary, self._unit)
+
+
+def write_table(folder: Path, rounds: Rounds, remarks: Sequence[str] = ()) -> None:
+    """Write the table, the diagnosis if there was one, the verdict, broken promises and further remarks as markdown."""
+    below = [*rounds.diagnosis, rounds.verdict, *rounds.broken_promises, *remarks]
+    told = "\n\n".join([table(rounds.columns, rounds.rows).rstrip(), *below])
+    (folder / MARKDOWN).write_text(f"{told}\n", encoding="utf-8")
+
+
+def write_curve(folder: Path, rounds: Rounds) -> None:
+    """Write the learning curve of all iterations, and of the search without grounding if there was one."""
+    learning_curve(folder / CURVE, rounds.searches(), unit=rounds.unit)

@@ -1,0 +1,1 @@
+"""Rollouts: one, many in parallel, and what they return."""

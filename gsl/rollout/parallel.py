@@ -1,0 +1,154 @@
+"""Many rollouts on all cores: the result depends on the jobs, not on who does them or when.
+
+joblib spreads them (loky on one machine; `joblib.parallel_config` chooses another engine, such as dask). If a worker
+dies, what has arrived is kept and only the missing jobs are tried again.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from pydantic import AfterValidator
+
+from gsl.core.interruption import processes_starting
+from gsl.core.setting import setting
+from gsl.core.trajectory import Trajectory
+from gsl.errors import GslError
+from gsl.rollout.rollout import Scenario, rollout
+
+TRIES = 3
+
+
+def _some(workers: int) -> int:
+    if workers == 0:
+        raise ValueError("must not be 0; -1 is one process a core")
+    return workers
+
+
+Workers = Annotated[
+    int, setting("processes; -1 for one a core, 1 for none beside this one", ge=-64, le=1024), AfterValidator(_some)
+]
+
+
+def threads(workers: int) -> int:
+    """Return how many processes or threads a setting of `workers` stands for."""
+    from joblib import cpu_count
+
+    return workers if workers > 0 else int(cpu_count())
+
+
+class Job(NamedTuple):
+    """One rollout to do: parameters, shape (n_parameters,), and seed."""
+
+    parameters: np.ndarray
+    seed: int
+
+
+class Episode(NamedTuple):
+    """What a search needs of a rollout; `outcome` is what the task reports of it, by name with unit."""
+
+    value: float
+    fell: bool
+    steps: int
+    outcome: Mapping[str, float]
+
+
+def trajectories(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Any) -> list[Trajectory]:
+    """Return the trajectories of all jobs, in their order."""
+    return in_parallel(_trajectory, scenario, jobs, workers, progress)
+
+
+def episodes(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Any) -> list[Episode]:
+    """Return value, fall and length of all jobs, in their order."""
+    return in_parallel(_episode, scenario, jobs, workers, progress)
+
+
+def in_parallel(function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Any) -> list[Any]:
+    """Return `function(pickled shared, job)` of all jobs, in their order."""
+    done = dict(arriving(function, shared, jobs, workers, progress))
+    return [done[index] for index in range(len(jobs))]
+
+
+def arriving(function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Any) -> Iterator[tuple[int, Any]]:
+    """Yield (index of job, `function(pickled shared, job)`) of all jobs, as they end."""
+    frozen = pickle.dumps(shared)
+    missing = list(range(len(jobs)))
+    for _ in range(TRIES):
+        for index, result in _arriving(function, frozen, jobs, tuple(missing), workers):
+            missing.remove(index)
+            progress.advance()
+            yield index, result
+        if not missing:
+            return
+    raise GslError(f"worker processes died {TRIES} times in one batch of jobs; try workers=1 or look at free memory")
+
+
+def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequence[int], workers: int) -> Iterator[Any]:
+    """Yield (index, result) as they come, until a worker dies."""
+    import joblib
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+    from joblib.parallel import get_active_backend
+
+    if workers == 1:
+        yield from ((index, function(frozen, jobs[index])) for index in missing)
+        return
+    parent = os.getpid() if type(get_active_backend()[0]).__name__ == "LokyBackend" else 0
+    parallel = joblib.Parallel(n_jobs=workers, batch_size=1, return_as="generator_unordered")
+    try:
+        with processes_starting():
+            found = parallel(
+                joblib.delayed(_numbered)(function, frozen, jobs[index], index, parent) for index in missing
+            )
+        yield from found
+    except TerminatedWorkerError:
+        return
+
+
+def _numbered(function: Any, frozen: bytes, job: Any, index: int, parent: int) -> tuple[int, Any]:
+    if parent:
+        _end_with_parent(parent)
+    return index, function(frozen, job)
+
+
+@lru_cache(maxsize=1)
+def _end_with_parent(parent: int) -> None:
+    """Let this worker end soon after the process that started it, which cannot see to it after a kill -9."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _trajectory(frozen: bytes, job: Job) -> Trajectory:
+    scenario, env = _standing_by(frozen)
+    return rollout(scenario, env, job.parameters, job.seed)
+
+
+def _episode(frozen: bytes, job: Job) -> Episode:
+    scenario, env = _standing_by(frozen)
+    done = rollout(scenario, env, job.parameters, job.seed)
+    return Episode(done.value, done.ended_in_a_fall, len(done), scenario.task.outcome(scenario.world.layout, done))
+
+
+_STANDING: dict[bytes, tuple[Scenario, Any]] = {}  # what this process has ready, one at most
+
+
+def _standing_by(frozen: bytes) -> tuple[Scenario, Any]:
+    """Return this process' scenario with its environment, kept from one job to the next."""
+    if frozen not in _STANDING:
+        for _, env in _STANDING.values():
+            env.close()
+        _STANDING.clear()
+        scenario = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
+        _STANDING[frozen] = scenario, scenario.make()
+    return _STANDING[frozen]

@@ -1,0 +1,112 @@
+"""One episode of a policy at a task in a world: a function of these and the seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import gymnasium
+import numpy as np
+
+from gsl.core.interfaces import Grounding, Policy, Task, World
+from gsl.core.layout import Layout
+from gsl.core.trajectory import Trajectory
+from gsl.errors import ConfigError
+from gsl.policies.programme import OpenLoopRun
+from gsl.worlds.grounded import GroundedEnv
+
+LONGEST = 100_000  # steps of an episode that nothing ends
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Everything of a rollout but the parameters and the seed."""
+
+    world: World
+    task: Task
+    policy: Policy
+    role: str
+    grounding: Grounding
+
+    def __post_init__(self) -> None:
+        """Refuse an episode without a step."""
+        if self.ticks < 1:
+            period = self.world.layout.control_period
+            given = f"{self.task.duration:g}"
+            raise ConfigError("task.duration", f"must be at least one control period ({period:g} s)", given=given)
+
+    @property
+    def ticks(self) -> int:
+        """Control steps of an episode that does not end early; an open-loop policy has its own number."""
+        planned = self.task.duration / self.world.layout.control_period
+        return round(min(planned, LONGEST))
+
+    def make(self) -> gymnasium.Env:
+        """Build the environment that `rollout` acts in."""
+        return GroundedEnv(self.world.make(), self.grounding)
+
+
+def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed: int) -> Trajectory:
+    """Run one episode.
+
+    Args:
+        scenario: What is to be done.
+        env: From `scenario.make`; nothing of earlier episodes stays in it.
+        parameters: Of the policy.
+        seed: Of the world and of the grounding.
+    """
+    layout = scenario.world.layout
+    observation, _ = env.reset(seed=seed, options={"posture": scenario.policy.posture(parameters, layout)})
+    try:
+        policy = scenario.policy.start(parameters, layout)
+        task = scenario.task.start(layout, observation, scenario.role)
+    except KeyError as error:
+        robot, other = "a robot without feet goes with task=excite", "task=own_reward and policy=mlp"
+        hint = f"a gymnasium environment goes with {other}" if layout.states else robot
+        raise ConfigError(
+            "task or policy", f"needs {error.args[0]}, which this world does not observe; {hint}"
+        ) from error
+    observations, actions, sent, rewards, ended = [observation], [], [], [], False
+    for _ in range(policy.ticks if isinstance(policy, OpenLoopRun) else scenario.ticks):
+        action = policy.act(observation)
+        before, (observation, own, ended, cut, info) = observation, env.step(action)
+        judged = task.step(before, observation, ended)
+        observations.append(observation)
+        actions.append(action)
+        sent.append(info["grounded_action"])
+        rewards.append(own if judged.reward is None else judged.reward)
+        if ended or cut or judged.ended:
+            break
+    record = _recorded_states if layout.states else _recorded
+    trajectory = record(layout, np.array(observations), np.array(actions), np.array(rewards), ended=ended)
+    grounded = np.array(sent)
+    return trajectory if np.array_equal(grounded, actions) else replace(trajectory, grounded_action=grounded)
+
+
+def _recorded(
+    layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, ended: bool
+) -> Trajectory:
+    sensors = {
+        column: states[:, layout[part].start + index]
+        for part, columns in layout.columns.items()
+        for index, column in enumerate(columns)
+    }
+    down = np.zeros(len(states), dtype=bool)
+    down[-1] = ended
+    return Trajectory(
+        time=layout.control_period * np.arange(len(states)),
+        action=actions,
+        position=states[:, layout["position"]],
+        velocity=states[:, layout["velocity"]],
+        reward=rewards,
+        fell=down,
+        sensors=sensors,
+    )
+
+
+def _recorded_states(
+    layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, ended: bool
+) -> Trajectory:
+    nothing, over = np.zeros((len(states), 0)), np.zeros(len(states), dtype=bool)
+    over[-1] = ended
+    time = layout.control_period * np.arange(len(states))
+    return Trajectory(time, actions, nothing, nothing, reward=rewards, sensors={"terminated": over}, state=states)

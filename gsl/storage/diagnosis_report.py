@@ -1,0 +1,20 @@
+"""The report of a diagnosis as a file, and the names of what lies beside it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+REPORT, PAGE, COMMANDS = "report.json", "report.html", "next_experiment.json"
+WORLD, SIMULATOR = "world/diagnosed.yaml", "world/simulator.yaml"
+
+
+def report_of(folder: Path) -> dict[str, Any]:
+    """Return the report of an artifact with paths that are good from where the command runs."""
+    report: dict[str, Any] = json.loads((folder / REPORT).read_text(encoding="utf-8"))
+    found = {key: (folder / report[key]).as_posix() for key in ("world_file", "report") if report.get(key)}
+    wanted = report.get("next_experiment")
+    if wanted and wanted.get("file"):
+        found |= {"next_experiment": wanted | {"file": (folder / wanted["file"]).as_posix()}}
+    return report | found

@@ -1,0 +1,91 @@
+"""Which parameters a stage starts from: a policy's own, or one that an artifact holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gsl.core.described import described
+from gsl.core.interfaces import Policy
+from gsl.errors import ArtifactError
+from gsl.storage import manifest
+from gsl.storage.identity import flat
+from gsl.storage.policies import Policies, PolicyRecord, read_policies
+from gsl.storage.references import resolve
+
+FILE = "policies.json"
+EVALUATION = "evaluation.json"  # of policies that were measured
+
+
+@dataclass(frozen=True)
+class PolicyChoice:
+    """A policy family and the reference to the parameters, None for the family's start values."""
+
+    policy: Policy
+    reference: str | None
+
+    def parents(self, role: str) -> Mapping[str, Path]:
+        """Return what is read, by role."""
+        return {} if self.reference is None else {role: resolve(self.reference)}
+
+    def parameters(self) -> np.ndarray:
+        """Return the parameters, shape (n_parameters,).
+
+        Raises:
+            ArtifactError: if the reference holds several policies.
+        """
+        if self.reference is None:
+            return self.policy.initial
+        found = records(self.policy, self.reference)
+        if len(found) > 1:
+            raise ArtifactError(self.reference, f"holds {len(found)} policies; evaluate them and name that artifact")
+        return vector(self.policy, found[0])
+
+
+def records(policy: Policy, reference: str) -> tuple[PolicyRecord, ...]:
+    """Return the policies of a file or artifact.
+
+    Raises:
+        ArtifactError: if they are of another family.
+    """
+    path = resolve(reference)
+    found = read_policies(_file(path))
+    if found.policy != described(policy):
+        raise ArtifactError(path, f"its policies are others: {_difference(found.policy, described(policy))}")
+    for name in found.records[0].parameters.keys() ^ set(policy.names):
+        raise ArtifactError(path, f"parameter {name}: not both the file and the policy know it; choose another policy=")
+    return found.records
+
+
+def _file(path: Path) -> Path:
+    if path.is_dir() and not (path / FILE).is_file():
+        kind = manifest.read(path).kind
+        raise ArtifactError(path, f"holds {kind}, which has no policies; name an artifact of optimize or evaluate")
+    return path / FILE if path.is_dir() else path
+
+
+def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str:
+    """Return the first setting in which two policies differ."""
+    left, right = flat(theirs), flat(ours)
+    name = next(name for name in [*left, *right] if left.get(name) != right.get(name))
+    told = "their class" if name == "_target_" else name
+    return f"{told} is {left.get(name)}, but policy= here says {right.get(name)}"
+
+
+def vector(policy: Policy, record: PolicyRecord) -> np.ndarray:
+    """Return a record's parameters in the policy's order, shape (n_parameters,)."""
+    return np.array([record.parameters[name] for name in policy.names])
+
+
+def record(policy: Policy, name: str, parameters: np.ndarray, **more: Any) -> PolicyRecord:
+    """Return parameters, shape (n_parameters,), as a record."""
+    return PolicyRecord(name, dict(zip(policy.names, parameters.tolist(), strict=True)), **more)
+
+
+def policies(policy: Policy, task: Any, found: list[PolicyRecord]) -> Policies:
+    """Return what a policy file holds."""
+    return Policies(described(policy), described(task), tuple(found))

@@ -1,0 +1,52 @@
+"""What to say of a learned servo: whether one should search with it, and what a user should know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+NEAR, FARTHEST = 1.0, 3.0  # noise floors: up to the first it is as good as the log can tell, beyond the second useless
+
+
+def problems(metrics: Mapping[str, Any]) -> list[str]:
+    """Return why nothing should be searched with a learned servo, if there is a reason.
+
+    Args:
+        metrics: Of its artifact.
+    """
+    after, before = metrics["floors_after"], metrics["floors_before"]
+    if after > FARTHEST:
+        return [f"held out, the learned servo is {after:.1f} noise floors from the log, more than {FARTHEST:g}"]
+    if after > before:
+        return [f"held out, the gap is {after:.2f} noise floors, {before:.2f} without"]
+    if after > NEAR and not metrics["learned"]:
+        return [f"nothing was learned: held out, the gap stays at {after:.1f} noise floors"]
+    return []
+
+
+def problems_of_members(metrics: Mapping[str, Any]) -> list[str]:
+    """Return why nothing should be searched with all members of a learned servo, if there is a reason.
+
+    Args:
+        metrics: Of its artifact.
+    """
+    most = min(FARTHEST, max(NEAR, metrics["floors_before"]))
+    return [
+        f"held out, member {k} is {floors:.1f} noise floors from the log, more than {most:.2g}"
+        for k, floors in enumerate(metrics["members"])
+        if k and floors > most
+    ]
+
+
+def remarks(metrics: Mapping[str, Any]) -> list[str]:
+    """Return what a user should know of a learned servo: how near it is, and which groups keep their old servo."""
+    after = metrics["floors_after"]
+    found = (
+        [] if after <= NEAR else [f"held out, the learned servo is {after:.1f} noise floors from the log, not within 1"]
+    )
+    if not metrics["whole_motions"]:
+        found.append("the log is one motion, of which parts are held out: the figures are optimistic")
+    for name, group in metrics["groups"].items():
+        if not group["learned"]:
+            found.append(f"{name} keep their servo: nothing that was learned brought held-out motions nearer")
+    return found

@@ -1,0 +1,1 @@
+"""Is a grounding good enough to search in? Checks before a search, and what each found."""

@@ -1,0 +1,246 @@
+"""Compliance of a simulated robot: its joints are loaded from outside, and their stiffness and strength measured.
+
+An action transformation changes how joints move; how they yield, it need not. The robot hangs in the air and holds its
+stance as a constant action; a torque acts on a joint as the ground would. First it swings (stiffness, damping), then
+it rises until the joint gives way (its strength). The grounding sees and acts once a control period, as in a search.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gsl.core.body import Robot
+from gsl.core.impedance import impedance
+from gsl.core.interfaces import Grounding
+from gsl.core.plant import Hook, Plant, noiseless
+from gsl.core.seeds import derived_seed, grounding_generator
+from gsl.errors import ConfigError
+from gsl.grounding.none import NoGrounding
+from gsl.worlds.bullet import BulletEnv, BulletWorld
+
+FREQUENCY = 1.25  # of the swing [Hz]: a step of the walk takes 0.3 to 0.5 s, a load on its leg as long
+AMPLITUDE = 0.35  # of the swing [joint's effort]: 4 times a worn servo's friction, half of a weak one's limit
+SETTLING, CYCLES = 1, 3  # cycles before the measurement and in it
+RATE, MOST = 0.3, 1.4  # of the rising load [effort/s], and where it ends [effort]: in 3 s to the nominal limit
+DRAG = 0.25  # on a joint that gives way [effort·s/rad]: without it the load would also have to move its inertia
+YIELDED = 0.1  # deflection beyond the linear one at which a joint has given way [rad]: 5 times the NAO's at its limit
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """How each motor of a robot answers a load, every array of shape (n_motors,).
+
+    Attributes:
+        motors: Names.
+        groups: Names of motors by group.
+        stiffness: Real part of the impedance at `FREQUENCY` [N·m/rad].
+        damping: Imaginary part over omega [N·m·s/rad].
+        noise: Standard error of the stiffness [N·m/rad].
+        torque: Load at which the motor gives way [N·m]; `MOST` efforts where it does not.
+    """
+
+    motors: tuple[str, ...]
+    groups: Mapping[str, tuple[str, ...]]
+    stiffness: np.ndarray
+    damping: np.ndarray
+    noise: np.ndarray
+    torque: np.ndarray
+
+    @property
+    def impedance(self) -> np.ndarray:
+        """Stiffness and damping as a complex number [N·m/rad]."""
+        return self.stiffness + 2j * np.pi * FREQUENCY * self.damping
+
+    def where(self, group: str) -> np.ndarray:
+        """Return which motors a group has, shape (n_motors,)."""
+        return np.isin(self.motors, self.groups[group])
+
+    def document(self) -> dict[str, Any]:
+        """Return it as a JSON document."""
+        arrays = ("stiffness", "damping", "noise", "torque")
+        groups = {name: list(members) for name, members in self.groups.items()}
+        return {
+            "motors": list(self.motors),
+            "groups": groups,
+            **{name: getattr(self, name).tolist() for name in arrays},
+        }
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> Compliance:
+        """Return what a document holds; what was not finite is NaN."""
+        arrays = {name: np.array(document[name], dtype=float) for name in ("stiffness", "damping", "noise", "torque")}
+        motors = tuple(document["motors"])
+        groups = {name: tuple(members) for name, members in document["groups"].items()}
+        in_order = sorted(groups, key=lambda name: motors.index(groups[name][0]))  # a document's keys are by letter
+        return cls(motors, {name: groups[name] for name in in_order}, **arrays)
+
+
+def measure(world: Any, grounding: Grounding, seed: int) -> Compliance:
+    """Measure the robot of a world with a grounding that is ready to act, without draws and noise if it can.
+
+    One joint is loaded at a time: a grounding's models may answer a load on one joint at another. Where nothing joins
+    the branches of a robot, since its base is held, one joint of each is loaded at once, which is three times as quick.
+
+    Args:
+        world: A robot in Bullet, with its effects.
+        grounding: What stands between action and simulator.
+        seed: Of all randomness.
+
+    Raises:
+        ConfigError: The world is no robot in Bullet.
+    """
+    if not isinstance(world, BulletWorld):
+        raise ConfigError("world", "only a robot in Bullet can be loaded from outside")
+    held, robot = replace(world, floating=False, start_noise=0.0), world.plant.robot
+    quiet = getattr(grounding, "expected", grounding)
+    effort = np.array([robot.joint(name).effort for name in robot.motors])
+    found, apart = np.zeros((4, len(robot.motors))), isinstance(grounding, NoGrounding) and separate(world.plant)
+    for number, loaded in enumerate(rounds(robot) if apart else np.eye(len(robot.motors), dtype=bool)):
+        swing = Swing(AMPLITUDE * effort * loaded, held.step)
+        hold(held, quiet, swing, swing.duration, derived_seed(seed, "swing", number))
+        found[:3, loaded] = swing.answer()[:, loaded]
+        rising = Ramp(RATE * effort * loaded * inwards(robot), DRAG * effort * loaded, found[0])
+        hold(held, quiet, rising, MOST / RATE, derived_seed(seed, "yield", number))
+        found[3, loaded] = np.where(rising.yielded, rising.torque, MOST * effort)[loaded]
+    return Compliance(robot.motors, joint_groups(robot), *found)
+
+
+class Swing:
+    """A load that swings, and how the joints answer.
+
+    Args:
+        amplitude: On each motor [N·m], shape (n_motors,).
+        step: Physics period [s].
+    """
+
+    def __init__(self, amplitude: np.ndarray, step: float) -> None:
+        self._amplitude, self._step = amplitude, step
+        self._rows: list[np.ndarray] = []
+        self._times: list[float] = []
+        self.done = False
+        self.duration = (SETTLING + CYCLES) / FREQUENCY
+
+    def __call__(self, motion: np.ndarray, time: float) -> np.ndarray:
+        """Note the joints' positions and return the load."""
+        if time < 0.0:
+            return np.zeros_like(self._amplitude)
+        self._times.append(time)
+        self._rows.append(motion[0].copy())
+        return self._amplitude * math.sin(2.0 * math.pi * FREQUENCY * time)
+
+    def answer(self) -> np.ndarray:
+        """Return stiffness, damping and the stiffness' standard error, shape (3, n_motors)."""
+        times, rows = np.array(self._times), np.array(self._rows)
+        load = np.outer(np.sin(2.0 * np.pi * FREQUENCY * times), self._amplitude)
+        first = [SETTLING / FREQUENCY + k / FREQUENCY for k in range(CYCLES)]
+        parts = [(times >= start - 0.5 * self._step) & (times < start + 1.0 / FREQUENCY) for start in first]
+        every = np.any(parts, axis=0)
+        whole = impedance(load[every], rows[every], times[every], FREQUENCY)
+        cycles = [impedance(load[part], rows[part], times[part], FREQUENCY).real for part in parts]
+        spread = np.std(cycles, axis=0, ddof=1) / math.sqrt(CYCLES)
+        return np.array([whole.real, whole.imag / (2.0 * np.pi * FREQUENCY), spread])
+
+
+class Ramp:
+    """A load that rises until a joint gives way, where it is taken off.
+
+    Args:
+        rate: On each motor [N·m/s], 0 for those that are not loaded, shape (n_motors,).
+        drag: Taken off the load per speed [N·m·s/rad], shape (n_motors,).
+        stiffness: By which a joint yields before it gives way [N·m/rad], shape (n_motors,).
+
+    Attributes:
+        yielded: Which motors have given way, shape (n_motors,).
+        torque: At which load [N·m], shape (n_motors,).
+    """
+
+    def __init__(self, rate: np.ndarray, drag: np.ndarray, stiffness: np.ndarray) -> None:
+        self._rate, self._drag, usable = rate, drag, np.isfinite(stiffness) & (stiffness > 0.0)
+        self._softness = np.where(usable, 1.0 / np.where(usable, stiffness, 1.0), 0.0)
+        self._still: np.ndarray | None = None
+        self.yielded, self.torque = np.zeros(len(rate), dtype=bool), np.zeros(len(rate))
+
+    def __call__(self, motion: np.ndarray, time: float) -> np.ndarray:
+        """Note what has given way and return the load."""
+        if time < 0.0:
+            return np.zeros_like(self._rate)
+        if self._still is None:
+            self._still = motion[0].copy()
+        load = self._rate * time - self._drag * motion[1]
+        beyond = np.sign(self._rate) * (motion[0] - self._still - self._softness * load)
+        new = (beyond > YIELDED) & ~self.yielded
+        self.torque[new], self.yielded[new] = np.abs(load[new]), True
+        return np.where(self.yielded, 0.0, load)
+
+    @property
+    def done(self) -> bool:
+        """Whether all loaded motors have given way."""
+        return bool((self.yielded | (self._rate == 0.0)).all())
+
+
+def hold(world: BulletWorld, grounding: Grounding, load: Swing | Ramp, duration: float, seed: int) -> None:
+    """Hold the stance for some time [s] or until the load is done; no push acts besides, but a user's own torque."""
+    plant = noiseless(world.plant)
+    env = BulletEnv(world, plant=replace(plant, hook=_both(load, plant.hook), pushes=()))
+    run = grounding.start(env.layout, grounding_generator(seed))
+    action = stance(world.plant.robot)
+    observation, _ = env.reset(seed=seed, options={"posture": action})
+    for _ in range(math.ceil(duration / world.period)):
+        observation, *_ = env.step(run.transform(observation, action))
+        if load.done:
+            break
+    env.close()
+
+
+def stance(robot: Robot) -> np.ndarray:
+    """Return the robot's stance as an action [rad], shape (n_joints,)."""
+    limits = [robot.joint(name) for name in robot.controlled]
+    return np.array([min(max(robot.stance.get(one.name, 0.0), one.lower), one.upper) for one in limits])
+
+
+def inwards(robot: Robot) -> np.ndarray:
+    """Return the direction in which each motor has more room, 1 or -1, shape (n_motors,)."""
+    joints, at = [robot.joint(name) for name in robot.motors], stance(robot)[robot.drive]
+    middle = np.array([0.5 * (joint.lower + joint.upper) for joint in joints])
+    return np.where(middle >= at, 1.0, -1.0)
+
+
+def separate(plant: Plant) -> bool:
+    """Whether a motor feels the others through its links alone: no common supply, no torque of a user's own."""
+    return plant.hook is None and not plant.servo.supply_resistance.any()
+
+
+def rounds(robot: Robot) -> list[np.ndarray]:
+    """Return which motors are loaded at the same time, one of each branch, masks of shape (n_motors,)."""
+    above = {joint.child: joint for joint in robot.joints}
+    branches: dict[str, list[tuple[int, int]]] = {}
+    for index, name in enumerate(robot.motors):
+        root, depth = robot.joint(name), 0
+        while root.parent in above:
+            root, depth = above[root.parent], depth + 1
+        branches.setdefault(root.name, []).append((depth, index))
+    masks = np.zeros((max(map(len, branches.values())), len(robot.motors)), dtype=bool)
+    for members in branches.values():
+        for mask, (_, index) in zip(masks, sorted(members), strict=False):
+            mask[index] = True
+    return list(masks)
+
+
+def joint_groups(robot: Robot) -> Mapping[str, tuple[str, ...]]:
+    """Return the motors by group of the robot; what is in none is a group, all motors if there are no groups."""
+    groups = {name: tuple(one for one in robot.motors if one in members) for name, members in robot.groups.items()}
+    inside = {one for members in groups.values() for one in members}
+    rest = tuple(one for one in robot.motors if one not in inside)
+    every = {**groups, ("others" if groups else "all"): rest}
+    return {name: members for name, members in every.items() if members}
+
+
+def _both(load: Swing | Ramp, own: Hook | None) -> Hook:
+    if own is None:
+        return load
+    return lambda motion, time: load(motion, time) + own(motion, time)

@@ -1,0 +1,66 @@
+"""Drift: how far policies have moved from the data that a grounding learned from; there it is guesswork."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from gsl.core.checkpoint import read_checkpoint
+from gsl.core.region import Region
+from gsl.core.seeds import derived_seed
+from gsl.core.trajectory import Trajectory
+from gsl.core.transitions import transitions, usable
+from gsl.grounding.gat import LoadedTransformation
+from gsl.rollout.rollout import Scenario, rollout
+from gsl.storage.checkpoints import write_checkpoint
+
+FILE, KIND = "region.safetensors", "region"
+
+
+def write_region(folder: Path, known: Region) -> None:
+    """Write where the forward model's data lie beside it."""
+    write_checkpoint(
+        folder / FILE,
+        {"mean": known.mean, "whitening": known.whitening, "bound": np.array([known.bound])},
+        {"kind": KIND},
+    )
+
+
+def read_region(folder: Path) -> Region:
+    """Read where the forward model's data lie.
+
+    Raises:
+        ArtifactError: The file is missing or damaged.
+    """
+    arrays, _ = read_checkpoint(folder / FILE, kind=KIND)
+    return Region(arrays["mean"], arrays["whitening"], float(arrays["bound"][0]))
+
+
+def drifts(scenario: Scenario, known: Region, found: Mapping[str, np.ndarray], seed: int) -> dict[str, float]:
+    """Return the share of ticks that each policy spends outside the data, in an episode without draws and noise.
+
+    Args:
+        scenario: With a `LoadedTransformation`.
+        known: Where its data lie, as windows of its forward model.
+        found: Parameters by policy, each of shape (n_parameters,).
+        seed: Of the episodes.
+    """
+    grounding = scenario.grounding
+    assert isinstance(grounding, LoadedTransformation), "only learned groundings have data"
+    scenario = replace(scenario, grounding=grounding.expected)
+    env, shares, columns = scenario.make(), {}, scenario.world.layout.numbers(grounding.forward.joints)
+    for index, (name, parameters) in enumerate(found.items()):
+        walked = rollout(scenario, env, parameters, derived_seed(seed, index)).only(columns)
+        shares[name] = outside(grounding, known, [walked])
+    env.close()
+    return shares
+
+
+def outside(grounding: LoadedTransformation, known: Region, episodes: Sequence[Trajectory]) -> float:
+    """Return the share of the ticks of episodes, of the known joints, that lie outside; 1 if none fills a window."""
+    history = grounding.forward.history
+    long = [one for one in episodes if usable(one) > history.span]
+    return known.outside(transitions(long, history, 1, carried_out=False).windows) if long else 1.0

@@ -1,0 +1,97 @@
+"""Screening: winners of a search walk often in its simulator before the robot tries them; one that falls is not tried.
+
+A candidate is judged by few episodes, and the best of many had luck. Where the simulator yields as the robot does, a
+policy falls in it about as often as on the robot (docs/torque.md), and falling there costs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from gsl.core.interfaces import Grounding
+from gsl.core.seeds import derived_seed
+from gsl.core.setting import setting
+from gsl.grounding.ane import ActionNoise
+from gsl.grounding.effects import DiagnosedEffects, innermost, with_innermost
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.none import NoGrounding
+from gsl.grounding.servo import LearnedServo
+from gsl.grounding.torque_noise import TorqueNoise
+from gsl.rollout.parallel import Job, episodes
+from gsl.rollout.rollout import Scenario
+
+FIRST = 4  # episodes after which one that fell walks no more
+
+Screening = Annotated[
+    int,
+    setting("episodes in the grounded simulator, without margins, in which a winner must not fall to be tried", ge=0),
+]
+
+
+class Screened(NamedTuple):
+    """How often a policy fell in how many episodes."""
+
+    falls: int
+    episodes: int
+
+    @property
+    def share(self) -> float:
+        """Of its episodes that ended in a fall."""
+        return self.falls / self.episodes
+
+
+def foretells_falls(grounding: Grounding) -> bool:
+    """Whether the simulator yields as the robot does: a servo was learned or effects were diagnosed."""
+    return isinstance(grounding, DiagnosedEffects) or isinstance(innermost(grounding), LearnedServo)
+
+
+def without_margins(grounding: Grounding) -> Grounding:
+    """Return a grounding without the noise and the draws that a search has on top."""
+    inner = innermost(grounding)
+    if isinstance(grounding, DiagnosedEffects):
+        grounding = replace(grounding, draws=False)
+    if isinstance(inner, LearnedServo):
+        return with_innermost(grounding, replace(inner, torque_noise=0.0, noise=0.0, ensemble=False))
+    if isinstance(inner, ActionTransformation):
+        return with_innermost(grounding, replace(inner, noise=0.0))
+    return with_innermost(grounding, NoGrounding()) if isinstance(inner, TorqueNoise | ActionNoise) else grounding
+
+
+def screen(
+    scenario: Scenario, policies: Mapping[str, np.ndarray], count: int, seed: int, *, workers: int, console: Any
+) -> dict[str, Screened]:
+    """Return how often policies fall in a simulator; one that falls in its first episodes walks no more.
+
+    Args:
+        scenario: Ready to act, without margins.
+        policies: Parameters by name, shape (n_parameters,) each.
+        count: Episodes of each.
+        seed: Of all randomness.
+        workers: Processes.
+        console: Where progress is shown.
+    """
+    first = min(FIRST, count)
+    with console.progress(len(policies) * count, "walking the winners in simulation") as progress:
+
+        def count_falls(names: Sequence[str], numbers: range) -> dict[str, int]:
+            jobs = [Job(policies[name], derived_seed(seed, "screening", name, n)) for name in names for n in numbers]
+            fell = [episode.fell for episode in episodes(scenario, jobs, workers=workers, progress=progress)]
+            return {name: sum(fell[k * len(numbers) : (k + 1) * len(numbers)]) for k, name in enumerate(names)}
+
+        early = count_falls(list(policies), range(first))
+        standing = [name for name, falls in early.items() if not falls]
+        progress.advance((len(policies) - len(standing)) * (count - first))
+        late = count_falls(standing, range(first, count)) if count > first else {}
+    return {
+        name: Screened(falls + late.get(name, 0), count if name in standing else first) for name, falls in early.items()
+    }
+
+
+def passing(screened: Mapping[str, Screened]) -> list[str]:
+    """Return the policies that never fell; if every one did, the one that fell least."""
+    standing = [name for name, result in screened.items() if not result.falls]
+    return standing or [min(screened, key=lambda name: screened[name].share)]
