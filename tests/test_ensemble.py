@@ -19,8 +19,8 @@ from scipy import stats
 from gsl.core.checkpoint import read_checkpoint
 from gsl.core.described import described
 from gsl.core.plant import Plant
-from gsl.diagnosis.files import read_diagnosis, uncertain_causes
 from gsl.errors import ConfigError
+from gsl.grounding.diagnosis_file import read_diagnosis, uncertain_causes
 from gsl.grounding.draws import DRAWS, UncertainCause, around, drawings, hypercube, within
 from gsl.grounding.effects import DiagnosedEffects, switched_on
 from gsl.grounding.none import NoGrounding
@@ -36,7 +36,8 @@ from gsl.storage.models import write_model
 from gsl.tasks.walk import Walk
 from gsl.training.servo_members import bootstrap
 from gsl.training.servo_verdict import problems_of_members
-from gsl.validation.gate import Gate, settled
+from gsl.validation.check_grounding import check_grounding
+from gsl.validation.gate import Gate
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
 
@@ -238,16 +239,16 @@ def test_drawn_effects_and_members_of_a_servo_go_together(folder: Path, tmp_path
     servo = LearnedServo(servo=str(folder / "runs/on_effects/train_servo"), ensemble=True)
     both = DiagnosedEffects(diagnosis=str(folder / "runs/found/diagnose"), draws=True, inner=servo)
     scenario = Scenario(NAO, Walk(duration=0.6), WalkEngine(), "sim", both)
-    ready, about = Gate(WalkEngine().initial, tmp_path, QUIET, False, 1).passed(scenario)
+    ready, about = check_grounding(scenario, Gate(WalkEngine().initial, tmp_path, QUIET, False, 1))
     assert isinstance(ready.world, EnsembleWorld) and ready.grounding == NoGrounding()
     assert [one.servo_member for one in ready.world.members] == [k % 3 for k in range(DRAWS)]
     assert len({str(one.effects) for one in ready.world.members}) == DRAWS
-    assert settled(scenario, about) == ready
+    assert scenario.prepared(about) == ready
     report = json.loads((tmp_path / "grounding.json").read_text())
     assert report["acceptable"] and report["drawn"]["acceptable"]
     nominal = replace(both, inner=replace(servo, servo=str(folder / "runs/several/train_servo")))
     with pytest.raises(ConfigError, match="was learned on top of another servo: kp of LKneePitch was 150"):
-        Gate(WalkEngine().initial, tmp_path, QUIET, False, 1).passed(replace(scenario, grounding=nominal))
+        check_grounding(replace(scenario, grounding=nominal), Gate(WalkEngine().initial, tmp_path, QUIET, False, 1))
 
 
 def test_a_bootstrap_draws_whole_motions_as_many_as_there_are() -> None:

@@ -19,14 +19,17 @@ from gsl.core.trajectory import Trajectory
 from gsl.effects.effect import together
 from gsl.errors import ConfigError, GslError
 from gsl.grounding.ane import ActionNoise
-from gsl.grounding.effects import DiagnosedEffects, Diagnosis, innermost, switched_on
+from gsl.grounding.diagnosis_file import Diagnosis
+from gsl.grounding.effects import DiagnosedEffects, innermost, switched_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.preparation import parents_of
 from gsl.grounding.randomised import RandomisedEffects
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.storage.policies import read_policies
+from gsl.validation.check_grounding import check_grounding
 from gsl.validation.effects import check_effects
-from gsl.validation.gate import Gate, grounding_parents
+from gsl.validation.gate import Gate
 
 LATE = {"command_latency": {"delay": 0.02}}
 DRY = {"coulomb_friction": [{"torque": 0.1, "joints": "legs"}, {"torque": 0.05, "joints": "arms"}]}
@@ -38,7 +41,7 @@ def found(effects: Mapping[str, Any], **given: Any) -> Diagnosis:
 
 
 def passed(scenario: Scenario, folder: Path, *, accept: bool = False) -> tuple[Scenario, Mapping[str, Any]]:
-    return Gate(REACH.initial, folder, QUIET, accept, 1).passed(scenario)
+    return check_grounding(scenario, Gate(REACH.initial, folder, QUIET, accept, 1))
 
 
 def ran(scenario: Scenario, seed: int = 3) -> Trajectory:
@@ -97,7 +100,7 @@ def test_what_a_grounding_is_made_of_is_named_from_the_outside_in(chain: Path) -
     folder = chain / "runs/chain"
     models = {"forward_model": str(folder / "train_forward"), "inverse_model": str(folder / "train_inverse")}
     nested = DiagnosedEffects(effects=LATE, inner=ActionTransformation(**models))
-    roles = grounding_parents(nested)
+    roles = parents_of(nested)
     assert list(roles) == ["grounding.inner.forward_model", "grounding.inner.inverse_model"]
 
 
@@ -106,8 +109,8 @@ def test_effects_with_which_nobody_can_stand_are_refused(tmp_path: Path) -> None
     scenario = replace(walk(duration=2.0), grounding=weak)
     gate = Gate(scenario.policy.initial, tmp_path, QUIET, False, 1)
     with pytest.raises(GslError, match=r"refused: π0 falls in 4 of 4 episodes.*accept=true"):
-        gate.passed(scenario)
-    _, about = replace(gate, accept=True).passed(scenario)
+        check_grounding(scenario, gate)
+    _, about = check_grounding(scenario, replace(gate, accept=True))
     assert about["grounding_acceptable"] is False
     assert json.loads((tmp_path / "grounding.json").read_text())["pi0"]["falls"] == 4
 

@@ -24,7 +24,8 @@ from gsl.models.servo_members import ServoMembers
 from gsl.policies.walk_engine import WalkEngine
 from gsl.rollout.rollout import Scenario
 from gsl.storage.models import write_model
-from gsl.validation.gate import Gate, settled
+from gsl.validation.check_grounding import check_grounding
+from gsl.validation.gate import Gate
 from gsl.worlds.bullet import BulletWorld
 
 WORLD = BulletWorld(robot="nao", effects={"torque_limit": {"factor": 0.5, "joints": "arms"}})
@@ -69,24 +70,25 @@ def test_noise_on_a_servo_is_what_motions_leave_unexplained_or_a_share_of_the_li
 
 def test_without_noise_an_episode_has_the_bits_it_had() -> None:
     scenario = walk(TorqueNoise(step=0.0, constant=0.0))
-    assert settled(scenario, {}).world == WORLD and settled(scenario, {}).grounding == NoGrounding()
+    assert scenario.prepared().world == WORLD and scenario.prepared().grounding == NoGrounding()
 
 
 def test_on_top_of_effects_both_are_there(tmp_path: Path) -> None:
     late = {"command_latency": {"delay": 0.01}}
     scenario = walk(DiagnosedEffects(effects=late, inner=TorqueNoise(step=0.1, constant=0.05)))
-    ready, report = Gate(WalkEngine().initial, tmp_path, QUIET, accept=False, seed=1).passed(scenario)
+    ready, report = check_grounding(scenario, Gate(WalkEngine().initial, tmp_path, QUIET, accept=False, seed=1))
     assert report["grounding_acceptable"] and report["effects"] == ["command_latency"]
     assert (ready.world.plant.servo.delay == 0.01).all() and (noise(ready.world) > 0.0).all()  # type: ignore[attr-defined]
-    assert settled(scenario, report) == ready
+    assert scenario.prepared(report) == ready
 
 
 def test_noise_in_which_pi0_falls_is_refused(tmp_path: Path) -> None:
     gate = Gate(WalkEngine().initial, tmp_path, QUIET, accept=False, seed=1)
     with pytest.raises(Refused, match=r"π0 falls in \d of 4 episodes with torque noise.*Lower grounding.step"):
-        gate.passed(walk(TorqueNoise(step=0.0, constant=1.0), WORLD))
+        check_grounding(walk(TorqueNoise(step=0.0, constant=1.0), WORLD), gate)
     assert not json.loads((tmp_path / "grounding.json").read_text())["acceptable"]
-    _, report = Gate(WalkEngine().initial, tmp_path, QUIET, accept=False, seed=1).passed(walk(TorqueNoise(), WORLD))
+    gate = Gate(WalkEngine().initial, tmp_path, QUIET, accept=False, seed=1)
+    _, report = check_grounding(walk(TorqueNoise(), WORLD), gate)
     assert report == {"grounding_acceptable": True}
 
 

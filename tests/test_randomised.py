@@ -16,6 +16,7 @@ from gsl.errors import ConfigError, Refused
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import Draw, RandomisedEffects, randomised
 from gsl.robots.catalogue import robot
+from gsl.validation.check_grounding import check_grounding
 from gsl.validation.gate import Gate
 from gsl.worlds.bullet import BulletWorld
 
@@ -79,8 +80,8 @@ def test_a_width_in_which_pi0_falls_is_refused_even_if_it_is_the_least(tmp_path:
     for width, least in ((1.0, 100), ("auto", 8)):
         drawn = replace(scenario, grounding=RandomisedEffects(("gravity_tilt",), width=width))
         with pytest.raises(Refused, match=rf"π0 falls in 4 of 4 episodes that draw from {least} % of the documented"):
-            gate.passed(drawn)
-    _, about = replace(gate, accept=True).passed(drawn)
+            check_grounding(drawn, gate)
+    _, about = check_grounding(drawn, replace(gate, accept=True))
     assert about == {"width": 0.08, "grounding_acceptable": False}
     assert not json.loads((tmp_path / "grounding.json").read_text())["acceptable"]
 

@@ -12,10 +12,11 @@ from gsl.grounding.ane import ActionNoise
 from gsl.grounding.effects import DiagnosedEffects
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.preparation import without_margins
 from gsl.grounding.servo import LearnedServo
 from gsl.grounding.torque_noise import TorqueNoise
 from gsl.policies.walk_engine import WalkEngine
-from gsl.validation.screening import FIRST, Screened, foretells_falls, passing, screen, without_margins
+from gsl.validation.screening import FIRST, Screened, foretells_falls, passing, screen
 
 GIVEN = {"command_latency": {"delay": 0.02}}
 

@@ -20,14 +20,16 @@ in an observation, which is a flat vector, shape (layout.size,).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
+from pathlib import Path
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
 import gymnasium
 import numpy as np
 
 from gsl.core.layout import Layout
 from gsl.core.table import Table
-from gsl.core.trajectory import Trajectory
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.errors import ConfigError
 
 REAL: Literal["real"] = "real"
 SIM: Literal["sim"] = "sim"
@@ -143,6 +145,90 @@ class Grounding(Protocol):
 
     def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
         """Return the grounding at the beginning of an episode, with its own source of randomness."""
+
+
+class Evidence(NamedTuple):
+    """What a grounding learns from; None for what it does not need.
+
+    Attributes:
+        real: Trajectories of the real robot, of π0 and of policies around it; others are held out for the check.
+        sim: Trajectories of the simulator, of the same policies.
+    """
+
+    real: Batch | None
+    sim: Batch | None
+
+
+@runtime_checkable
+class Trainable(Grounding, Protocol):
+    """A grounding with a model of its own, to be derived from: gsl collects what it needs and keeps what it learned.
+
+    Attributes:
+        needs: Which of "real" and "sim" it learns from.
+        model: Path or run of `train-grounding`, a setting; empty before it has learned.
+    """
+
+    needs: ClassVar[tuple[str, ...]]
+    model: str
+
+    def learn(self, evidence: Evidence, seed: int) -> Mapping[str, np.ndarray]:
+        """Return what it has learned, as arrays by name."""
+
+    def load(self, arrays: Mapping[str, np.ndarray]) -> Grounding:
+        """Return a grounding that acts by what was learned."""
+
+    def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
+        """Refuse to start.
+
+        Raises:
+            ConfigError: Always; what `load` returns can be started.
+        """
+        raise ConfigError("grounding", "has to learn first; a stage that uses it has to load what it learned")
+
+
+class Prepared(NamedTuple):
+    """A world that a grounding has made, and what changes the actions in it."""
+
+    world: World
+    grounding: Grounding
+
+
+@runtime_checkable
+class Preparable(Protocol):
+    """A grounding that changes the world, or is made of artifacts; a stage prepares it before the first episode."""
+
+    def parents(self, path: str) -> Mapping[str, Path]:
+        """Return the artifacts that it is made of, by role.
+
+        Args:
+            path: Dotted name of the setting that the grounding is; a role is the name of a setting below it.
+        """
+
+    def check(self, world: World) -> Any:
+        """Refuse a world that it is not for, before anything is asked of the real robot.
+
+        Raises:
+            ConfigError: It is one.
+        """
+
+    def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
+        """Return the world that it makes of the simulator, and what acts there.
+
+        Args:
+            world: The simulator.
+            settled: What a search has settled where the settings leave a choice, by name such as `alpha`.
+
+        Raises:
+            ConfigError: The world is not of a kind that it is for.
+        """
+
+
+@runtime_checkable
+class HasMargins(Protocol):
+    """A grounding with noise or draws on top, which keep a search from what only one simulator rewards."""
+
+    def without_margins(self) -> Grounding:
+        """Return the grounding without them."""
 
 
 class SearchRun(Protocol):

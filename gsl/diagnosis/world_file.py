@@ -12,8 +12,7 @@ from gsl.diagnosis import nuisance
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.replay import Effects
 from gsl.effects.effect import together
-
-DIGITS = 6
+from gsl.storage.diagnosis_report import DIGITS
 
 
 def diagnosed_effects(found: Findings) -> dict[str, Any]:

@@ -6,67 +6,28 @@ transformation inside, physics takes what has a name, and what is left is learne
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, is_dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import field, is_dataclass, replace
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from gsl.core.described import described
-from gsl.core.interfaces import Grounding, GroundingRun, World
+from gsl.core.interfaces import Grounding, GroundingRun, Preparable, Prepared, Trainable, World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.effects.effect import together
 from gsl.errors import ConfigError
-from gsl.grounding.draws import UncertainCause, around
+from gsl.grounding.diagnosis_file import Diagnosis, read_diagnosis
+from gsl.grounding.draws import around
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.preparation import parents_of, prepare, without_margins
 from gsl.grounding.randomised import RandomisedEffects
+from gsl.storage.references import resolve
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
-
-MANY = 6  # effects, more of which are counted and not named
-DOUBT = "In the task that may be no nearer: compare with grounding=ane and grounding=gat."  # docs/results/withheld.md
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """What a diagnosis says of a simulator.
-
-    Attributes:
-        verdict: `no_gap`, `causes`, `inseparable`, `unknown`; `given` or `identified` where nobody diagnosed.
-        causes: Names of the effects that it names.
-        summary: In a sentence.
-        robot: That was simulated.
-        simulated: The `effects:` of the simulator as it was.
-        effects: What it lacks, its calibration included.
-        before, after: The held-out gap without and with them, in noise floors; None where nobody measured.
-        uncertain: Causes with their probabilities and intervals, as far as it tells them.
-    """
-
-    verdict: str
-    causes: tuple[str, ...]
-    summary: str
-    robot: str
-    simulated: Mapping[str, Any]
-    effects: Mapping[str, Any]
-    before: float | None = None
-    after: float | None = None
-    uncertain: tuple[UncertainCause, ...] = ()
-
-    @property
-    def told(self) -> str:
-        """What is done with it, in a sentence."""
-        if not self.causes:
-            kept = "Nothing is switched on: the simulator is taken as it is, calibrated joint by joint."
-            return f"{kept} {DOUBT}" if self.verdict == "unknown" else kept
-        return f"Switched on in the simulator: {named(self.causes)}."
-
-
-def named(causes: Sequence[str]) -> str:
-    """Return effects by name, or only how many they are."""
-    names = tuple(dict.fromkeys(causes))
-    return ", ".join(names) if len(names) <= MANY else f"{len(names)} effects"
 
 
 @component
@@ -80,9 +41,9 @@ class DiagnosedEffects:
     method: Annotated[
         Literal["diagnose", "identify"], setting("what finds the effects: a diagnosis, or a fit of all of them at once")
     ] = "diagnose"
-    inner: Annotated[
-        Grounding | ActionTransformation, setting("what stands between action and the diagnosed simulator")
-    ] = field(default_factory=NoGrounding)
+    inner: Annotated[Grounding, setting("what stands between action and the diagnosed simulator")] = field(
+        default_factory=NoGrounding
+    )
     draws: Annotated[
         bool, setting("each episode is in another simulator, drawn from the causes' probabilities and intervals")
     ] = False
@@ -119,6 +80,27 @@ class DiagnosedEffects:
         if not self.diagnosis:
             raise ConfigError("grounding.diagnosis", f"is missing; name a run of gsl {self.method}, or set effects")
         return read(self.diagnosis, self.method)
+
+    def parents(self, path: str) -> Mapping[str, Path]:
+        """Return the diagnosis, and what the inner grounding is made of."""
+        own = {} if self.effects else {f"{path}.diagnosis": resolve(self.diagnosis, kind=self.method)}
+        return {**own, **parents_of(self.inner, f"{path}.inner")}
+
+    def check(self, world: World) -> None:
+        """Refuse a world without effects, and what the inner grounding is not for."""
+        having_effects(world)
+        if isinstance(self.inner, Preparable):
+            self.inner.check(world)
+
+    def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
+        """Return the world with the effects and the inner grounding in it."""
+        found = self.load(read_diagnosis)
+        inside = prepare(self.inner, switched_on(world, found), settled)
+        return inside._replace(world=self.drawn(inside.world, found))
+
+    def without_margins(self) -> DiagnosedEffects:
+        """Return the same without draws, and without the margins of the inner grounding."""
+        return replace(self, draws=False, inner=without_margins(self.inner))
 
     def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
         """Refuse to start: the world has to be changed first.
@@ -170,4 +152,4 @@ def with_innermost(grounding: Grounding, inner: Grounding) -> Grounding:
 
 def learned(grounding: Grounding) -> bool:
     """Whether a grounding has models that learn from real trajectories."""
-    return isinstance(innermost(grounding), ActionTransformation)
+    return isinstance(innermost(grounding), ActionTransformation | Trainable)

@@ -8,8 +8,9 @@ Hanna, Desai, Karnan, Warnell, Stone: Grounded action transformation for sim-to-
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -17,6 +18,7 @@ import numpy as np
 from gsl.core.draws import Draws
 from gsl.core.grounding import grounded
 from gsl.core.history import Window
+from gsl.core.interfaces import Prepared, World
 from gsl.core.layout import Layout
 from gsl.core.observation import Senses
 from gsl.core.setting import component, setting
@@ -29,6 +31,8 @@ from gsl.models.ensemble import Ensemble, Forward
 from gsl.models.head import Likelihood
 from gsl.models.inverse import InverseModel, Solver
 from gsl.models.states import StateForward
+from gsl.storage.models import read_forward_model, read_inverse_model
+from gsl.storage.references import resolve
 
 REACH = 0.5  # [rad]; a servo told to go farther than this from the agent's target is at its torque limit anyway
 
@@ -129,6 +133,25 @@ class ActionTransformation:
         x = f.joints if isinstance(self.x, str) else self.x
         check_known(x, f.joints, "x")
         return LoadedTransformation(f, f_inv, alpha, self.noise, x, self.predicts != "point", self.gate)
+
+    def parents(self, path: str) -> Mapping[str, Path]:
+        """Return both models."""
+        return {
+            f"{path}.forward_model": resolve(self.forward_model, kind="train_forward"),
+            f"{path}.inverse_model": resolve(self.inverse_model, kind="train_inverse"),
+        }
+
+    def check(self, world: World) -> None:
+        """Take any world: what its models need is checked where they are trained."""
+
+    def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
+        """Return the same world and the transformation with its models, with what a search settled of alpha and x."""
+        chosen = replace(self, alpha=settled["alpha"], x=tuple(settled["x"])) if "x" in settled else self
+        return Prepared(world, chosen.load(read_forward_model, read_inverse_model))
+
+    def without_margins(self) -> ActionTransformation:
+        """Return the same without noise on top."""
+        return replace(self, noise=0.0)
 
     def start(self, layout: Layout, rng: np.random.Generator) -> TransformationRun:
         """Refuse to start without models.

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from gsl.core.body import Robot
-from gsl.core.interfaces import GroundingRun
+from gsl.core.interfaces import GroundingRun, Prepared, World
 from gsl.core.layout import Layout
 from gsl.core.setting import Setting, component, setting, settings_of
 from gsl.effects.effect import documented, effect_class
 from gsl.errors import ConfigError
+from gsl.grounding.none import NoGrounding
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.randomised import RandomisedWorld
 
@@ -56,6 +58,19 @@ class RandomisedEffects:
     def widths(self) -> tuple[float, ...]:
         """What to try, the widest first."""
         return WIDTHS if self.width == "auto" else (self.width,)
+
+    def parents(self, path: str) -> Mapping[str, Path]:
+        """Return nothing: it is made of no artifact."""
+        return {}
+
+    def check(self, world: World) -> None:
+        """Refuse a world whose effects cannot be drawn."""
+        randomised(world, self, self.widths[0])
+
+    def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
+        """Return the world with effects that are drawn, as widely as was settled or set."""
+        width = settled.get("width", self.widths[0])
+        return Prepared(randomised(world, self, width), NoGrounding())
 
     def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
         """Refuse to start: the world has to be changed first.

@@ -6,12 +6,14 @@ every physics step (gsl/core/servo_law.py), where a grounded action acts once a 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
-from gsl.core.interfaces import Grounding, GroundingRun
+from gsl.core.interfaces import Grounding, GroundingRun, Prepared, World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
@@ -19,7 +21,8 @@ from gsl.grounding.ane import ActionNoise
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.torque_noise import with_torque_noise
 from gsl.models.servo import other_base
-from gsl.models.servo_file import read_members, read_servo
+from gsl.models.servo_file import MAKER, read_members, read_servo
+from gsl.storage.references import resolve
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
 from gsl.worlds.velocity_motors import check_servos
@@ -41,6 +44,23 @@ class LearnedServo:
     ] = 0.0
     ensemble: Annotated[bool, setting("each episode is with another member of the servo, of several")] = False
     noise: Annotated[float, setting("action noise on top", unit="rad", ge=0)] = 0.0
+
+    def parents(self, path: str) -> Mapping[str, Path]:
+        """Return the artifact of train-servo."""
+        return {f"{path}.servo": resolve(self.servo, kind=MAKER)}
+
+    def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
+        """Return the world with the learned servo, and action noise if it was asked for."""
+        return Prepared(self.at_its_place().switched_on(world), self.actions)
+
+    def at_its_place(self) -> LearnedServo:
+        """Return the same with its servo named by its folder, whatever run or file it was asked for by."""
+        place = resolve(self.servo, kind=MAKER)
+        return replace(self, servo=str(place.parent if place.is_file() else place))
+
+    def without_margins(self) -> LearnedServo:
+        """Return its first member alone, without noise."""
+        return replace(self, torque_noise=0.0, noise=0.0, ensemble=False)
 
     def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
         """Refuse to start: the world has to be changed first.

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
 from gsl.core.described import described
-from gsl.core.interfaces import GroundingRun
+from gsl.core.interfaces import GroundingRun, Prepared, World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.effects.effect import together
 from gsl.errors import ConfigError
+from gsl.grounding.none import NoGrounding
 from gsl.worlds.bullet import BulletWorld
 
 EFFECT = "torque_noise"
@@ -37,6 +39,22 @@ class TorqueNoise:
                                    lower=0.0, upper=1.0, source=ROBUST)] = 0.3  # fmt: skip
     constant: Annotated[float, setting(f"standard deviation of what is drawn once an episode, {SHARE}", ge=0,
                                        lower=0.0, upper=0.2, source=ROBUST)] = 0.1  # fmt: skip
+
+    def parents(self, path: str) -> Mapping[str, Path]:
+        """Return nothing: it is made of no artifact."""
+        return {}
+
+    def check(self, world: World) -> None:
+        """Refuse a world without torques, or with a joint without a limit."""
+        torque_limits(world)
+
+    def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
+        """Return the world with this noise in it."""
+        return Prepared(self.switched_on(world), NoGrounding())
+
+    def without_margins(self) -> NoGrounding:
+        """Return no grounding: noise is all that it is."""
+        return NoGrounding()
 
     def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
         """Refuse to start: the world has to be changed first.

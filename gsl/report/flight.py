@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from gsl.grounding.effects import Diagnosis
+from gsl.grounding.diagnosis_file import Diagnosis
 
 
 class Flight(NamedTuple):

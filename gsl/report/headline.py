@@ -8,7 +8,7 @@ from typing import Any
 
 from gsl.core.unit import Unit, gained
 from gsl.core.words import falls, several
-from gsl.grounding.effects import named
+from gsl.grounding.diagnosis_file import named
 from gsl.storage.artifact import Artifact
 
 Metrics = Mapping[str, Any]
@@ -84,6 +84,11 @@ def _train_servo(metrics: Metrics, unit: Unit) -> str:
     return f"held out, {metrics['floors_before']:.1f} noise floors became {metrics['floors_after']:.2f}"
 
 
+def _train_grounding(metrics: Metrics, unit: Unit) -> str:
+    sizes = [f"{name} {' x '.join(map(str, shape))}" for name, shape in metrics["arrays"].items()]
+    return f"learned {', '.join(sizes)} from {several(metrics['trajectories'], 'real episode')}"
+
+
 def _train_inverse(metrics: Metrics, unit: Unit) -> str:
     if metrics.get("space"):
         return _of_states(metrics)
@@ -139,6 +144,7 @@ _TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
     "diagnose": _diagnose,
     "identify": _identify,
     "train_forward": _train_forward,
+    "train_grounding": _train_grounding,
     "train_inverse": _train_inverse,
     "train_servo": _train_servo,
     "optimize": _optimize,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -11,6 +13,7 @@ from gsl.core.interfaces import Grounding, Policy, Task, World
 from gsl.core.layout import Layout
 from gsl.core.trajectory import Trajectory
 from gsl.errors import ConfigError
+from gsl.grounding.preparation import prepare
 from gsl.policies.programme import OpenLoopRun
 from gsl.worlds.grounded import GroundedEnv
 
@@ -39,6 +42,15 @@ class Scenario:
         """Control steps of an episode that does not end early; an open-loop policy has its own number."""
         planned = self.task.duration / self.world.layout.control_period
         return round(min(planned, LONGEST))
+
+    def prepared(self, settled: Mapping[str, Any] | None = None) -> Scenario:
+        """Return the scenario with a grounding ready to act, in the world that it makes.
+
+        Args:
+            settled: What a search has settled of it: its metrics.
+        """
+        world, grounding = prepare(self.grounding, self.world, settled)
+        return replace(self, world=world, grounding=grounding)
 
     def make(self) -> gymnasium.Env:
         """Build the environment that `rollout` acts in."""

@@ -7,32 +7,38 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from gsl.core.interfaces import REAL, SIM, Grounding, Learner, Policy, Search, Task, World
+from gsl.core.interfaces import (
+    REAL,
+    SIM,
+    Grounding,
+    Learner,
+    Policy,
+    Preparable,
+    Search,
+    Task,
+    Trainable,
+    World,
+)
 from gsl.core.setting import component, setting
 from gsl.core.words import several
-from gsl.diagnosis.files import read_diagnosis
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects, having_effects, innermost, switched_on, with_innermost
+from gsl.grounding.diagnosis_file import read_diagnosis
+from gsl.grounding.effects import DiagnosedEffects, innermost, learned, switched_on, with_innermost
 from gsl.grounding.gat import ActionTransformation, check_known
 from gsl.grounding.none import NoGrounding
-from gsl.grounding.randomised import RandomisedEffects
 from gsl.grounding.servo import LearnedServo
-from gsl.grounding.torque_noise import TorqueNoise, torque_limits
 from gsl.models.config import ModelConfig
 from gsl.optimizers.objective import Objective, Quantile
-from gsl.stages.collect import Collect
+from gsl.stages.chain_training import train_own, train_transformation
 from gsl.stages.diagnosis_plan import DiagnosisPlan
 from gsl.stages.evaluate import Evaluate, check_tolerated
 from gsl.stages.link import built
 from gsl.stages.optimize import BEST, Optimize
-from gsl.stages.train_forward import TrainForward
-from gsl.stages.train_inverse import TrainInverse
 from gsl.stages.values import Values
 from gsl.storage.artifact import Artifact
 from gsl.training.data import FEWEST, WHY
-from gsl.training.inverse import Method
 from gsl.training.states import refuse_robots
-from gsl.validation.model_requirements import as_needed, extra_ticks, looking_ahead
+from gsl.validation.model_requirements import as_needed
 from gsl.validation.screening import Screening
 from gsl.worlds.external import asking
 
@@ -110,23 +116,20 @@ class Chain:
         data = self.shared.get(REAL, place) / "collect_real"
         return replace(self, earlier=(*self.earlier, str(data))) if self.aggregate else self
 
-    def check(self, grounding: Grounding | ActionTransformation) -> None:
+    def check(self, grounding: Grounding) -> None:
         """Refuse what could not be trained, before anything is asked of the real robot.
 
         Raises:
             ConfigError: Effects of a world that has none, models that cannot be, or too few episodes.
         """
-        if isinstance(grounding, DiagnosedEffects | RandomisedEffects):
-            having_effects(self.sim)
+        if isinstance(grounding, Preparable):
+            grounding.check(self.sim)
         inner = innermost(grounding)
-        if isinstance(inner, TorqueNoise):
-            torque_limits(self.sim)
-        if isinstance(inner, LearnedServo):
-            inner.check(self.sim)
-        if not isinstance(inner, ActionTransformation):
+        if isinstance(inner, ActionTransformation):
+            self._check_joints(inner)
+            self._check_models(inner)
+        if not learned(grounding):
             return
-        self._check_joints(inner)
-        self._check_models(inner)
         for role, count in {REAL: sum(self.budget.real), SIM: sum(self.budget.sim)}.items():
             if count < FEWEST:
                 problem = f"{several(count, 'episode')} with neighbours; {FEWEST} are the least for a model: {WHY}"
@@ -200,50 +203,10 @@ class Chain:
             inside = replace(self, sim=switched_on(self.sim, grounding.load(read_diagnosis)))
             return replace(grounding, inner=inside.ready(home, grounding.inner, previous, seed, console))
         if isinstance(grounding, ActionTransformation):
-            return self.trained(home, grounding, previous, seed, console)
+            return train_transformation(self, home, grounding, previous, seed, console)
+        if isinstance(grounding, Trainable):
+            return train_own(self, home, grounding, previous, seed, console)
         return grounding
-
-    def trained(
-        self, home: Path, grounding: ActionTransformation, previous: str | None, seed: int, console: Any
-    ) -> ActionTransformation:
-        """Collect in both worlds, train both models below `home`, and return the grounding that they make."""
-        budget = self.budget
-        counts: dict[Literal["real", "sim"], tuple[int, int]] = {REAL: budget.real, SIM: budget.sim}
-        places = {role: self.shared.get(role, home) for role in counts}
-        data = {role: place / f"collect_{role}" for role, place in places.items()}
-        for role, (episodes, neighbours) in counts.items():
-            stage = Collect(
-                world=asking(self.real, data[role]) if role == REAL else self.sim,
-                task=self.task,
-                policy=self.policy,
-                role=role,
-                episodes=episodes,
-                neighbours=neighbours,
-                spread=budget.spread,
-                action_noise=budget.real_action_noise if role == REAL else budget.sim_action_noise,
-                initial=previous,
-                workers=self.workers,
-                seed=seed,
-            )
-            built(stage, data[role], console)
-        method: Method = "solve" if grounding.residual else self.inverse_method
-        extra = extra_ticks(self.sim)
-        inverse_model = looking_ahead(self.inverse_model, extra)
-        needed, base = as_needed(self.forward_model, grounding), None
-        if extra:
-            without = ", and f is not fitted to its own answers" if needed.multi_step > 1 else ""
-            looking = f"models look {inverse_model.horizon} ticks ahead{without}"
-            console.status(f"actions show late in the simulator: {looking}")
-        inverse = TrainInverse(str(data[SIM]), inverse_model, method=method, seed=seed)
-        alike = method == self.inverse_method
-        f_inverse = built(inverse, (places[SIM] if alike else home) / inverse.kind, console)
-        needed = looking_ahead(needed, extra)
-        if grounding.residual:
-            needed = replace(needed, history=f_inverse.metrics["history"], horizon=inverse_model.horizon)
-            base = str(f_inverse.folder)
-        forward = TrainForward(str(data[REAL]), needed, base, seed=seed, earlier=self.earlier)
-        f = built(forward, home / forward.kind, console)
-        return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))
 
     def values(self, out: Path, grounding: Grounding | None, found: Mapping[str, Any], console: Any) -> Artifact:
         """Measure a fixed set of policies in the simulator with a grounding that is ready; without one, in real."""

@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 from gsl.core.interfaces import REAL, Grounding, World
 from gsl.core.setting import component, setting
-from gsl.diagnosis.files import read_diagnosis
 from gsl.diagnosis.settings import Without
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects, Diagnosis, innermost, switched_on
+from gsl.grounding.diagnosis_file import Diagnosis, read_diagnosis
+from gsl.grounding.effects import DiagnosedEffects, innermost, switched_on
 from gsl.grounding.servo import LearnedServo
 from gsl.policies.excitation import Excitation
 from gsl.report.flight import Flight

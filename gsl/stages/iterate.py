@@ -6,15 +6,15 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, World
+from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, Trainable, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
 from gsl.core.words import in_unit
 from gsl.errors import ConfigError, Refused
-from gsl.grounding.effects import learned
-from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.effects import innermost, learned
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.preparation import MAKER, without_margins
 from gsl.models.config import ModelConfig
 from gsl.optimizers.objective import Objective, Quantile, check_objective
 from gsl.policies.policy import sized
@@ -30,9 +30,8 @@ from gsl.storage.policy_choice import FILE, policies, record, records, vector
 from gsl.storage.trajectories import DATA, read
 from gsl.training.data import HELDOUT, of_policy
 from gsl.validation.compliance_transfer import SECTION, with_real
-from gsl.validation.gate import REPORT, settled
+from gsl.validation.gate import REPORT
 from gsl.validation.iteration_pictures import draw_flight, draw_walk_and_joint
-from gsl.validation.screening import without_margins
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.gymnasium import try_out
 
@@ -58,7 +57,7 @@ class Iterate:
     forward_model: Annotated[ModelConfig, setting("how f is learned")]
     inverse_model: Annotated[ModelConfig, setting("how the simulator's inverse is learned")]
     inverse_method: Annotated[Literal["regression", "solve"], setting("what the inverse is (train-inverse --help)")]
-    grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
+    grounding: Annotated[Grounding, setting("what stands between action and simulator")]
     optimizer: Annotated[Search | Learner, setting("what improves the parameters")]
     budget: Annotated[Budget, setting("episodes of each part")]
     diagnosis: Annotated[DiagnosisPlan, setting("how grounding=effects finds the effects")]
@@ -184,9 +183,10 @@ class Iterate:
         """Draw what the first iteration's grounding makes of real motions that nothing was learned from, and a walk."""
         place = home / FIRST
         search = Artifact(place / "optimize", manifest.read(place / "optimize"))
-        scenario = settled(Scenario(self.sim, self.task, self.policy, SIM, without_margins(first)), search.metrics)
+        scenario = Scenario(self.sim, self.task, self.policy, SIM, without_margins(first)).prepared(search.metrics)
         if self.learned:
-            heldout = read(place / "train_forward" / HELDOUT)
+            maker = MAKER if isinstance(innermost(first), Trainable) else "train_forward"
+            heldout = read(place / maker / HELDOUT)
             walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
             draw_walk_and_joint(folder, scenario, walk)
         elif (place / EXCITATION).is_dir():
@@ -194,7 +194,7 @@ class Iterate:
             draw_flight(folder, self.sim, scenario, log, vector(self.policy, best), self.seed)
 
 
-def check_aggregate(iterate: Iterate, groundings: Iterable[Grounding | ActionTransformation], name: str) -> None:
+def check_aggregate(iterate: Iterate, groundings: Iterable[Grounding], name: str) -> None:
     """Refuse to keep real trajectories for an f that is fitted once, or never.
 
     Raises:
@@ -205,7 +205,7 @@ def check_aggregate(iterate: Iterate, groundings: Iterable[Grounding | ActionTra
         raise ConfigError(name, problem, given="true")
 
 
-def check_trainable(iterate: Iterate, name: str, grounding: Grounding | ActionTransformation) -> None:
+def check_trainable(iterate: Iterate, name: str, grounding: Grounding) -> None:
     """Refuse what iterations could not train, before anything is asked of the real robot.
 
     Args:

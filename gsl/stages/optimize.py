@@ -14,6 +14,7 @@ from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
+from gsl.grounding.preparation import parents_of, without_margins
 from gsl.optimizers.objective import CVAR, Objective, Quantile, check_objective, objective_values
 from gsl.policies.policy import sized
 from gsl.rollout.parallel import Job, Workers, episodes
@@ -24,10 +25,11 @@ from gsl.storage.generation_log import Generation, GenerationLog
 from gsl.storage.models import model_file
 from gsl.storage.policies import PolicyRecord, write_policies
 from gsl.storage.policy_choice import FILE, PolicyChoice, policies, record, vector
+from gsl.validation.check_grounding import check_grounding
 from gsl.validation.compliance_transfer import report_compliance
 from gsl.validation.drift import drifts, read_region
-from gsl.validation.gate import REPORT, Gate, grounding_parents, settled
-from gsl.validation.screening import Screening, foretells_falls, passing, screen, without_margins
+from gsl.validation.gate import REPORT, Gate
+from gsl.validation.screening import Screening, foretells_falls, passing, screen
 
 BEST = "best_in_simulation.json"
 
@@ -58,7 +60,7 @@ class Optimize:
     world: Annotated[World, setting("the simulator")]
     task: Annotated[Task, setting("what is to be maximised")]
     policy: Annotated[Policy, setting("what is to be improved")]
-    grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and simulator")]
+    grounding: Annotated[Grounding, setting("what stands between action and simulator")]
     optimizer: Annotated[Search | Learner, setting("what improves the parameters")]
     rollouts: Annotated[int, setting("episodes of each candidate", ge=1)]
     screening: Screening = 0
@@ -76,13 +78,13 @@ class Optimize:
 
     def parents(self) -> Mapping[str, Path]:
         """Return the start policy and what the grounding is made of."""
-        return {**PolicyChoice(self.policy, self.initial).parents("initial"), **grounding_parents(self.grounding)}
+        return {**PolicyChoice(self.policy, self.initial).parents("initial"), **parents_of(self.grounding)}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the policies: π0, then one of each generation; and which of these is worth most in simulation."""
         first = PolicyChoice(self.policy, self.initial).parameters()
         bare = Scenario(self.world, self.task, self.policy, SIM, self.grounding)
-        scenario, checked = Gate(first, folder, console, self.accept, self.seed).passed(bare)
+        scenario, checked = check_grounding(bare, Gate(first, folder, console, self.accept, self.seed))
         yielding = report_compliance(
             bare.world, scenario.world, scenario.grounding, folder / REPORT, console, self.seed
         )
@@ -144,7 +146,7 @@ class Optimize:
         """Return the winners that do not fall in the grounded simulator, and what to report of all."""
         if not (self.screening and foretells_falls(self.grounding)):
             return winners, {}
-        scenario = settled(replace(bare, grounding=without_margins(self.grounding)), checked)
+        scenario = replace(bare, grounding=without_margins(self.grounding)).prepared(checked)
         parameters = {winner.policy.name: vector(self.policy, winner.policy) for winner in winners}
         seed = derived_seed(self.seed, self.kind)
         results = screen(scenario, parameters, self.screening, seed, workers=self.workers, console=console)

@@ -13,13 +13,12 @@ from gsl.core.interfaces import REAL, Grounding, Policy, Task, World
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import rank_correlation
-from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.preparation import parents_of
 from gsl.policies.policy import neighbour
 from gsl.rollout.parallel import Job, Workers, episodes
 from gsl.rollout.rollout import Scenario
 from gsl.storage.artifact import Artifact
 from gsl.storage.documents import write_json
-from gsl.validation.gate import grounding_parents, settled
 
 FILE = "values.json"
 
@@ -36,7 +35,7 @@ class Values:
     world: Annotated[World, setting("where they are measured")]
     task: Annotated[Task, setting("what is measured")]
     policy: Annotated[Policy, setting("family of the policies")]
-    grounding: Annotated[Grounding | ActionTransformation, setting("what stands between action and world")]
+    grounding: Annotated[Grounding, setting("what stands between action and world")]
     found: Annotated[Mapping[str, Any], setting("what a search settled of the grounding: alpha, x, width")]
     count: Annotated[int, setting("policies", ge=3)] = 40
     spread: Annotated[float, setting("of the policies, in units of a parameter's scale", gt=0)] = 0.12
@@ -45,11 +44,11 @@ class Values:
 
     def parents(self) -> Mapping[str, Path]:
         """Return what the grounding is made of."""
-        return grounding_parents(self.grounding)
+        return parents_of(self.grounding)
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         """Write the values."""
-        scenario = settled(Scenario(self.world, self.task, self.policy, REAL, self.grounding), self.found)
+        scenario = Scenario(self.world, self.task, self.policy, REAL, self.grounding).prepared(self.found)
         rng = np.random.default_rng(derived_seed(self.seed, self.kind))
         thetas = [neighbour(self.policy, self.policy.initial, self.spread, rng) for _ in range(self.count)]
         jobs = [Job(theta, derived_seed(self.seed, self.kind, index)) for index, theta in enumerate(thetas)]

@@ -29,7 +29,6 @@ from gsl.studies.held_out import MEASURED, check_first_iteration, check_robot, h
 from gsl.studies.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl.studies.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
 from gsl.training.data import FEWEST, degrees
-from gsl.validation.gate import settled
 from gsl.validation.replay import replayed
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
@@ -69,9 +68,7 @@ class Budget:
     forced: ClassVar[str] = GOES_ON
 
     iterate: Annotated[Iterate, setting("what a trial is; its grounding and real budget are replaced")]
-    methods: Annotated[
-        Mapping[str, Grounding | ActionTransformation], setting("transformations of actions, by name", min_length=1)
-    ]
+    methods: Annotated[Mapping[str, Grounding], setting("transformations of actions, by name", min_length=1)]
     budgets: Annotated[
         tuple[Annotated[int, setting("", ge=FEWEST)], ...],
         setting("real trajectories to learn from, the fewest first", min_length=1),
@@ -153,7 +150,7 @@ class Budget:
         ready = chain.ready(place, self.methods[method], None, seed, console)
         found = chain.search(place / "optimize", ready, None, seed, console)
         measured = chain.measure(place / "evaluate", found, seed, console)
-        acting = settled(Scenario(chain.sim, chain.task, chain.policy, SIM, ready), found.metrics).grounding
+        acting = Scenario(chain.sim, chain.task, chain.policy, SIM, ready).prepared(found.metrics).grounding
         assert isinstance(acting, LoadedTransformation), "its world is a robot"
         env: Any = chain.sim.make()
         drawn = derived_seed(seed, "replays")

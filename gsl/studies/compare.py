@@ -15,7 +15,6 @@ from gsl.core.setting import component, setting
 from gsl.core.unit import Unit
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
-from gsl.grounding.gat import ActionTransformation
 from gsl.stages.chain import Chain
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
@@ -51,7 +50,7 @@ class Compare:
 
     iterate: Annotated[Iterate, setting("what a trial is; its worlds and grounding are replaced")]
     worlds: Annotated[Mapping[str, World], setting("the real worlds, by name", min_length=1)]
-    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name", min_length=1)]
+    methods: Annotated[Mapping[str, Grounding], setting("the groundings, by name", min_length=1)]
     trials: Annotated[int, setting("trials of each method", ge=1)]
     simulators: Annotated[
         Mapping[str, World] | None, setting("the simulators, by name; none for the one of iterate")

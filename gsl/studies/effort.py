@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from gsl.core.interfaces import REAL, SIM, Grounding, Search, World
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, innermost, learned
-from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.servo import LearnedServo
 from gsl.rollout.parallel import threads
@@ -78,7 +77,7 @@ def seconds(study: Compare, *, search: bool = True) -> float:
     return (rolled / workers + fitted) * study.trials * len(sims)
 
 
-def _flown(method: Grounding | ActionTransformation) -> tuple[str, ...]:
+def _flown(method: Grounding) -> tuple[str, ...]:
     """Return what a method makes of motions in the air."""
     diagnosed = (method.method,) if isinstance(method, DiagnosedEffects) and not method.effects else ()
     servo = innermost(method)

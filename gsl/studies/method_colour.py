@@ -9,7 +9,7 @@ from gsl.grounding.servo import LearnedServo
 from gsl.report.style import EFFECTS, GAT, SERVO, SGAT, UNINFORMED
 
 
-def method_colour(grounding: Grounding | ActionTransformation) -> str:
+def method_colour(grounding: Grounding) -> str:
     """Return it, as the style's figures have it."""
     if isinstance(innermost(grounding), LearnedServo):
         return SERVO

@@ -19,7 +19,6 @@ from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
 from gsl.grounding.effects import learned
-from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.policy import sized
@@ -57,7 +56,7 @@ class NoiseStudy:
         tuple[Annotated[float, setting("", ge=0)], ...],
         setting("standard deviations of the real worlds' noise", min_length=1),
     ]
-    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name", min_length=1)]
+    methods: Annotated[Mapping[str, Grounding], setting("the groundings, by name", min_length=1)]
     further: Annotated[Search | Trpo, setting("how it goes on from π0")]
     trials: Annotated[int, setting("trials of each method", ge=1)]
     sims: Annotated[Mapping[str, GymnasiumWorld], setting("simulators of worlds that have one of their own")] = field(
@@ -183,7 +182,7 @@ class NoiseStudy:
         self,
         of: Callable[..., Point],
         chain: Chain,
-        grounding: Grounding | ActionTransformation,
+        grounding: Grounding,
         first: Path,
         place: Path,
         start: str,

@@ -32,6 +32,7 @@ from gsl.studies.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl.studies.yielding import Loads
 from gsl.training.data import degrees, of_policy
 from gsl.validation.check import asked
+from gsl.validation.check_grounding import check_grounding
 from gsl.validation.compliance import joint_groups
 from gsl.validation.gate import Gate
 from gsl.validation.replay import replayed
@@ -59,7 +60,7 @@ class Replays:
 
     iterate: Annotated[Iterate, setting("what a trial is; its worlds and grounding are replaced")]
     worlds: Annotated[Mapping[str, World], setting("the real worlds, by name", min_length=1)]
-    methods: Annotated[Mapping[str, Grounding | ActionTransformation], setting("the groundings, by name", min_length=1)]
+    methods: Annotated[Mapping[str, Grounding], setting("the groundings, by name", min_length=1)]
     trials: Annotated[int, setting("trials of each method", ge=1)]
     gains: Annotated[
         str | tuple[str, ...] | None,
@@ -129,7 +130,7 @@ class Replays:
         ready = chain.ready(below / method / name, grounding, None, seed, console)
         gate = Gate(chain.policy.initial, below / method / name, Silent(), accept=True, seed=seed)
         gate.folder.mkdir(parents=True, exist_ok=True)
-        scenario, found = gate.passed(Scenario(chain.sim, chain.task, chain.policy, SIM, ready))
+        scenario, found = check_grounding(Scenario(chain.sim, chain.task, chain.policy, SIM, ready), gate)
         acting, reach = scenario.grounding, None
         env: Any = scenario.world.make()
         drawn = derived_seed(seed, "replays")

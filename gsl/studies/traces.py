@@ -22,6 +22,7 @@ from gsl.models.ensemble import Forward
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.markdown import table
 from gsl.rollout.rollout import Scenario, rollout
+from gsl.stages.chain_training import train_transformation
 from gsl.stages.iterate import Iterate, check_trainable
 from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.studies.duration import duration_told
@@ -136,7 +137,7 @@ def trained(iterate: Iterate, home: Path, console: Any) -> LoadedTransformation:
     assert isinstance(iterate.grounding, ActionTransformation), "_check has refused others"
     console.status(f"{duration_told(seconds_of_models(iterate))} from nothing; what is built is not built again")
     chain = replace(iterate.chain, accept=True)
-    ready = chain.trained(home, iterate.grounding, None, iterate.seed, console)
+    ready = train_transformation(chain, home, iterate.grounding, None, iterate.seed, console)
     loaded = ready.load(read_forward_model, read_inverse_model)
     assert isinstance(loaded, LoadedTransformation), "the world is a robot"
     return loaded

@@ -14,6 +14,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import InputError
 from gsl.grounding.gat import LoadedTransformation
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.preparation import without_margins
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.training.data import FALLS, of_policy
 from gsl.validation.reachability import Reachability, reachability
@@ -37,7 +38,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
     """Measure a grounding: its replays as it is expected, π0 with its draws and noise.
 
     Args:
-        scenario: The simulator with the task, the policy and a `LoadedTransformation`.
+        scenario: The simulator with the task, the policy and a grounding that is ready to act.
         parameters: Of π0, shape (n_parameters,).
         heldout: Real trajectories that no model has seen.
         seed: Of all randomness.
@@ -53,16 +54,17 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         periods = f"{heldout.control_period:g} s, not the world's {layout.control_period:g} s"
         raise InputError(f"the held-out trajectories have a control period of {periods}")
     grounding = scenario.grounding
-    assert isinstance(grounding, LoadedTransformation), "only learned groundings are checked so"
+    transformation = grounding if isinstance(grounding, LoadedTransformation) else None
+    expected = transformation.expected if transformation else without_margins(grounding)
     lacking = tuple(dict.fromkeys(part for episode in heldout.episodes for part in missing(episode, layout)))
     env = scenario.world.make()
     try:
         deviations = {
-            group: _compared(env, grounding.expected, of_policy(heldout, pi0=group == PI0), seed)
+            group: _compared(env, expected, of_policy(heldout, pi0=group == PI0), seed)
             for group in (PI0, OFF)
             if not lacking
         }
-        reach = None if lacking else asked(env, grounding, heldout.episodes, seed)
+        reach = asked(env, transformation, heldout.episodes, seed) if transformation and not lacking else None
     finally:
         env.close()
     ran = pi0_in(scenario, parameters, derived_seed(seed, EPISODES))
@@ -73,7 +75,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         sum(fell for _, fell in ran),
         np.array([value for value, _ in ran]),
         allowed_falls(heldout),
-        grounding.alpha,
+        transformation.alpha if transformation else None,
         reach,
         sum(one.ended_in_a_fall for one in of_policy(heldout, pi0=False)),
         lacking,

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from gsl.grounding.effects import Diagnosis
+from gsl.grounding.diagnosis_file import Diagnosis, read_diagnosis
+from gsl.grounding.effects import DiagnosedEffects, switched_on
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.servo import LearnedServo
 from gsl.rollout.rollout import Scenario
 from gsl.validation.check import pi0_in
+from gsl.validation.check_grounding import check_grounding
+from gsl.validation.gate import REPORT, Gate, Passed, examine
 
 
 def check_effects(found: Diagnosis, scenario: Scenario, parameters: np.ndarray, seed: int) -> dict[str, Any]:
@@ -34,3 +41,25 @@ def check_effects(found: Diagnosis, scenario: Scenario, parameters: np.ndarray, 
         "acceptable": not problems,
         "problems": problems,
     }
+
+
+@examine.register
+def check_diagnosed_effects(grounding: DiagnosedEffects, scenario: Scenario, gate: Gate) -> Passed:
+    """Switch effects on; an inner grounding that learns is checked in the world that they make."""
+    found = grounding.load(read_diagnosis)
+    gate.console.status(found.told)
+    about = {"effects": list(found.causes), "diagnosis": found.verdict}
+    inside = replace(scenario, world=switched_on(scenario.world, found), grounding=grounding.inner)
+    ready, checked = check_grounding(inside, gate)
+    own, path = isinstance(grounding.inner, ActionTransformation | LearnedServo), gate.folder / REPORT
+    before = json.loads(path.read_text(encoding="utf-8")) if own and path.exists() else {}
+    ready = replace(ready, world=grounding.drawn(ready.world, found))
+    if grounding.draws or not own:
+        report = check_effects(found, ready, gate.parameters, gate.seed_of("check"))
+        gate.report({**before, "drawn": report} if own else report)
+        passed = report["acceptable"] and checked.get("grounding_acceptable", True)
+        checked = {**checked, "grounding_acceptable": passed}
+        gate.judge(report["problems"], "Diagnose again")
+    if grounding.draws:
+        gate.show_members(ready.world)
+    return Passed(ready, {**about, **checked})

@@ -7,7 +7,6 @@ policy falls in it about as often as on the robot (docs/torque.md), and falling 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -15,12 +14,8 @@ import numpy as np
 from gsl.core.interfaces import Grounding
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import setting
-from gsl.grounding.ane import ActionNoise
-from gsl.grounding.effects import DiagnosedEffects, innermost, with_innermost
-from gsl.grounding.gat import ActionTransformation
-from gsl.grounding.none import NoGrounding
+from gsl.grounding.effects import DiagnosedEffects, innermost
 from gsl.grounding.servo import LearnedServo
-from gsl.grounding.torque_noise import TorqueNoise
 from gsl.rollout.parallel import Job, episodes
 from gsl.rollout.rollout import Scenario
 
@@ -47,18 +42,6 @@ class Screened(NamedTuple):
 def foretells_falls(grounding: Grounding) -> bool:
     """Whether the simulator yields as the robot does: a servo was learned or effects were diagnosed."""
     return isinstance(grounding, DiagnosedEffects) or isinstance(innermost(grounding), LearnedServo)
-
-
-def without_margins(grounding: Grounding) -> Grounding:
-    """Return a grounding without the noise and the draws that a search has on top."""
-    inner = innermost(grounding)
-    if isinstance(grounding, DiagnosedEffects):
-        grounding = replace(grounding, draws=False)
-    if isinstance(inner, LearnedServo):
-        return with_innermost(grounding, replace(inner, torque_noise=0.0, noise=0.0, ensemble=False))
-    if isinstance(inner, ActionTransformation):
-        return with_innermost(grounding, replace(inner, noise=0.0))
-    return with_innermost(grounding, NoGrounding()) if isinstance(inner, TorqueNoise | ActionNoise) else grounding
 
 
 def screen(

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from gsl.grounding.servo import LearnedServo
 from gsl.models.servo_file import MAKER
 from gsl.rollout.rollout import Scenario
 from gsl.storage.references import load
 from gsl.training.servo_verdict import problems, problems_of_members, remarks
 from gsl.validation.check import pi0_in
+from gsl.validation.gate import Gate, Passed, examine
 
 
 def check_servo(
@@ -38,3 +40,17 @@ def check_servo(
         "problems": found,
         "remarks": remarks(metrics),
     }
+
+
+@examine.register
+def check_learned_servo(grounding: LearnedServo, scenario: Scenario, gate: Gate) -> Passed:
+    """Switch a learned servo on, if it is near enough to the log that it was learned from."""
+    ready, place = scenario.prepared(), grounding.at_its_place().servo
+    report = check_servo(place, ready, gate.parameters, gate.seed_of("check"), ensemble=grounding.ensemble)
+    gate.report(report)
+    for line in report["remarks"]:
+        gate.console.status(f"warning: {line}")
+    gate.judge(report["problems"], "Log more motions, or learn on top of a diagnosis (grounding=effects_servo)")
+    floors = {"floors_before": report["floors_before"], "floors_after": report["floors_after"]}
+    gate.show_members(ready.world)
+    return Passed(ready, {"servo": floors, "grounding_acceptable": report["acceptable"]})

@@ -2,14 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from gsl.diagnosis.world_file import DIGITS
 from gsl.grounding.draws import UncertainCause
-from gsl.grounding.effects import Diagnosis
-from gsl.storage.diagnosis_report import report_of
+from gsl.storage.diagnosis_report import DIGITS, report_of
 from gsl.storage.references import load
+
+MANY = 6  # effects, more of which are counted and not named
+DOUBT = "In the task that may be no nearer: compare with grounding=ane and grounding=gat."  # docs/results/withheld.md
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a diagnosis says of a simulator.
+
+    Attributes:
+        verdict: `no_gap`, `causes`, `inseparable`, `unknown`; `given` or `identified` where nobody diagnosed.
+        causes: Names of the effects that it names.
+        summary: In a sentence.
+        robot: That was simulated.
+        simulated: The `effects:` of the simulator as it was.
+        effects: What it lacks, its calibration included.
+        before, after: The held-out gap without and with them, in noise floors; None where nobody measured.
+        uncertain: Causes with their probabilities and intervals, as far as it tells them.
+    """
+
+    verdict: str
+    causes: tuple[str, ...]
+    summary: str
+    robot: str
+    simulated: Mapping[str, Any]
+    effects: Mapping[str, Any]
+    before: float | None = None
+    after: float | None = None
+    uncertain: tuple[UncertainCause, ...] = ()
+
+    @property
+    def told(self) -> str:
+        """What is done with it, in a sentence."""
+        if not self.causes:
+            kept = "Nothing is switched on: the simulator is taken as it is, calibrated joint by joint."
+            return f"{kept} {DOUBT}" if self.verdict == "unknown" else kept
+        return f"Switched on in the simulator: {named(self.causes)}."
+
+
+def named(causes: Sequence[str]) -> str:
+    """Return effects by name, or only how many they are."""
+    names = tuple(dict.fromkeys(causes))
+    return ", ".join(names) if len(names) <= MANY else f"{len(names)} effects"
 
 
 def read_diagnosis(reference: str, kind: str) -> Diagnosis:

@@ -1,0 +1,47 @@
+"""Preparing any grounding: what it is made of, the world that it makes, and what acts in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gsl.core.checkpoint import read_checkpoint
+from gsl.core.interfaces import Grounding, HasMargins, Preparable, Prepared, Trainable, World
+from gsl.errors import ConfigError
+from gsl.storage.references import resolve
+
+MODEL, KIND, MAKER = "grounding_model.safetensors", "grounding", "train_grounding"
+
+
+def parents_of(grounding: Any, path: str = "grounding") -> Mapping[str, Path]:
+    """Return the artifacts that a grounding is made of, by role; `path` is the setting that it is."""
+    if isinstance(grounding, Preparable):
+        return grounding.parents(path)
+    return {f"{path}.model": _trained(grounding)} if isinstance(grounding, Trainable) else {}
+
+
+def prepare(grounding: Grounding, world: World, settled: Mapping[str, Any] | None = None) -> Prepared:
+    """Return the world that a grounding makes and what acts in it, with what a search has settled.
+
+    Raises:
+        ConfigError: The world is not of a kind that it is for, or what it has learned is missing.
+    """
+    if isinstance(grounding, Preparable):
+        return grounding.prepare(world, settled or {})
+    if isinstance(grounding, Trainable):
+        place = _trained(grounding)
+        arrays, _ = read_checkpoint(place / MODEL if place.is_dir() else place, kind=KIND)
+        return Prepared(world, grounding.load(arrays))
+    return Prepared(world, grounding)
+
+
+def without_margins(grounding: Grounding) -> Grounding:
+    """Return a grounding without the noise and the draws that a search has on top."""
+    return grounding.without_margins() if isinstance(grounding, HasMargins) else grounding
+
+
+def _trained(grounding: Trainable) -> Path:
+    if not grounding.model:
+        raise ConfigError("grounding.model", "is missing; name a run of gsl train-grounding")
+    return resolve(grounding.model, kind=MAKER)

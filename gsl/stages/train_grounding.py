@@ -1,0 +1,68 @@
+"""Train a grounding: let one with a model of its own learn from trajectories, most of them real."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from gsl.core.interfaces import REAL, SIM, Evidence, Trainable
+from gsl.core.setting import component, setting
+from gsl.errors import ConfigError
+from gsl.grounding.preparation import KIND, MAKER, MODEL
+from gsl.storage.checkpoints import write_checkpoint
+from gsl.storage.trajectories import data_file, read, write
+from gsl.training.data import FALLS, HELDOUT, of_policy, parts
+
+
+@component
+class TrainGrounding:
+    """Lets a grounding learn from a part of the real trajectories, and stores the others beside its model."""
+
+    kind: ClassVar[str] = MAKER
+
+    grounding: Annotated[Trainable, setting("what learns")]
+    real: Annotated[str | None, setting("real trajectories: a file, or a run or artifact of collect")] = None
+    sim: Annotated[str | None, setting("simulated trajectories of the same policies")] = None
+    heldout: Annotated[float, setting("share of the real trajectories that is held out", gt=0, lt=1)] = 0.2
+    seed: Annotated[int, setting("of the split and of the fit", ge=0)] = 1
+
+    def __post_init__(self) -> None:
+        """Refuse a grounding without the trajectories that it needs.
+
+        Raises:
+            ConfigError: They are missing, or it needs something else.
+        """
+        for role in self.grounding.needs:
+            if role not in (REAL, SIM):
+                raise ConfigError("grounding.needs", f"is of {REAL} and {SIM}", given=role)
+            if getattr(self, role) is None:
+                raise ConfigError(role, f"is missing; the grounding learns from {role} trajectories")
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the files of trajectories, or the artifacts."""
+        named = {role: reference for role in (REAL, SIM) if (reference := getattr(self, role)) is not None}
+        files = {role: data_file(reference) for role, reference in named.items()}
+        return {role: path if path == Path(named[role]) else path.parent for role, path in files.items()}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        """Write what was learned, and the real trajectories that it was not learned from."""
+        console.status("the grounding learns")
+        real, count = None, 0
+        if self.real is not None:
+            data = parts(data_file(self.real), other=SIM, share=self.heldout, seed=self.seed)
+            episodes = (*data.training.episodes, *data.validation.episodes)
+            labels = [one for part in (data.training, data.validation) for one in part.metadata["episodes"]]
+            real = replace(data.training, episodes=episodes, metadata={**data.training.metadata, "episodes": labels})
+            own = [one for part in data for one in of_policy(part, pi0=True)]
+            falls = float(np.mean([one.ended_in_a_fall for one in own])) if own else 0.0
+            write(folder / HELDOUT, replace(data.heldout, metadata={**data.heldout.metadata, FALLS: falls}))
+            count = len(real)
+        sim = None if self.sim is None else read(data_file(self.sim))
+        arrays = self.grounding.learn(Evidence(real, sim), self.seed)
+        name = f"{type(self.grounding).__module__}.{type(self.grounding).__qualname__}"
+        write_checkpoint(folder / MODEL, arrays, {"kind": KIND, "class": name})
+        return {"trajectories": count, "arrays": {key: list(values.shape) for key, values in arrays.items()}}

@@ -1,0 +1,171 @@
+"""A grounding with a model and an optimiser of a user's own: one file and one yaml each, in his folder."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import SMALL, done, refused
+
+from gsl.core.checkpoint import read_checkpoint
+from gsl.grounding.preparation import KIND, MODEL
+from gsl.robots.nao import nao
+
+GROUNDING = '''
+"""Actions move as much less far in the simulator as the real joints move less fast."""
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from gsl.core.interfaces import Trainable
+from gsl.core.setting import component, setting
+
+
+@component
+class Shrink(Trainable):
+    """Learns the ratio of mean speeds, joint by joint."""
+
+    needs: ClassVar[tuple[str, ...]] = ("real", "sim")
+    model: Annotated[str, setting("path or run of train-grounding")] = ""
+    most: Annotated[float, setting("of the ratio", gt=0)] = 1.0
+
+    def learn(self, evidence, seed):
+        real, sim = (np.concatenate([np.abs(one.velocity) for one in part.episodes]).mean(axis=0) + 1e-6
+                     for part in (evidence.real, evidence.sim))
+        return {"ratio": np.minimum(self.most, real / sim)}
+
+    def load(self, arrays):
+        return Shrunk(arrays["ratio"])
+
+
+class Shrunk:
+    def __init__(self, ratio):
+        self.ratio = ratio
+
+    def start(self, layout, rng):
+        self.place = layout["position"]
+        return self
+
+    def transform(self, observation, action):
+        here = observation[self.place]
+        return here + self.ratio * (action - here)
+'''
+
+OPTIMISER = '''
+"""Random search around the best so far."""
+from typing import Annotated
+
+import numpy as np
+
+from gsl.core.setting import component, setting
+
+
+@component
+class RandomSearch:
+    """Draws candidates around the best one that it has seen."""
+
+    candidates: Annotated[int, setting("of a generation", ge=1)] = 3
+    generations: Annotated[int, setting("generations", ge=1)] = 2
+    spread: Annotated[float, setting("in units of a parameter's scale", gt=0)] = 0.05
+
+    def start(self, parameters, scale, seed):
+        return Run(self, np.asarray(parameters), scale, np.random.default_rng(seed))
+
+
+class Run:
+    def __init__(self, settings, best, scale, rng):
+        self.settings, self.best, self.scale, self.rng, self.value = settings, best, scale, rng, -np.inf
+
+    def ask(self):
+        count, size = self.settings.candidates, len(self.best)
+        steps = self.settings.spread * self.scale * self.rng.standard_normal((count, size))
+        self.asked = [self.best + step for step in steps]
+        return self.asked
+
+    def tell(self, values):
+        if max(values) > self.value:
+            self.value, self.best = max(values), self.asked[int(np.argmax(values))]
+'''
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A user's folder: two modules, and a yaml file of each."""
+    folder: Path = tmp_path_factory.mktemp("own")
+    (folder / "own_grounding.py").write_text(GROUNDING)
+    (folder / "own_optimiser.py").write_text(OPTIMISER)
+    for group, text in {
+        "grounding/shrink": "_target_: own_grounding.Shrink\nmodel: ''\nmost: 1.0\n",
+        "optimizer/random_search": "_target_: own_optimiser.RandomSearch\ncandidates: 3\ngenerations: 2\n",
+    }.items():
+        path = folder / f"mine/{group}.yaml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def importable(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(home))
+
+
+OWN = ("--config-dir", "mine")
+
+
+@pytest.fixture(scope="module")
+def iterated(home: Path) -> Path:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(home))
+        done("iterate", *OWN, *SMALL, "grounding=shrink", "optimizer=random_search", "accept=true",
+             "name=own", folder=home)  # fmt: skip
+    return home / "runs/own"
+
+
+def test_an_iteration_trains_checks_and_searches_with_both(iterated: Path) -> None:
+    first = iterated / "iteration_01"
+    arrays, about = read_checkpoint(first / "train_grounding" / MODEL, kind=KIND)
+    assert about["class"] == "own_grounding.Shrink"
+    assert arrays["ratio"].max() <= 1.0
+    report = json.loads((first / "optimize/grounding.json").read_text())
+    assert set(report["errors"]["pi0"]) == {"grounded", "ungrounded", "no_change"}
+    generations = [json.loads(line) for line in (first / "optimize/generations.jsonl").read_text().splitlines()]
+    assert [len(one["values"]) for one in generations] == [3, 3]
+
+
+def test_what_is_held_out_is_not_learned_from(iterated: Path) -> None:
+    metrics = json.loads((iterated / "iteration_01/train_grounding/metrics.json").read_text())
+    collected = json.loads((iterated / "iteration_01/collect_real/metrics.json").read_text())
+    assert 0 < metrics["trajectories"] < collected["episodes"]
+    assert metrics["arrays"] == {"ratio": [len(nao().controlled)]}
+
+
+def test_the_same_by_hand(iterated: Path, home: Path) -> None:
+    """What `iterate` does, stage by stage: the same model comes out."""
+    data = ("real=runs/own/iteration_01/collect_real", "sim=runs/own/iteration_01/collect_sim")
+    done("train-grounding", *OWN, "+grounding@grounding=shrink", *data, "name=hand", folder=home)
+    here, there = (
+        read_checkpoint(home / f"runs/{place}/train_grounding" / MODEL, kind=KIND)[0]
+        for place in ("hand", "own/iteration_01")
+    )
+    np.testing.assert_array_equal(here["ratio"], there["ratio"])
+    chosen = ("grounding=shrink", "grounding.model=hand", "optimizer=random_search", "accept=true", "name=hand")
+    done("optimize", *OWN, *SMALL, *chosen, folder=home)
+
+
+def test_both_appear_in_compare(iterated: Path, home: Path) -> None:
+    methods = [f"~methods.{name}" for name in ("ane_01", "gat", "gat_005", "effects", "effects_gat")]
+    own = ("+grounding@methods.shrink=shrink", "optimizer@iterate.optimizer=random_search", "trials=1")
+    done("compare", *OWN, *SMALL[:1], "iterate.task.duration=1.6", "iterate.workers=1", *methods, "~worlds.nao_weak",
+         *own, "name=set", folder=home)  # fmt: skip
+    assert "| shrink |" in (home / "runs/set/compare/table.md").read_text()
+
+
+def test_what_is_missing_is_said_in_one_line(home: Path) -> None:
+    said = refused("optimize", *OWN, "grounding=shrink", "name=refused", folder=home)
+    assert said == "grounding.model: is missing; name a run of gsl train-grounding"
+    said = refused("train-grounding", *OWN, "+grounding@grounding=shrink", "name=refused", folder=home)
+    assert said == "real: is missing; the grounding learns from real trajectories"
+    said = refused("optimize", *OWN, "grounding=shrink", "grounding.most=-1", "name=refused", folder=home)
+    assert "grounding.most" in said
