@@ -286,15 +286,9 @@ class Learner(Protocol):
         """Steps that it takes in the simulator, none of one that asks for its table."""
 
     def learn(
-        self,
-        simulator: Simulator,
-        policy: Policy,
-        parameters: np.ndarray,
-        seed: int,
-        *,
-        bold: bool,
-        advance: Callable[[int], None],
-    ) -> Iterator[np.ndarray]:
+        self, simulator: Simulator, policy: Policy, parameters: np.ndarray, seed: int, *,
+        bold: bool, advance: Callable[[int], None],
+    ) -> Iterator[np.ndarray]:  # fmt: skip
         """Yield the parameters after each generation.
 
         Args:
