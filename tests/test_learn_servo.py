@@ -13,7 +13,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.experiment import Experiment, experiment
 from gsl.diagnosis.records import slope
 from gsl.effects.effect import applied, built
-from gsl.errors import InputError
+from gsl.errors import ConfigError, InputError
 from gsl.models.servo import ServoModel, neutral, with_group, without_group
 from gsl.robots.go2 import go2
 from gsl.robots.pendulum import pendulum
@@ -127,6 +127,11 @@ def played_by_bullet(plant: Plant, *, motions: int = 12, seconds: float = 4.0) -
     env.close()
     labels = [{"policy": f"motion_{k}"} for k in range(motions)]
     return Batch(tuple(episodes), ROBOT.controlled, PERIOD, metadata={"episodes": labels})
+
+
+def test_a_torque_hook_is_refused_where_it_would_be_left_out() -> None:
+    with pytest.raises(ConfigError, match="effects: the torque hook pushed acts in Bullet alone"):
+        Held.of(replace(nominal(ROBOT), hook=pushed), STEP, PERIOD)
 
 
 def test_a_network_learns_what_no_number_says() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import SMALL, done, refused
+from commands import SMALL, done, gsl, refused
 
 from gsl.core.checkpoint import read_checkpoint
 from gsl.grounding.preparation import KIND, MODEL
@@ -90,14 +90,47 @@ class Run:
 '''
 
 
+PLAIN = '''
+"""All joints go too far."""
+from gsl.core.setting import component
+
+
+@component
+class TooFar:
+    def start(self, layout, rng):
+        return self
+
+    def transform(self, observation, action):
+        return action + 0.7
+'''
+
+TASK = '''
+"""A walk that is worth its distance in feet."""
+from typing import ClassVar
+
+from gsl.core.setting import component
+from gsl.tasks.walk import Walk
+
+
+@component
+class Feet(Walk):
+    unit: ClassVar[str] = "ft/s"
+    shown: ClassVar[float] = 3.28
+'''
+
+
 @pytest.fixture(scope="module")
 def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A user's folder: two modules, and a yaml file of each."""
     folder: Path = tmp_path_factory.mktemp("own")
     (folder / "own_grounding.py").write_text(GROUNDING)
     (folder / "own_optimiser.py").write_text(OPTIMISER)
+    (folder / "own_task.py").write_text(TASK)
+    (folder / "own_plain.py").write_text(PLAIN)
     for group, text in {
         "grounding/shrink": "_target_: own_grounding.Shrink\nmodel: ''\nmost: 1.0\n",
+        "grounding/plain": "_target_: own_plain.TooFar\n",
+        "task/feet": "_target_: own_task.Feet\nduration: 1.6\nfall_cost: 0.15\n",
         "optimizer/random_search": "_target_: own_optimiser.RandomSearch\ncandidates: 3\ngenerations: 2\n",
     }.items():
         path = folder / f"mine/{group}.yaml"
@@ -169,3 +202,16 @@ def test_what_is_missing_is_said_in_one_line(home: Path) -> None:
     assert said == "real: is missing; the grounding learns from real trajectories"
     said = refused("optimize", *OWN, "grounding=shrink", "grounding.most=-1", "name=refused", folder=home)
     assert "grounding.most" in said
+
+
+def test_a_task_of_ones_own_is_shown_in_its_unit(home: Path) -> None:
+    said = done("collect", *OWN, "task=feet", "preset=toy", "workers=1", "name=feet", "world=nao_ideal", folder=home)
+    assert "[ft/s]" in said.out
+    assert " ft/s" in done("runs", folder=home).out
+
+
+def test_a_grounding_that_nothing_is_known_of_is_checked_by_falls(home: Path) -> None:
+    said = gsl("optimize", *OWN, *SMALL, "task.duration=4", "grounding=plain", "name=plain", folder=home)
+    assert "TooFar is no grounding of gsl's: only the falls of π0 in it are checked" in said.err
+    assert said.code == 1
+    assert "π0 falls in 4 of 4 episodes of the grounded simulator. Let TooFar change less" in said.lines[-1]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from gsl.errors import GslError
 from gsl.rollout import parallel
 from gsl.rollout.parallel import Job, episodes, trajectories
 from gsl.rollout.rollout import Scenario, rollout
+from gsl.worlds.bullet import BulletWorld
 
 
 def _jobs(scenario: Scenario, count: int = 4) -> list[Job]:
@@ -74,6 +77,28 @@ def _in_parallel(function: Callable[..., int], tmp_path: Path) -> list[int]:
     jobs = [Job(np.zeros(1), seed) for seed in range(10, 16)]
     with QUIET.progress(len(jobs), "") as progress:
         return parallel.in_parallel(partial(function, tmp_path / "died"), arm(), jobs, 2, progress)
+
+
+class Closure:
+    """A grounding of a user's own that holds a function without a name."""
+
+    def __init__(self) -> None:
+        self.change = lambda action: action
+
+    def start(self, *_: object) -> Closure:
+        return self
+
+
+def test_a_component_with_a_closure_is_refused_in_one_line() -> None:
+    scenario = replace(walk(), grounding=Closure())  # type: ignore[arg-type]
+    with pytest.raises(GslError, match=r"cannot go to the worker processes .*lambda.*; give its object plain fields"):
+        _run(scenario, _jobs(scenario, 1), 1)
+
+
+def test_a_world_whose_effect_hooks_a_closure_goes_to_workers() -> None:
+    world = BulletWorld(robot="nao", effects={})
+    vars(world)["plant"] = replace(world.plant, hook=lambda motion, time: 0.0 * motion[0])
+    assert pickle.loads(pickle.dumps(world)).plant.hook is None  # built anew from the effects, which have none
 
 
 def test_a_killed_worker_costs_only_its_own_jobs(tmp_path: Path) -> None:

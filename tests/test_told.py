@@ -95,6 +95,27 @@ def test_where_pi0_is_returned_nothing_is_gained() -> None:
     assert rounds.metrics()["gain"] == {"value": -14.6 + 20.0, "interval": [3.0, 8.0], "share": None}
 
 
+@pytest.mark.parametrize(
+    ("after", "low", "title"),
+    [
+        (-14.6, 3.0, "Real side: -14.6, π0 -20.0"),
+        (-19.5, -3.0, "Real side: -19.5, π0 -20.0; the gain is not significant"),
+        (-21.0, -3.0, "Real side: π0 is returned, -20.0"),
+    ],
+)
+def test_a_curve_says_what_the_table_says(after: float, low: float, title: str) -> None:
+    rounds = Rounds(OwnReward())
+    rounds.add(evaluation(-20.0, after, low, 8.0), 10)
+    assert rounds.title == title
+
+
+def test_a_curve_says_what_came_out_without_grounding() -> None:
+    rounds = Rounds(Walk())
+    rounds.add(evaluation(0.2, 0.25, 0.02, 0.08), 10)
+    rounds.add_beside(evaluation(0.2, 0.22, 0.01, 0.03))
+    assert rounds.title == "Real side: 25.0 cm/s with grounding, 22.0 without, π0 20.0"
+
+
 def test_an_environment_that_ends_has_not_fallen() -> None:
     robot, environment = Rounds(Walk()), Rounds(OwnReward())
     for rounds in (robot, environment):

@@ -12,9 +12,8 @@ One episode (gsl/rollout/rollout.py) uses four of them:
         reward      = task.step(before, observation, fell)
 
 `optimize` lets the fifth choose the parameters of a policy: a `Search` by values of episodes, a `Learner` by steps of
-its own. A component is a frozen dataclass (`gsl.core.setting.component`): its fields are its settings, and it can
-be pickled. What changes in an episode is in the object that `start` returns. The layout says where each quantity stands
-in an observation, which is a flat vector, shape (layout.size,).
+its own. A component is a frozen dataclass (`gsl.core.setting.component`) that can be pickled; its fields are settings.
+What changes in an episode is in the object that `start` returns. An observation is flat, shape (layout.size,).
 """
 
 from __future__ import annotations

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -15,18 +14,8 @@ Metrics = Mapping[str, Any]
 
 
 def unit_of(artifact: Artifact) -> Unit:
-    """Return the unit of the task that an artifact's settings name; the bare value if the task is not gsl's."""
-    config = artifact.config
-    task = config.get("task") or config.get("iterate", {}).get("task") or {}
-    name = task.get("_target_", "") if isinstance(task, Mapping) else ""
-    if not str(name).startswith("gsl.tasks."):
-        return Unit()
-    try:
-        module, _, attribute = str(name).rpartition(".")
-        kind = getattr(importlib.import_module(module), attribute)
-        return Unit.of(kind)
-    except (ImportError, ValueError, AttributeError):
-        return Unit()
+    """Return the unit of an artifact's task; the bare value where there is none."""
+    return Unit(**artifact.manifest.unit) if artifact.manifest.unit else Unit()
 
 
 def headline(artifact: Artifact) -> str:

@@ -157,8 +157,20 @@ class Rounds:
         """Return the panels of the learning curve."""
         found = [self._search(f"iteration {k + 1}", one, f"π{k}") for k, one in enumerate(self._done)]
         if self._beside is not None:
-            found.append(self._search("without grounding", self._beside, "π0")._replace(bare=True))
+            found.append(self._search("without grounding", self._beside, "π0"))
         return found
+
+    @property
+    def title(self) -> str:
+        """What came out, in a line, with the figures of the table."""
+        figures, unit = self.metrics(), self._unit
+        before, after = unit.bare(figures["baseline"]["value"]), unit.shown(figures["returned"]["value"])
+        with_it = " with grounding" if self._beside else ""
+        without = f", {unit.bare(self._beside.metrics['returned']['value'])} without" if self._beside else ""
+        if self.best is None:
+            return f"Real side: π0 is returned{with_it}, {after}{without}"
+        doubt = "" if figures["gain"]["interval"][0] > 0.0 else "; the gain is not significant"
+        return f"Real side: {after}{with_it}{without}, π0 {before}{doubt}"
 
     @property
     def unit(self) -> str:
@@ -193,4 +205,4 @@ def write_table(folder: Path, rounds: Rounds, remarks: Sequence[str] = ()) -> No
 
 def write_curve(folder: Path, rounds: Rounds) -> None:
     """Write the learning curve of all iterations, and of the search without grounding if there was one."""
-    learning_curve(folder / CURVE, rounds.searches(), unit=rounds.unit)
+    learning_curve(folder / CURVE, rounds.searches(), unit=rounds.unit, title=rounds.title)

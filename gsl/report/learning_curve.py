@@ -49,20 +49,18 @@ class Search(NamedTuple):
         points: Where it starts, then the best of each generation.
         confirmed: The returned policy measured again on fresh episodes, if it was.
         start: Name of the policy where it starts.
-        bare: Whether it is without grounding, there to compare the others with.
     """
 
     label: str
     points: Sequence[Point]
     confirmed: Point | None = None
     start: str = "π0"
-    bare: bool = False
 
 
 def search(
     label: str, evaluation: Mapping[str, Any], *, shown: float = 1.0, returned: str | None = None, start: str = "π0"
 ) -> Search:
-    """Return what an `evaluation.json` holds.
+    """Return what an `evaluation.json` holds; the start has its value of the report, as in the table.
 
     Args:
         label: Heading of its panel.
@@ -71,13 +69,16 @@ def search(
         returned: Name of the policy that was chosen.
         start: Name for people of the policy where the search starts.
     """
-    fresh = [row for row in evaluation["confirmation"] if row["name"] == returned and row["generation"]]
-    confirmed = points(fresh, shown=shown)[0] if fresh else None
+    fresh = {row["name"]: row for row in evaluation["confirmation"]}
+    best = fresh.get(returned or "")
+    confirmed = _point(best, shown) if best and best["generation"] else None
     later = [(one["name"], one["falls"]) for phase in ("check", "confirmation") for one in evaluation[phase]]
     found = [
         point._replace(later=sum(falls for name, falls in later if name == row["name"]))
         for row, point in zip(evaluation["policies"], points(evaluation["policies"], shown=shown), strict=True)
     ]
+    if (begun := evaluation["policies"][0]["name"]) in fresh:
+        found[0] = _point(fresh[begun], shown)._replace(later=found[0].later)
     return Search(label, found, confirmed, start)
 
 
@@ -86,19 +87,18 @@ def points(rows: Sequence[Mapping[str, Any]], *, shown: float = 1.0) -> list[Poi
     return [_point(row, shown) for row in rows]
 
 
-def learning_curve(path: Path, searches: Sequence[Search], *, unit: str, title: str | None = None) -> None:
+def learning_curve(path: Path, searches: Sequence[Search], *, unit: str, title: str) -> None:
     """Write the figure of the searches as a PNG file; arguments as those of `learning_curve_figure`."""
     save(learning_curve_figure(searches, unit=unit, title=title), path)
 
 
-def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str | None = None) -> Figure:
+def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str) -> Figure:
     """Return the figure of the searches.
 
     Args:
         searches: Panels from left to right.
         unit: Of all values.
-        title: By default how many of the generations' best stay on their feet in real, if some fall, and are above
-            their start; beside a search without grounding, what both return.
+        title: The finding, in a line.
     """
     with look():
         whole = figure(4.6)
@@ -109,7 +109,7 @@ def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str |
             _draw(axes, one)
             axes.tick_params(labelleft=True)
         panels[0].set_ylabel(in_unit("value", unit) if unit else "return of an episode")
-        headline(whole, title or _finding(searches, unit))
+        headline(whole, title)
     return whole
 
 
@@ -212,35 +212,3 @@ def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -
         "fontsize": 9.5,
     }
     axes.annotate(text, (x, y), color=colour, zorder=7, **place)
-
-
-def _finding(searches: Sequence[Search], unit: str) -> str:
-    bare, grounded = [one for one in searches if one.bare], [one for one in searches if not one.bare]
-    count, stable, better = _counted(grounded or bare)
-    if grounded and bare:
-        others, _, gain = _counted(bare)
-        start = grounded[0].points[0].real
-        ours = f"{_number(_end_value(grounded))} {unit}".rstrip()
-        values = f"{ours} with grounding, {_number(_end_value(bare))} without"
-        stay = f"{better} and {gain} of {count}" if count == others else f"{better} of {count} and {gain} of {others}"
-        return f"Real side: {values}, {grounded[0].start} {_number(start)}; {stay} winners gain"
-    if stable == count:
-        return f"{better} of {count} generation winners are above their start in real"
-    return f"Of {count} generation winners {stable} stay on their feet in real, {better} are above their start"
-
-
-def _end_value(searches: Sequence[Search]) -> float:
-    """Return the real value of what searches end with: the last policy that was chosen, else their start."""
-    chosen = [one.confirmed.real for one in searches if one.confirmed]
-    return chosen[-1] if chosen else searches[0].points[0].real
-
-
-def _number(value: float) -> str:
-    return f"{value:.1f}"
-
-
-def _counted(searches: Sequence[Search]) -> tuple[int, int, int]:
-    """Return how many generation winners there are, how many never fall in real, and how many are above their start."""
-    winners = [(point, one.points[0]) for one in searches for point in one.points[1:]]
-    stable = [(point, start) for point, start in winners if point.stable]
-    return len(winners), len(stable), sum(point.real > start.real for point, start in stable)

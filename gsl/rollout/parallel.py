@@ -78,7 +78,7 @@ def in_parallel(function: Any, shared: Any, jobs: Sequence[Any], workers: int, p
 
 def arriving(function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Any) -> Iterator[tuple[int, Any]]:
     """Yield (index of job, `function(pickled shared, job)`) of all jobs, as they end."""
-    frozen = pickle.dumps(shared)
+    frozen = _frozen(shared)
     missing = list(range(len(jobs)))
     for _ in range(TRIES):
         for index, result in _arriving(function, frozen, jobs, tuple(missing), workers):
@@ -88,6 +88,19 @@ def arriving(function: Any, shared: Any, jobs: Sequence[Any], workers: int, prog
         if not missing:
             return
     raise GslError(f"worker processes died {TRIES} times in one batch of jobs; try workers=1 or look at free memory")
+
+
+def _frozen(shared: Any) -> bytes:
+    """Return what all workers need, pickled.
+
+    Raises:
+        GslError: A component of the user's own cannot be.
+    """
+    try:
+        return pickle.dumps(shared)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        advice = "give its object plain fields and functions of a module, no closures"
+        raise GslError(f"a component cannot go to the worker processes ({error}); {advice}") from error
 
 
 def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequence[int], workers: int) -> Iterator[Any]:

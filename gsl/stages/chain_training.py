@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from gsl.core.interfaces import REAL, SIM, Grounding, Trainable
 from gsl.grounding.gat import ActionTransformation
+from gsl.stages.chain import Links
 from gsl.stages.collect import Collect
 from gsl.stages.link import built
 from gsl.stages.train_forward import TrainForward
@@ -18,12 +19,9 @@ from gsl.training.inverse import Method
 from gsl.validation.model_requirements import as_needed, extra_ticks, looking_ahead
 from gsl.worlds.external import asking
 
-if TYPE_CHECKING:
-    from gsl.stages.chain import Chain
-
 
 def train_own(
-    chain: Chain, home: Path, grounding: Trainable, previous: str | None, seed: int, console: Any
+    chain: Links, home: Path, grounding: Trainable, previous: str | None, seed: int, console: Any
 ) -> Grounding:
     """Collect what a grounding needs, let it learn below `home`, and return it with its model."""
     data = collect(chain, home, previous, seed, console, roles=grounding.needs)
@@ -36,7 +34,7 @@ def train_own(
 
 
 def collect(
-    chain: Chain, home: Path, previous: str | None, seed: int, console: Any, *, roles: Sequence[str] = (REAL, SIM)
+    chain: Links, home: Path, previous: str | None, seed: int, console: Any, *, roles: Sequence[str] = (REAL, SIM)
 ) -> dict[str, Path]:
     """Collect trajectories of a policy and its neighbours, below `home` or where they are shared, by role."""
     budget, data = chain.budget, dict[str, Path]()
@@ -63,7 +61,7 @@ def collect(
 
 
 def train_transformation(
-    chain: Chain, home: Path, grounding: ActionTransformation, previous: str | None, seed: int, console: Any
+    chain: Links, home: Path, grounding: ActionTransformation, previous: str | None, seed: int, console: Any
 ) -> ActionTransformation:
     """Collect in both worlds, train both models below `home`, and return the grounding that they make."""
     data = collect(chain, home, previous, seed, console)

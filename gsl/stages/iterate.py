@@ -21,7 +21,8 @@ from gsl.policies.policy import sized
 from gsl.report.iteration import Rounds, write_curve, write_table
 from gsl.rollout.parallel import Workers
 from gsl.rollout.rollout import Scenario
-from gsl.stages.chain import Budget, Chain
+from gsl.stages.chain import Budget
+from gsl.stages.chain_rounds import Chain
 from gsl.stages.diagnosis_plan import EXCITATION, DiagnosisPlan, flown
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Protocol
 import yaml
 
 from gsl.core.interruption import checkpoint
+from gsl.core.unit import Unit
 from gsl.errors import ArtifactError
 from gsl.storage import documents, manifest
 from gsl.storage.identity import Identity, changes, identify
@@ -139,7 +140,13 @@ def _work(
         git=commit(),
         created=created,
         duration=time.perf_counter() - begin,
+        unit=_unit(stage),
     )
+
+
+def _unit(stage: Stage) -> dict[str, Any] | None:
+    task = getattr(getattr(stage, "iterate", stage), "task", None)
+    return None if task is None else Unit.of(task)._asdict()
 
 
 def _parents(stage: Stage, identity: Identity, folder: Path) -> tuple[Parent, ...]:

@@ -51,6 +51,7 @@ class Manifest:
         created: Coordinated universal time, ISO 8601.
         duration: Time the work took [s].
         metrics: Name of the file that holds the metrics.
+        unit: How values of its task are shown (`gsl.core.unit.Unit`), None where there is no task.
         schema_version: Version of this contract.
     """
 
@@ -66,6 +67,7 @@ class Manifest:
     created: str
     duration: float
     metrics: str = "metrics.json"
+    unit: Mapping[str, Any] | None = None
     schema_version: int = SCHEMA_VERSION
 
     @property

@@ -15,7 +15,7 @@ from gsl.core.setting import component, setting
 from gsl.core.unit import Unit
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, learned
-from gsl.stages.chain import Chain
+from gsl.stages.chain_rounds import Chain
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.values import ranked

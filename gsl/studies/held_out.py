@@ -10,7 +10,7 @@ from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError, GslError
 from gsl.models.free_run import TICKS
-from gsl.stages.chain import Chain
+from gsl.stages.chain_rounds import Chain
 from gsl.stages.collect import FILE, Collect
 from gsl.stages.iterate import Iterate
 from gsl.stages.link import built

@@ -25,7 +25,7 @@ from gsl.policies.policy import sized
 from gsl.report.console import Console
 from gsl.report.noise_bars import Bars, noise_bars
 from gsl.rollout.parallel import Workers, arriving
-from gsl.stages.chain import Chain
+from gsl.stages.chain_rounds import Chain
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.optimize import BEST
 from gsl.storage.policy_choice import EVALUATION

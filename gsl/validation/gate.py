@@ -17,7 +17,9 @@ import numpy as np
 from gsl.core.interfaces import SIM, World
 from gsl.core.seeds import derived_seed
 from gsl.errors import Refused
+from gsl.grounding.ane import ActionNoise
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.random_choice import RandomChoice
 from gsl.rollout.rollout import Scenario
 from gsl.storage.documents import write_json
 from gsl.validation.check import EPISODES, pi0_in
@@ -102,7 +104,12 @@ class Gate:
 
 @singledispatch
 def examine(grounding: Any, scenario: Scenario, gate: Gate) -> Passed:
-    """Check a grounding by its kind: `grounding` is the scenario's own."""
+    """Check a grounding by its kind: `grounding` is the scenario's own. Of an unknown kind only π0's falls are."""
     if not isinstance(grounding, NoGrounding):
         warn_uncharged(scenario.world, gate.console, SIM, "the grounded action")
-    return Passed(scenario.prepared(), {})
+    ready = scenario.prepared()
+    if isinstance(grounding, NoGrounding | ActionNoise | RandomChoice):
+        return Passed(ready, {})
+    kind = type(grounding).__name__
+    gate.console.status(f"{kind} is no grounding of gsl's: only the falls of π0 in it are checked")
+    return Passed(ready, gate.check_falls(ready, "of the grounded simulator", f"Let {kind} change less"))

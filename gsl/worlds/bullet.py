@@ -76,6 +76,10 @@ class BulletWorld:
             return plant
         return having_servo(plant, read_servo(self.servo, self.servo_member), self.servo)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the plant out: a worker builds its own, and a torque hook need not be a function of a module."""
+        return {name: value for name, value in vars(self).items() if name != "plant"}
+
     @property
     def layout(self) -> Layout:
         """What an observation holds."""

@@ -16,6 +16,7 @@ from gsl.core.compiled import compiled
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
 from gsl.core.plant import Plant, Push
 from gsl.core.servo_law import HIDDEN, LAYERS
+from gsl.errors import ConfigError
 from gsl.worlds.chain import COLUMNS, Chain, Pushed, accelerate, chain
 from gsl.worlds.encoder import REMEMBERED
 from gsl.worlds.pushes import acting
@@ -67,7 +68,15 @@ class Held:
 
     @classmethod
     def of(cls, plant: Plant, step: float, period: float) -> Held:
-        """Prepare a plant."""
+        """Prepare a plant.
+
+        Raises:
+            ConfigError: It has a torque hook, which only Bullet calls.
+        """
+        if plant.hook is not None:
+            name = getattr(plant.hook, "__qualname__", type(plant.hook).__qualname__)
+            problem = f"the torque hook {name} acts in Bullet alone, and logs in the air are replayed without it"
+            raise ConfigError("effects", f"{problem}; leave its effect out here, or write it as a law of the servo")
         servo = packed(plant.servo, plant.robot.supply_voltage, plant.law)
         pushes = [row for push in plant.pushes for row in _aimed(push, plant.robot)]
         tree = chain(plant, plant.servo.armature - servo.rows[ROTOR])
