@@ -1,3 +1,47 @@
-"""gsl: grounded simulation learning, from a few real trajectories to a policy that works on the robot."""
+"""gsl: grounded simulation learning, from a few real trajectories to a policy that works on the robot.
+
+What `gsl.NAME` offers from Python stands in gsl/api.py; it is loaded when it is first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gsl.api import (
+        Result,
+        Verdict,
+        diagnose,
+        make_grounding,
+        make_policy,
+        make_task,
+        make_world,
+        read_trajectories,
+        roll_out,
+        run,
+        write_trajectories,
+    )
 
 __version__ = "0.1.0"
+__all__ = [
+    "Result",
+    "Verdict",
+    "diagnose",
+    "make_grounding",
+    "make_policy",
+    "make_task",
+    "make_world",
+    "read_trajectories",
+    "roll_out",
+    "run",
+    "write_trajectories",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load the interface for Python when one of its names is used."""
+    if name not in __all__:
+        raise AttributeError(f"module 'gsl' has no attribute {name!r}")
+    from gsl import api
+
+    return getattr(api, name)

@@ -19,8 +19,8 @@ FLOORS = (  # from the ground up: a room imports from lower floors alone
     ("grounding",),
     ("rollout", "report"),
     ("diagnosis", "real_robot", "benchmarks", "commandline"),
-    ("training", "blind"),
-    ("validation",),
+    ("training", "blind", "api"),
+    ("validation", "gym"),
     ("stages", "cli"),
     ("studies", "__main__"),
 )

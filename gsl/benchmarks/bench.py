@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from gsl.core.interfaces import SIM
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.grounding.none import NoGrounding
 from gsl.policies.walk_engine import WalkEngine
+from gsl.report.console import Console
 from gsl.rollout.parallel import Job, trajectories
 from gsl.rollout.rollout import Scenario
 from gsl.storage.trajectories import write
@@ -44,7 +44,7 @@ ROLLOUTS, WORKERS, ROUNDS = 24, 2, 3
 EPISODES = 30  # in the file whose writing is measured
 
 
-def run_bench(console: Any) -> None:
+def run_bench(console: Console) -> None:
     """Measure everything, and print a table or exactly the figures as JSON."""
     figures = measured(console)
     rows = [_row(name, figures[name]) for name in FIGURES]
@@ -54,7 +54,7 @@ def run_bench(console: Any) -> None:
         console.result(figures)
 
 
-def measured(console: Any) -> dict[str, float]:
+def measured(console: Console) -> dict[str, float]:
     """Return all figures by name."""
     world = BulletWorld(robot="nao", effects={})
     scenario = Scenario(world, Walk(), WalkEngine(), SIM, NoGrounding())
@@ -86,7 +86,7 @@ def _row(name: str, value: float) -> tuple[str, ...]:
     return name, meaning, f"{value:.{digits}f}", limit, verdict
 
 
-def _workers(scenario: Scenario, console: Any) -> tuple[float, float, list[Trajectory]]:
+def _workers(scenario: Scenario, console: Console) -> tuple[float, float, list[Trajectory]]:
     """Return CPU in workers / serially, serial CPU of all rollouts [s] and what they made; the two ways take turns."""
     parameters = scenario.policy.initial
     jobs = [Job(parameters, seed) for seed in range(ROLLOUTS)]

@@ -16,10 +16,10 @@ from gsl.commandline.composer import Composition
 from gsl.commandline.config_errors import instantiation_error, missing, resolution_error
 from gsl.commandline.known_settings import declared
 from gsl.commandline.overrides import COMMAND_KEYS, file_of
+from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.core.validation import make
-from gsl.report.console import Console
 
 RUNS = Path("runs")
 
@@ -77,7 +77,7 @@ def prepared(config: Mapping[str, Any]) -> tuple[Any, dict[str, Any], CommandSet
     settings = {key: value for key, value in config.items() if key not in dropped}
     for path in _missing(settings, ""):
         raise missing(path)
-    stage = _instantiated(settings)
+    stage = instantiated(settings)
     described(stage)  # refuses what could not be written down afterwards
     return stage, settings, own
 
@@ -96,7 +96,12 @@ def resolved(composition: Composition) -> dict[str, Any]:
     return {str(key): value for key, value in container.items()}
 
 
-def _instantiated(mapping: Mapping[str, Any]) -> Any:
+def instantiated(mapping: Mapping[str, Any]) -> Any:
+    """Return the object that a mapping with `_target_` describes.
+
+    Raises:
+        ConfigError: A value is of the wrong type or impossible.
+    """
     try:
         return instantiate(dict(mapping), _convert_="all")
     except InstantiationException as error:

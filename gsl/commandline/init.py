@@ -17,6 +17,7 @@ from gsl.core.body import Robot
 from gsl.core.setting import component, setting
 from gsl.core.validation import make
 from gsl.errors import ConfigError, InputError
+from gsl.report.console import Console
 from gsl.robots.catalogue import names
 from gsl.robots.hinges import JointSettings, drivable, from_description
 from gsl.robots.urdf_xml import read_description
@@ -53,7 +54,7 @@ class Init:
     period: Annotated[float, setting("control period of your logs", unit="s", gt=0)] = 0.02
 
 
-def write_configuration(arguments: Sequence[str], worlds: Collection[str], console: Any) -> None:
+def write_configuration(arguments: Sequence[str], worlds: Collection[str], console: Console) -> None:
     """Write the folder and say what to type next.
 
     Args:
@@ -137,7 +138,7 @@ def _plain(text: str) -> str:
     return yaml.safe_dump(text, allow_unicode=True, width=1000).splitlines()[0]
 
 
-def _tell(folder: Path, told: Init, robot: Robot, console: Any) -> None:
+def _tell(folder: Path, told: Init, robot: Robot, console: Console) -> None:
     name = told.name
     files = [(folder / part).as_posix() for part in (ROBOT, WORLD.format(name))]
     mine = shlex.quote(folder.as_posix())

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+from gsl.report.console import Console
 from gsl.report.render import portrait
 from gsl.robots.catalogue import robot
 from gsl.robots.urdf import urdf
 from gsl.storage.whole import explained
 
 
-def write_robot(name: str, folder: Path, console: Any) -> None:
+def write_robot(name: str, folder: Path, console: Console) -> None:
     """Write <name>.urdf and, of a robot that has shapes, <name>.png.
 
     Args:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gsl.core.console import Console, Progress
 from gsl.core.interfaces import REAL
 from gsl.core.seeds import derived_seed
 from gsl.core.statistics import Interval, bootstrap_interval, mean_interval, rank_correlation
@@ -28,7 +29,7 @@ class Effort(NamedTuple):
 
 
 def policy_gap(
-    measured: RealReturns, before: BulletWorld, after: BulletWorld, *, named: bool, effort: Effort, console: Any
+    measured: RealReturns, before: BulletWorld, after: BulletWorld, *, named: bool, effort: Effort, console: Console
 ) -> dict[str, Any]:
     """Return what policies are worth in three worlds, and how well either simulator predicts it.
 
@@ -69,7 +70,7 @@ def policy_gap(
     return {**found, "never_stopped": rest, "caveats": _caveats(found, len(rows) - len(whole), rest)}
 
 
-def _played(measured: RealReturns, world: BulletWorld, effort: Effort, progress: Any) -> list[list[Episode]]:
+def _played(measured: RealReturns, world: BulletWorld, effort: Effort, progress: Progress) -> list[list[Episode]]:
     """Return the episodes of each policy."""
     scenario = Scenario(world, measured.task, measured.policy, REAL, NoGrounding())
     jobs = [

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator
 
+from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import setting
 from gsl.effects.effect import effect_class
@@ -41,7 +42,7 @@ Tolerance = Annotated[float, setting("difference of a joint that does not matter
 class Telling:
     """Says a phase when it begins, and now and then how long it has been at it; nothing goes on after a Ctrl-C."""
 
-    def __init__(self, console: Any) -> None:
+    def __init__(self, console: Console) -> None:
         self._console, self._phase, self._fits = console, "", 0
         self._begun = self._said = time.monotonic()
 

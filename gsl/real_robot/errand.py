@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.interfaces import Grounding, World
 from gsl.errors import ArtifactError, ConfigError, Waiting
@@ -64,7 +65,7 @@ def answer_parents(world: World) -> Mapping[str, Path]:
 
 
 def asked(
-    scenario: Scenario, orders: Sequence[Order], errand: Errand, *, workers: int, console: Any
+    scenario: Scenario, orders: Sequence[Order], errand: Errand, *, workers: int, console: Console
 ) -> list[Verdict | None]:
     """Return the episodes of all orders, None for those that nobody wants after a fall of their policy.
 
@@ -95,7 +96,7 @@ def asked(
 
 
 def foreseen(
-    scenario: Scenario, orders: Sequence[Order], request: Mapping[str, Any], *, workers: int, console: Any
+    scenario: Scenario, orders: Sequence[Order], request: Mapping[str, Any], *, workers: int, console: Console
 ) -> list[str]:
     """Return, and tell, which policies ask in a nominal simulator for what the runner will refuse on the robot."""
     world = scenario.world

@@ -8,8 +8,9 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
+from gsl.core.console import LiveTable, Progress
 from gsl.core.interruption import checkpoint
 from gsl.report.tables import LineTable, RichLiveTable, drawn, fitting, total
 
@@ -20,20 +21,6 @@ _log = logging.getLogger("gsl")
 
 SECONDS_BETWEEN_LINES = 10.0
 WIDTH_WITHOUT_TERMINAL = 200
-
-
-class Progress(Protocol):
-    """What a long loop tells how far it is."""
-
-    def advance(self, steps: int = 1) -> None:
-        """Say that `steps` more are done."""
-
-
-class LiveTable(Protocol):
-    """A table that grows while a person watches."""
-
-    def row(self, *cells: object) -> None:
-        """Add a row."""
 
 
 class Console:

@@ -17,6 +17,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import AfterValidator
 
+from gsl.core.console import Progress
 from gsl.core.interruption import processes_starting
 from gsl.core.setting import setting
 from gsl.core.trajectory import Trajectory
@@ -60,23 +61,25 @@ class Episode(NamedTuple):
     outcome: Mapping[str, float]
 
 
-def trajectories(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Any) -> list[Trajectory]:
+def trajectories(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Progress) -> list[Trajectory]:
     """Return the trajectories of all jobs, in their order."""
     return in_parallel(_trajectory, scenario, jobs, workers, progress)
 
 
-def episodes(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Any) -> list[Episode]:
+def episodes(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Progress) -> list[Episode]:
     """Return value, fall and length of all jobs, in their order."""
     return in_parallel(_episode, scenario, jobs, workers, progress)
 
 
-def in_parallel(function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Any) -> list[Any]:
+def in_parallel(function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Progress) -> list[Any]:
     """Return `function(pickled shared, job)` of all jobs, in their order."""
     done = dict(arriving(function, shared, jobs, workers, progress))
     return [done[index] for index in range(len(jobs))]
 
 
-def arriving(function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Any) -> Iterator[tuple[int, Any]]:
+def arriving(
+    function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Progress
+) -> Iterator[tuple[int, Any]]:
     """Yield (index of job, `function(pickled shared, job)`) of all jobs, as they end."""
     frozen = _frozen(shared)
     missing = list(range(len(jobs)))

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.observation import observations
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
@@ -56,7 +57,7 @@ class Answer:
         files = {name: resolve(file) for name, file in (("logs", self.logs), ("returns", self.returns)) if file}
         return {**files, "request": Path(self.request) / NAME}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the answer in the form that a request's folder is searched for."""
         request = read_request(Path(self.request))
         files = {role: path for role, path in self.parents().items() if role != "request"}

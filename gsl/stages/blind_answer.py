@@ -27,6 +27,7 @@ from gsl.blind.files import (
     seals_of,
 )
 from gsl.blind.seals import VERSION, files_below, total
+from gsl.core.console import Console, Progress
 from gsl.core.setting import component, setting
 from gsl.core.validation import make
 from gsl.diagnosis.logs import check_log, on_ground
@@ -69,7 +70,7 @@ class BlindAnswer:
         """Return the seals of the data, which hold the hash of every file of it."""
         return {"data": found(self.data, SEALS, "blind_make")}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write an answer for each case, and the hash of all."""
         seals = self.parents()["data"]
         cases = [seals.parent / CASES / name for name in seals_of(seals)]
@@ -95,7 +96,7 @@ class BlindAnswer:
             "seal": sealed["total"],
         }
 
-    def _all(self, cases: Iterable[Path], leaders: Mapping[Path, Path], folder: Path, progress: Any) -> None:
+    def _all(self, cases: Iterable[Path], leaders: Mapping[Path, Path], folder: Path, progress: Progress) -> None:
         """Answer the cases that have no answer yet; those with a leader use what chance gained there."""
         missing = [case for case in sorted(cases) if not _file(folder, case).exists()]
         tasks = [_Task(case, folder, _nulls(folder, leaders.get(case))) for case in missing]

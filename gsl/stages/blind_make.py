@@ -16,6 +16,7 @@ from gsl.blind.on_foot import Track
 from gsl.blind.programmes import drawn_programmes
 from gsl.blind.seals import VERSION, files_below, nonce_of, sealed
 from gsl.blind.walks import Walks
+from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.errors import GslError
@@ -65,7 +66,7 @@ class BlindMake:
         """Everything is made here."""
         return {}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the cases and their seals into the folder, and the labels into another one."""
         secret = self._secret(folder)
         world, orders = self.sim, self._orders(folder, secret)

@@ -12,6 +12,7 @@ from gsl.blind.label import WALK, Label
 from gsl.blind.mark import Mark, marked
 from gsl.blind.results import OURS, markdown, results
 from gsl.blind.seals import check_label, files_below
+from gsl.core.console import Console
 from gsl.core.setting import component, setting
 from gsl.errors import GslError
 from gsl.storage import documents
@@ -38,7 +39,7 @@ class BlindReveal:
             "labels": found(self.labels, LABELS, "blind_make"),
         }
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the results as JSON and as markdown."""
         files = self.parents()
         labels = _labels(files["data"], files["labels"])

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from gsl.core.console import Console
 from gsl.core.interfaces import (
     REAL,
     SIM,
@@ -105,7 +106,7 @@ class Chain(Links):
         grounding: Grounding,
         previous: str | None,
         seed: int,
-        console: Any,
+        console: Console,
         *,
         search: Path | None = None,
         only: str = "",
@@ -115,11 +116,11 @@ class Chain(Links):
         found = self.search((search or place) / "optimize", ready, previous, seed, console)
         return Round(ready, found, self.measure(place / "evaluate", found, seed, console, only=only))
 
-    def pretrained(self, place: Path, seed: int, console: Any) -> str:
+    def pretrained(self, place: Path, seed: int, console: Console) -> str:
         """Improve the policy's start values in the plain simulator at `place`; return the file of the best."""
         return str(self.search(place, NoGrounding(), None, seed, console).folder / BEST)
 
-    def diagnosed(self, home: Path, grounding: Grounding, seed: int, console: Any) -> Grounding:
+    def diagnosed(self, home: Path, grounding: Grounding, seed: int, console: Console) -> Grounding:
         """Return a grounding that has its diagnosis and its learned servo, made below `home` if it wants its own."""
         common: dict[str, Any] = {"workers": self.workers, "seed": seed, "console": console}
         if isinstance(grounding, DiagnosedEffects) and not grounding.effects:
@@ -132,7 +133,7 @@ class Chain(Links):
             grounding = with_innermost(grounding, replace(inner, servo=str(made.folder)))
         return grounding
 
-    def ready(self, home: Path, grounding: Grounding, previous: str | None, seed: int, console: Any) -> Grounding:
+    def ready(self, home: Path, grounding: Grounding, previous: str | None, seed: int, console: Console) -> Grounding:
         """Return a grounding that has its models, trained below `home`; those inside of effects know their world."""
         if isinstance(grounding, DiagnosedEffects):
             inside = replace(self, sim=switched_on(self.sim, grounding.load(read_diagnosis)))
@@ -143,7 +144,7 @@ class Chain(Links):
             return train_own(self, home, grounding, previous, seed, console)
         return grounding
 
-    def values(self, out: Path, grounding: Grounding | None, found: Mapping[str, Any], console: Any) -> Artifact:
+    def values(self, out: Path, grounding: Grounding | None, found: Mapping[str, Any], console: Console) -> Artifact:
         """Measure a fixed set of policies in the simulator with a grounding that is ready; without one, in real."""
         stage = Values(
             world=self.real if grounding is None else self.sim,
@@ -155,7 +156,7 @@ class Chain(Links):
         )
         return built(stage, out, console)
 
-    def search(self, out: Path, grounding: Grounding, previous: str | None, seed: int, console: Any) -> Artifact:
+    def search(self, out: Path, grounding: Grounding, previous: str | None, seed: int, console: Console) -> Artifact:
         """Optimise in the simulator with a grounding that is ready."""
         stage = Optimize(
             world=self.sim,
@@ -174,7 +175,7 @@ class Chain(Links):
         )
         return built(stage, out, console)
 
-    def measure(self, out: Path, found: Artifact, seed: int, console: Any, only: str = "") -> Artifact:
+    def measure(self, out: Path, found: Artifact, seed: int, console: Console, only: str = "") -> Artifact:
         """Measure what a search found in the real world, or one file of it only."""
         stage = Evaluate(
             world=asking(self.real, out),

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL, SIM, Grounding, Trainable
 from gsl.grounding.gat import ActionTransformation
 from gsl.stages.chain import Links
@@ -21,7 +22,7 @@ from gsl.worlds.external import asking
 
 
 def train_own(
-    chain: Links, home: Path, grounding: Trainable, previous: str | None, seed: int, console: Any
+    chain: Links, home: Path, grounding: Trainable, previous: str | None, seed: int, console: Console
 ) -> Grounding:
     """Collect what a grounding needs, let it learn below `home`, and return it with its model."""
     data = collect(chain, home, previous, seed, console, roles=grounding.needs)
@@ -34,7 +35,7 @@ def train_own(
 
 
 def collect(
-    chain: Links, home: Path, previous: str | None, seed: int, console: Any, *, roles: Sequence[str] = (REAL, SIM)
+    chain: Links, home: Path, previous: str | None, seed: int, console: Console, *, roles: Sequence[str] = (REAL, SIM)
 ) -> dict[str, Path]:
     """Collect trajectories of a policy and its neighbours, below `home` or where they are shared, by role."""
     budget, data = chain.budget, dict[str, Path]()
@@ -61,7 +62,7 @@ def collect(
 
 
 def train_transformation(
-    chain: Links, home: Path, grounding: ActionTransformation, previous: str | None, seed: int, console: Any
+    chain: Links, home: Path, grounding: ActionTransformation, previous: str | None, seed: int, console: Console
 ) -> ActionTransformation:
     """Collect in both worlds, train both models below `home`, and return the grounding that they make."""
     data = collect(chain, home, previous, seed, console)

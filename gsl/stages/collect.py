@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.interfaces import SIM, Policy, Task, World
 from gsl.core.seeds import derived_seed
@@ -66,7 +67,7 @@ class Collect:
         chosen = PolicyChoice(self.policy, self.initial).parents("initial")
         return {**chosen, **command_file(self.policy), **answer_parents(self.world)}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write one parquet file."""
         layout = self.world.layout
         policy = playing(self.policy, layout)
@@ -98,7 +99,7 @@ class Collect:
             "value": None if isinstance(policy, Programmed) else float(np.mean(own)),
         }
 
-    def _played(self, scenario: Scenario, pieces: Sequence[Piece], console: Any) -> list[Trajectory]:
+    def _played(self, scenario: Scenario, pieces: Sequence[Piece], console: Console) -> list[Trajectory]:
         """Return the episodes, of a robot somewhere else from its answer."""
         seeds = [derived_seed(self.seed, self.kind, self.role, index) for index in range(len(pieces))]
         jobs = [Job(piece.parameters, seed) for piece, seed in zip(pieces, seeds, strict=True)]

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from gsl.core.body import lumped
+from gsl.core.console import Console
 from gsl.core.labels import alike
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
@@ -104,7 +105,7 @@ class CrossValidate:
         """Return the files that are read."""
         return log_parents(real=self.real)
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the table and every fold."""
         log = read_logs(self.real)
         check_log(log, lumped(self.sim.plant.robot), self.real)
@@ -149,7 +150,7 @@ class CrossValidate:
             raise ConfigError("by", problem, given=self.by)
         return sorted(found, key=lambda value: (str(type(value)), value))
 
-    def _fold(self, log: Batch, values: list[Any], inner: list[Any], console: Any) -> Fold:
+    def _fold(self, log: Batch, values: list[Any], inner: list[Any], console: Console) -> Fold:
         """Diagnose the trajectories without some values, which know nothing of the others; these are looked at once."""
         told = f"{self.by} {', '.join(map(str, values))}"
         console.status(f"{told} is held out")

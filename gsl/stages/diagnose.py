@@ -12,6 +12,7 @@ from typing import Annotated, Any, ClassVar
 import yaml
 
 from gsl.core.body import lumped
+from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
@@ -75,7 +76,7 @@ class Diagnose:
         logs = log_parents(real=self.real, reference=self.reference)
         return {**logs, **(measured_parents(self.policies) if self.policies else {})}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json, report.html, the diagnosed world and the next experiment."""
         begin = time.perf_counter()
         robot = lumped(self.sim.plant.robot)
@@ -124,7 +125,7 @@ class Diagnose:
             seed=self.seed, tolerance=self.tolerance, held_out=self.held_out,
         )  # fmt: skip
 
-    def _policy_gap(self, measured: RealReturns, found: Findings, console: Any) -> Mapping[str, Any]:
+    def _policy_gap(self, measured: RealReturns, found: Findings, console: Console) -> Mapping[str, Any]:
         effort = Effort(self.episodes, threads(self.workers), self.seed)
         after = replace(self.sim, effects=self._effects(found))
         named = bool(found.answer.candidates)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL, Grounding, World
 from gsl.core.setting import component, setting
 from gsl.diagnosis.settings import Without
@@ -43,7 +44,7 @@ class DiagnosisPlan:
     without: Without = ()
 
     def carried_out(
-        self, real: World, sim: World, method: str, home: Path, *, workers: int, seed: int, console: Any
+        self, real: World, sim: World, method: str, home: Path, *, workers: int, seed: int, console: Console
     ) -> Artifact:
         """Return what a method finds of a simulator in an excitation of the real robot, both built below `home`.
 
@@ -73,7 +74,7 @@ class DiagnosisPlan:
 
     def servo(
         self, real: World, sim: World, effects: Diagnosis | None, home: Path, *,
-        members: int = 1, workers: int, seed: int, console: Any,
+        members: int = 1, workers: int, seed: int, console: Console,
     ) -> Artifact:  # fmt: skip
         """Return the servo learned from an excitation of the real robot, on top of effects if there are any.
 
@@ -90,7 +91,7 @@ class DiagnosisPlan:
         name = stage.kind if effects is None else f"{stage.kind}_on_effects"
         return built(stage, home / (name if members == 1 else f"{name}_members"), console)
 
-    def flown(self, real: World, home: Path, *, workers: int, seed: int, console: Any) -> Artifact:
+    def flown(self, real: World, home: Path, *, workers: int, seed: int, console: Console) -> Artifact:
         """Return the log of an excitation of the real robot in the air, built below `home`.
 
         Raises:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from scipy import stats
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL, Policy, Task, World
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
@@ -78,7 +79,7 @@ class Evaluate:
         """Return where the policies come from, and what a robot somewhere else has answered."""
         return {"policies": resolve(self.policies), **answer_parents(self.world)}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the table of all policies and the chosen one."""
         if getattr(self.world, "action_noise", 0.0):
             warn_uncharged(self.world, console, REAL, "the world's noise")
@@ -144,7 +145,7 @@ class Evaluate:
         return falls(done) <= self.tolerated * len(done)
 
     def _measured(
-        self, thetas: Sequence[PolicyRecord], purpose: str, count: int, *, console: Any
+        self, thetas: Sequence[PolicyRecord], purpose: str, count: int, *, console: Console
     ) -> list[list[Episode]]:
         """Return the episodes of some policies; but for a report, none after a fall that is not tolerated."""
         scenario = Scenario(self.world, self.task, self.policy, REAL, NoGrounding())

@@ -11,6 +11,7 @@ import numpy as np
 import yaml
 
 from gsl.core.body import lumped
+from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
@@ -55,7 +56,7 @@ class Identify:
         """Return the files that are read."""
         return log_parents(real=self.real)
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json and the identified world."""
         found = read_motions(self.real, lumped(self.sim.plant.robot))
         options = Options(self.without, threads=threads(self.workers))

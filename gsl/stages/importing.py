@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
@@ -53,7 +54,7 @@ class Import:
         alone = len(files) == 1
         return {"source" if alone else f"source {name}": file for name, file in files.items()}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write one parquet file, and what was found as a document."""
         chosen = self._places()
         found = [one for place in self._progress(chosen, console) for one in self._episodes(place, console)]
@@ -72,7 +73,7 @@ class Import:
             "seconds": sum(float(one.trajectory.time[-1]) for one in found),
         }
 
-    def look(self, console: Any) -> dict[str, Any]:
+    def look(self, console: Console) -> dict[str, Any]:
         """Say what `run` would do, and return it with the exit code that it would have."""
         chosen, found, problems = self._places(), list[Episode](), list[str]()
         for place in self._progress(chosen, console):
@@ -107,13 +108,13 @@ class Import:
     def _places(self) -> list[Place]:
         return places(self._source(), self.mapping.files)
 
-    def _progress(self, chosen: list[Place], console: Any) -> Any:
+    def _progress(self, chosen: list[Place], console: Console) -> Any:
         with console.progress(len(chosen), "reading logs") as progress:
             for place in chosen:
                 yield place
                 progress.advance()
 
-    def _episodes(self, place: Place, console: Any) -> list[Episode]:
+    def _episodes(self, place: Place, console: Console) -> list[Episode]:
         for path in place.files.values():
             if path.is_file() and (size := path.stat().st_size) > LARGE:
                 console.status(f"reading {path}, {size / GB:.2g} GB; with {self.memory:g} GB of memory at most")

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+from gsl.core.console import Console
 from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, Trainable, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import seed_of_round
@@ -90,7 +91,7 @@ class Iterate:
         """Everything is made here."""
         return {}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Run the iterations, write the policy they end with, the table and the plots."""
         check_aggregate(self, [self.grounding], "aggregate")
         self.chain.check(self.grounding)
@@ -166,7 +167,7 @@ class Iterate:
     def _collected_real(self) -> int:
         return sum(self.budget.real) if self.learned else 0
 
-    def _diagnosed(self, home: Path, rounds: Rounds, console: Any) -> Grounding:
+    def _diagnosed(self, home: Path, rounds: Rounds, console: Console) -> Grounding:
         """Return the grounding with its diagnosis: an excitation knows no policy, so that one serves all iterations."""
         grounding = self.chain.diagnosed(home / FIRST, self.grounding, self.seed, console)
         if flight := flown(home / FIRST, self.grounding, grounding):
@@ -175,7 +176,7 @@ class Iterate:
                 console.status(finding)
         return grounding
 
-    def _ungrounded(self, home: Path, start: str | None, console: Any) -> Artifact:
+    def _ungrounded(self, home: Path, start: str | None, console: Console) -> Artifact:
         place = home / FIRST
         found = self.chain.search(place / "optimize_none", NoGrounding(), start, self.seed, console)
         return self.chain.measure(place / "evaluate_none", found, self.seed, console)

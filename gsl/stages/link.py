@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.errors import ArtifactError
 from gsl.report.headline import headline
@@ -14,7 +14,7 @@ from gsl.storage.artifact import Artifact, Stage, build
 COMMAND = "gsl iterate"
 
 
-def built(stage: Stage, out: Path, console: Any) -> Artifact:
+def built(stage: Stage, out: Path, console: Console) -> Artifact:
     """Build one link; what an earlier chain built otherwise in its place is replaced, what anyone else built is not."""
     command, ours = f"{COMMAND} ({stage.kind})", _ours(out)
     made = build(stage, config=described(stage), out=out, command=command, force=ours, console=console)

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from gsl.core.console import Console, Progress
 from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, World
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
@@ -80,7 +81,7 @@ class Optimize:
         """Return the start policy and what the grounding is made of."""
         return {**PolicyChoice(self.policy, self.initial).parents("initial"), **parents_of(self.grounding)}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the policies: π0, then one of each generation; and which of these is worth most in simulation."""
         first = PolicyChoice(self.policy, self.initial).parameters()
         bare = Scenario(self.world, self.task, self.policy, SIM, self.grounding)
@@ -110,7 +111,7 @@ class Optimize:
         }
 
     def _searched(
-        self, optimizer: Search, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Any
+        self, optimizer: Search, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Console
     ) -> Iterator[Winner]:
         """Yield the best candidate of each generation of a search."""
         search = optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
@@ -129,7 +130,7 @@ class Optimize:
                 means = generation.means or generation.values
                 yield Winner(self._record(index, candidates[best], means[best]), generation.values[best])
 
-    def _learned(self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Any) -> Iterator[Winner]:
+    def _learned(self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Console) -> Iterator[Winner]:
         """Yield what a learner has come to after each generation."""
         seed, simulator = derived_seed(self.seed, self.kind), GroundedSimulator(scenario, first)
         total = optimizer.taken + optimizer.generations * self.rollouts
@@ -141,7 +142,7 @@ class Optimize:
                 yield Winner(self._record(index, parameters, value), value)
 
     def _screen(
-        self, bare: Scenario, checked: Mapping[str, Any], winners: list[Winner], console: Any
+        self, bare: Scenario, checked: Mapping[str, Any], winners: list[Winner], console: Console
     ) -> tuple[list[Winner], Mapping[str, Any]]:
         """Return the winners that do not fall in the grounded simulator, and what to report of all."""
         if not (self.screening and foretells_falls(self.grounding)):
@@ -157,7 +158,7 @@ class Optimize:
         falls = {name: result._asdict() for name, result in results.items()}
         return [winner for winner in winners if winner.policy.name in kept], {"screened": falls}
 
-    def _drift(self, scenario: Scenario, found: Iterable[PolicyRecord], console: Any) -> Mapping[str, Any]:
+    def _drift(self, scenario: Scenario, found: Iterable[PolicyRecord], console: Console) -> Mapping[str, Any]:
         """Return and tell how far the policies have moved from what a learned grounding has seen."""
         inner = innermost(self.grounding)
         if not (isinstance(inner, ActionTransformation) and isinstance(scenario.grounding, LoadedTransformation)):
@@ -169,7 +170,9 @@ class Optimize:
         console.status(f"{told} ({first[0]}: {100 * first[1]:.0f} %)")
         return {"drift": shares}
 
-    def _evaluated(self, scenario: Scenario, candidates: Sequence[np.ndarray], index: int, progress: Any) -> Generation:
+    def _evaluated(
+        self, scenario: Scenario, candidates: Sequence[np.ndarray], index: int, progress: Progress
+    ) -> Generation:
         jobs = [
             Job(candidate, derived_seed(self.seed, self.kind, index, number, rollout))
             for number, candidate in enumerate(candidates)

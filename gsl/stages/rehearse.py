@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar
 import gymnasium
 import numpy as np
 
+from gsl.core.console import Console, Progress
 from gsl.core.interfaces import World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
@@ -45,7 +46,7 @@ class Rehearse:
         """Return the request."""
         return {"request": Path(self.request) / NAME} if (Path(self.request) / NAME).is_file() else {}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the answer."""
         place = Path(self.request)
         request = read_request(place)
@@ -82,7 +83,7 @@ class Surrogate:
         self._acting, self._fell, self._name = False, False, ""
         self.measured: dict[str, tuple[float, bool]] = {}
 
-    def serve(self, folder: Path, log: Path, episodes: Sequence[str], progress: Any) -> None:
+    def serve(self, folder: Path, log: Path, episodes: Sequence[str], progress: Progress) -> None:
         """Run the runner of a folder until it ends.
 
         Raises:
@@ -110,7 +111,7 @@ class Surrogate:
         if process.returncode:
             raise GslError(f"the runner ended with exit code {process.returncode}: {last}")
 
-    def _answer(self, call: Mapping[str, Any], progress: Any) -> Any:
+    def _answer(self, call: Mapping[str, Any], progress: Progress) -> Any:
         match call["do"]:
             case "begin":
                 episode = call["episode"]
@@ -123,7 +124,7 @@ class Surrogate:
                 return self._read()
         return None
 
-    def _begin(self, episode: Mapping[str, Any], progress: Any) -> None:
+    def _begin(self, episode: Mapping[str, Any], progress: Progress) -> None:
         posture = np.array(episode["posture"])
         self._observation, _ = self._env.reset(seed=episode["seed"], options={"posture": posture})
         self._start, self._left, self._name = self._observation, episode["steps"], episode["name"]

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL, Policy, Search, Task, World
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
@@ -55,7 +56,7 @@ class Survey:
         """Everything is made here."""
         return {}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the table."""
         optimal = [theta for number in range(self.searches) for theta in self._search(number, folder, console)]
         rng = np.random.default_rng(self.seed)
@@ -78,7 +79,7 @@ class Survey:
         (folder / TABLE).write_text(table(COLUMNS, rows), encoding="utf-8")
         return found
 
-    def _search(self, number: int, folder: Path, console: Any) -> list[np.ndarray]:
+    def _search(self, number: int, folder: Path, console: Console) -> list[np.ndarray]:
         place = folder / f"search_{number + 1}"
         place.mkdir(exist_ok=True)
         search = Optimize(
@@ -94,7 +95,7 @@ class Survey:
         search.run(place, console)
         return [vector(self.policy, one) for one in read_policies(place / FILE).records[2:]]
 
-    def _episodes(self, world: World, thetas: Sequence[np.ndarray], label: str, console: Any) -> list[Episode]:
+    def _episodes(self, world: World, thetas: Sequence[np.ndarray], label: str, console: Console) -> list[Episode]:
         scenario = Scenario(world, self.task, self.policy, REAL, NoGrounding())
         jobs = [Job(theta, derived_seed(self.seed, self.kind, label, index)) for index, theta in enumerate(thetas)]
         with console.progress(len(jobs), label) as progress:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.interfaces import SIM
 from gsl.core.region import region
 from gsl.core.setting import component, setting
@@ -70,7 +71,7 @@ class TrainForward:
             raise ConfigError("earlier", "names the same trajectories twice; what is held out would be learned from")
         return {name: path if path == Path(named[name]) else path.parent for name, path in files.items()} | below
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the model and the trajectories it has not seen."""
         path = data_file(self.data)
         newest = parts(path, other=SIM, share=self.heldout, seed=self.seed)

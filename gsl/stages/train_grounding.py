@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL, SIM, Evidence, Trainable
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
@@ -48,7 +49,7 @@ class TrainGrounding:
         files = {role: data_file(reference) for role, reference in named.items()}
         return {role: path if path == Path(named[role]) else path.parent for role, path in files.items()}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write what was learned, and the real trajectories that it was not learned from."""
         console.status("the grounding learns")
         real, count = None, 0

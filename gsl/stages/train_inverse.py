@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
@@ -40,7 +41,7 @@ class TrainInverse:
         path = data_file(self.data)
         return {"data": path if path == Path(self.data) else path.parent}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the model."""
         if self.model.multi_step > 1:
             raise ConfigError("model.multi_step", "is of a forward model", given=str(self.model.multi_step))

@@ -11,6 +11,7 @@ import numpy as np
 import yaml
 
 from gsl.core.body import lumped
+from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.diagnosis.experiment import Experiment
@@ -68,7 +69,7 @@ class TrainServo:
         """Return the files that are read."""
         return log_parents(real=self.real, walks=self.walks)
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the checkpoint, the world that it makes and what it has learned as curves."""
         exp = read_motions(self.real, lumped(self.sim.plant.robot), self.held_out)
         if len(exp.held_out) < 2:

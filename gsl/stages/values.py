@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL, Grounding, Policy, Task, World
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
@@ -46,7 +47,7 @@ class Values:
         """Return what the grounding is made of."""
         return parents_of(self.grounding)
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the values."""
         scenario = Scenario(self.world, self.task, self.policy, REAL, self.grounding).prepared(self.found)
         rng = np.random.default_rng(derived_seed(self.seed, self.kind))

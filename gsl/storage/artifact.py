@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Protocol
 
 import yaml
 
+from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
 from gsl.core.unit import Unit
 from gsl.errors import ArtifactError
@@ -37,7 +38,7 @@ class Stage(Protocol):
         """Return what the stage reads, artifacts or files, by role: the dotted name of the setting that names it."""
         ...
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the results into `folder` and return the metrics."""
         ...
 
@@ -69,7 +70,9 @@ class Artifact:
         return metrics
 
 
-def build(stage: Stage, *, config: Mapping[str, Any], out: Path, command: str, force: bool, console: Any) -> Artifact:
+def build(
+    stage: Stage, *, config: Mapping[str, Any], out: Path, command: str, force: bool, console: Console
+) -> Artifact:
     """Return the artifact of `stage` in `out`, building it unless it is there already.
 
     Args:
@@ -116,7 +119,7 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
 
 
 def _work(
-    stage: Stage, identity: Identity, config: Mapping[str, Any], folder: Path, command: str, console: Any
+    stage: Stage, identity: Identity, config: Mapping[str, Any], folder: Path, command: str, console: Console
 ) -> Manifest:
     begin = time.perf_counter()
     created = datetime.now(UTC).isoformat(timespec="seconds")

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL, SIM, Grounding
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
@@ -86,7 +87,7 @@ class Budget:
         """Everything is made here, but for what is known."""
         return known_parents(self.known, DATA)
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Run all trials, write the points, the table and the figure.
 
         Raises:
@@ -139,7 +140,7 @@ class Budget:
             self.iterate, budget=replace(self.iterate.budget, real_episodes=own, real_neighbours=count - own)
         )
 
-    def _point(self, home: Path, method: str, count: int, number: int, console: Any) -> Point:
+    def _point(self, home: Path, method: str, count: int, number: int, console: Console) -> Point:
         name, seed = f"trial_{number:02d}", self.iterate.seed + number - 1
         if method == NONE:
             return self._ungrounded(home / NONE / name, number, console)
@@ -159,7 +160,7 @@ class Budget:
         errors = degrees(grounded.joints), degrees(bare.joints)
         return Point(method, count, number, measured.metrics["returned"]["value"], *errors)
 
-    def _ungrounded(self, place: Path, number: int, console: Any) -> Point:
+    def _ungrounded(self, place: Path, number: int, console: Console) -> Point:
         chain, seed = self.iterate.chain, self.iterate.seed + number - 1
         found = chain.search(place / "optimize", NoGrounding(), None, seed, console)
         measured = chain.measure(place / "evaluate", found, seed, console)

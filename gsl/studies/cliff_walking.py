@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval
@@ -79,7 +80,7 @@ class Figure11:
         """Everything is made here."""
         return {}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Run all trials; write the points, the table and the figure."""
         simulator = self._real(0.0)
         start = simulator.solved(np.full(len(simulator.terminal), DOWN))

@@ -8,6 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL, SIM, Grounding, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import seed_of_round
@@ -64,7 +65,7 @@ class Compare:
         """Everything is made here, but for what is known."""
         return known_parents(self.known, DATA)
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Run all trials; write every trial's figures and the tables."""
         found, made = self.carried_out(folder, console)
         summary = summaries(found)
@@ -74,7 +75,7 @@ class Compare:
         return {"trials": self.trials, "summaries": [one._asdict() for one in summary]}
 
     def carried_out(
-        self, folder: Path, console: Any, seconds: Callable[[], float] | None = None
+        self, folder: Path, console: Console, seconds: Callable[[], float] | None = None
     ) -> tuple[list[Trial], str]:
         """Return all trials, built beside `folder` and told as they end, and who made them; write them down.
 
@@ -125,7 +126,7 @@ class Compare:
     def _simulators(self) -> Mapping[str, World]:
         return self.simulators or {"": self.iterate.sim}
 
-    def _trial(self, home: Path, sim: World, cell: Cell, number: int, console: Any) -> Iterator[Trial]:
+    def _trial(self, home: Path, sim: World, cell: Cell, number: int, console: Console) -> Iterator[Trial]:
         """Yield a trial iteration by iteration."""
         seed, name, method = self.iterate.seed + number - 1, f"trial_{number:02d}", self.methods[cell.method]
         chain = replace(self.iterate.chain, sim=sim, real=self.worlds[cell.world], accept=True)
@@ -160,7 +161,7 @@ class Compare:
             chain = replace(chain.after(place), shared={})
 
     def _ranked(
-        self, chain: Chain, world: Path, out: Path, ready: Grounding, found: Artifact, console: Any
+        self, chain: Chain, world: Path, out: Path, ready: Grounding, found: Artifact, console: Console
     ) -> float | None:
         if not self.rank:
             return None

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL, World
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch
@@ -41,7 +41,7 @@ def check_robot(world: World, where: str) -> None:
         raise ConfigError(where, "is no robot; replays begin in a robot's real states")
 
 
-def held_out(chain: Chain, place: Path, seed: int, console: Any) -> Batch:
+def held_out(chain: Chain, place: Path, seed: int, console: Console) -> Batch:
     """Return them, collected at `place` if they are not there yet: one of π0, the others around it."""
     stage = Collect(
         world=chain.real,

@@ -9,6 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
 
+from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.setting import setting
 from gsl.errors import ArtifactError, ConfigError
@@ -83,7 +84,7 @@ class Ledger:
             another one tells otherwise, or is the one to be written.
     """
 
-    def __init__(self, path: Path, known: Mapping[str, Path], kind: type[Figures], console: Any) -> None:
+    def __init__(self, path: Path, known: Mapping[str, Path], kind: type[Figures], console: Console) -> None:
         self._path, self._console = path, console
         self._done: dict[str, list[dict[str, Any]]] = {}
         self._kind = kind

@@ -80,7 +80,7 @@ class NoiseStudy:
         """Everything is made here, but for what is known."""
         return known_parents(self.known, DATA)
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Run all trials; write the points, the table and the figure."""
         for name, world in self.worlds.items():
             check_alike(self.sims.get(name, self.iterate.sim).layout, world.layout)

@@ -8,6 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from gsl.core.console import Console, Silent
 from gsl.core.interfaces import REAL, SIM, Grounding, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import derived_seed
@@ -41,16 +42,6 @@ from gsl.worlds.bullet import BulletWorld
 DATA = "replays.json"
 
 
-class Silent:
-    """Hears what the gate says of its own check, which is of other trajectories than the study's."""
-
-    def status(self, text: str) -> None:
-        """Say nothing."""
-
-    def table(self, *parts: Any) -> None:
-        """Show nothing."""
-
-
 @component
 class Replays:
     """Trial k of every method has the same seed, and is judged on the same trajectories of its real world."""
@@ -74,7 +65,7 @@ class Replays:
         """Everything is made here, but for what is known."""
         return {**known_parents(self.known, DATA), **known_parents(self.gains, TRIALS, "gains")}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Build every grounding as a search would have it, replay, load, write the figures, the table and the picture.
 
         Raises:
@@ -118,7 +109,7 @@ class Replays:
             for k, world, method in product(numbers(self.first, self.trials), self.worlds, self.methods)
         }
 
-    def _replay(self, home: Path, number: int, world: str, method: str, loads: Loads, console: Any) -> Replay:
+    def _replay(self, home: Path, number: int, world: str, method: str, loads: Loads, console: Console) -> Replay:
         seed, name, below = self.iterate.seed + number - 1, f"trial_{number:02d}", home / world
         chain = replace(self.iterate.chain, real=self.worlds[world], accept=True)
         held = held_out(chain, below / "held_out" / name, seed, console)

@@ -7,6 +7,7 @@ from dataclasses import field, fields
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 
+from gsl.core.console import Console
 from gsl.core.interfaces import Search, Task
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
@@ -45,7 +46,7 @@ class Reproduce(Compare):
 
     table: Annotated[PaperTable, setting("how the trials are told")] = field(kw_only=True)
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Say beforehand how long it takes, run all trials, write every trial's figures, the table and the picture.
 
         Raises:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.history import windows
 from gsl.core.interfaces import REAL, Grounding, World
 from gsl.core.observation import observations, sensed
@@ -56,7 +57,7 @@ class Figure6:
         """Everything is made here."""
         return {}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Train the grounding, play the command in the three worlds, draw."""
         _check(self.iterate, self.joint, self.duration)
         iterate, loaded = self.iterate, trained(self.iterate, folder.parent, console)
@@ -95,7 +96,7 @@ class Figure7:
         """Everything is made here."""
         return {}
 
-    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Train the grounding, walk in real, replay in simulation, draw."""
         iterate = self.iterate
         if extra_ticks(iterate.sim):
@@ -132,7 +133,7 @@ class Figure7:
         return _told(folder, self, plain.real, found)
 
 
-def trained(iterate: Iterate, home: Path, console: Any) -> LoadedTransformation:
+def trained(iterate: Iterate, home: Path, console: Console) -> LoadedTransformation:
     """Return the grounding of an iteration's settings, alpha 1 for `auto`, trained below `home`."""
     assert isinstance(iterate.grounding, ActionTransformation), "_check has refused others"
     console.status(f"{duration_told(seconds_of_models(iterate))} from nothing; what is built is not built again")

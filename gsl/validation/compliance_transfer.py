@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.impedance import closed, handed_over
 from gsl.core.interfaces import Grounding, World
 from gsl.core.seeds import derived_seed
@@ -142,7 +143,7 @@ class ComplianceReport:
 
 
 def report_compliance(
-    plain: World, world: World, grounding: Grounding, report: Path, console: Any, seed: int
+    plain: World, world: World, grounding: Grounding, report: Path, console: Console, seed: int
 ) -> Mapping[str, Any]:
     """Measure what a grounding makes of a simulator, add it to its report and show it; return it as metrics.
 

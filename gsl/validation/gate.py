@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.interfaces import SIM, World
 from gsl.core.seeds import derived_seed
 from gsl.errors import Refused
@@ -50,7 +51,7 @@ class Gate:
 
     parameters: np.ndarray
     folder: Path
-    console: Any
+    console: Console
     accept: bool
     seed: int
 

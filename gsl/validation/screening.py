@@ -7,10 +7,11 @@ policy falls in it about as often as on the robot (docs/torque.md), and falling 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.core.interfaces import Grounding
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import setting
@@ -45,7 +46,7 @@ def foretells_falls(grounding: Grounding) -> bool:
 
 
 def screen(
-    scenario: Scenario, policies: Mapping[str, np.ndarray], count: int, seed: int, *, workers: int, console: Any
+    scenario: Scenario, policies: Mapping[str, np.ndarray], count: int, seed: int, *, workers: int, console: Console
 ) -> dict[str, Screened]:
     """Return how often policies fall in a simulator; one that falls in its first episodes walks no more.
 

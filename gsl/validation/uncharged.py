@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.console import Console
 from gsl.worlds.control_cost import FREE, KEYS
 
 _PRICE = "'{_target_: gsl.worlds.control_cost.Quadratic, weight: 0.1}'"
@@ -24,7 +25,7 @@ def uncharged(world: Any) -> bool:
     return not free and not any(key in info for key in KEYS)
 
 
-def warn_uncharged(world: Any, console: Any, role: str, what: str) -> None:
+def warn_uncharged(world: Any, console: Console, role: str, what: str) -> None:
     """Warn where the reward of a world that plays `role` may charge for `what` instead of the agent's action."""
     if uncharged(world):
         advice = f"{role}.control_cost={_PRICE} says what it charges, weight: 0 that it does not"

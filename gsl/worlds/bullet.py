@@ -77,8 +77,11 @@ class BulletWorld:
         return having_servo(plant, read_servo(self.servo, self.servo_member), self.servo)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave the plant out: a worker builds its own, and a torque hook need not be a function of a module."""
-        return {name: value for name, value in vars(self).items() if name != "plant"}
+        """Leave a plant with a torque hook out: a worker builds its own, as a hook need not be a module's function."""
+        state = dict(vars(self))
+        if self.plant.hook is not None:
+            del state["plant"]
+        return state
 
     @property
     def layout(self) -> Layout:

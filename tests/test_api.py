@@ -1,0 +1,113 @@
+"""gsl from Python: the same names, checks and artifacts as on the command line."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from commands import done
+
+import gsl
+from gsl.errors import GslError
+from gsl.storage.trajectories import read
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_package_loads_nothing_before_it_is_used() -> None:
+    code = "import sys, gsl; assert not {'numpy', 'hydra', 'gymnasium', 'torch'} & set(sys.modules); gsl.make_world"
+    subprocess.run([sys.executable, "-c", code], check=True)
+    assert set(gsl.__all__) <= set(dir(__import__("gsl.api", fromlist=["api"])))
+    with pytest.raises(AttributeError, match="module 'gsl' has no attribute 'make_word'"):
+        _ = gsl.make_word
+
+
+def test_a_world_has_the_settings_that_are_given() -> None:
+    world = gsl.make_world("nao_worn", step=0.001, effects={"ground_friction": {"friction": 0.6}})
+    assert world.step == 0.001  # type: ignore[attr-defined]
+    effects = world.effects  # type: ignore[attr-defined]
+    assert effects["ground_friction"] == {"friction": 0.6}
+    assert "torque_limit" in effects  # what makes it worn is still there
+
+
+def test_rollouts_are_trajectories_that_can_be_written(elsewhere: Path) -> None:
+    world, task = gsl.make_world("nao_ideal"), gsl.make_task("walk", duration=0.6)
+    batch = gsl.roll_out(world, task, episodes=2, seed=4)
+    assert [one.position.shape for one in batch.episodes] == [(31, 15)] * 2
+    again = gsl.roll_out(world, task, episodes=2, seed=4, workers=2)
+    for one, other in zip(batch.episodes, again.episodes, strict=True):
+        np.testing.assert_array_equal(one.position, other.position)
+    gsl.write_trajectories(Path("log.parquet"), batch)
+    back = gsl.read_trajectories("log.parquet")
+    np.testing.assert_array_equal(back.episodes[1].position, batch.episodes[1].position)
+
+
+def test_a_stage_is_the_same_from_python_and_from_the_command_line(elsewhere: Path) -> None:
+    made = gsl.run("collect", world="nao_ideal", preset="toy", name="here", workers=1, task={"duration": 0.6})
+    done("collect", "world=nao_ideal", "preset=toy", "name=there", "workers=1", "task.duration=0.6", folder=elsewhere)
+    here, there = (f"runs/{name}/collect_real/trajectories.parquet" for name in ("here", "there"))
+    assert Path(here).read_bytes() == Path(there).read_bytes()
+    assert made.metrics["episodes"] == 6
+    assert "<th>episodes</th>" in made._repr_html_()
+    again = gsl.run("collect", world="nao_ideal", preset="toy", name="here", workers=1, **{"task.duration": 0.6})
+    assert again.artifact.unchanged
+
+
+def test_a_component_goes_as_it_is(elsewhere: Path) -> None:
+    world = gsl.make_world("nao_ideal", effects={"torque_limit": {"factor": 0.5}})
+    made = gsl.run("collect", world=world, preset="toy", name="mine", workers=1, task={"duration": 0.6})
+    assert made.artifact.config["world"]["effects"] == {"torque_limit": {"factor": 0.5}}
+
+
+def test_a_diagnosis_is_an_object_with_its_page(elsewhere: Path) -> None:
+    late = {"world.effects.command_latency.delay": 0.02, "world.period": 0.02}
+    log = gsl.run("collect", world="xl330_pendulum", task="excite", name="air", workers=1, **late)
+    world = gsl.make_world("xl330_pendulum", period=0.02)
+    found = gsl.diagnose(log.folder, world, most=1, duels=0, nulls=1, limits=False, workers=1)
+    assert "command_latency" in found.causes
+    assert str(found).startswith(f"{found.verdict}: ")
+    assert "srcdoc" in found._repr_html_()
+    diagnosed = gsl.make_world("xl330_pendulum", effects=found.effects)
+    assert "command_latency" in diagnosed.effects  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: gsl.make_world("nao_wron"), "no world called nao_wron; did you mean nao_worn"),
+        (lambda: gsl.make_world("nao_worn", stp=1), "world.stp: no such setting; did you mean world.step"),
+        (lambda: gsl.make_world("nao_worn", effects={"backlsh": {}, "b": {"c": 1}}), "world.effects.b: no such effect"),
+        (lambda: gsl.run("colect"), "command = colect: there is none of this name; did you mean collect?"),
+        (lambda: gsl.run("collect", sim=gsl.make_world("nao_ideal")), "sim: gsl collect has no such setting"),
+        (lambda: gsl.roll_out(gsl.make_world("nao_ideal"), parameters=[1.0]), "parameters = 1: the policy has 15"),
+        (lambda: gsl.read_trajectories("nowhere"), "nowhere: there is no such path and no such run"),
+    ],
+)
+def test_mistakes_are_said_in_one_line(call: Callable[[], object], said: str, elsewhere: Path) -> None:
+    with pytest.raises(GslError) as caught:
+        call()
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_worlds_have_gymnasium_ids() -> None:
+    env = gymnasium.make("gsl.gym:gsl/nao_worn-v0", effects={"ground_friction": {"friction": 0.6}})
+    observation, _ = env.reset(seed=1)
+    assert env.observation_space.contains(observation)
+    env.step(env.action_space.sample())
+    env.close()
+
+
+def test_a_file_of_python_and_one_of_the_command_line_are_alike(elsewhere: Path) -> None:
+    batch = gsl.roll_out(gsl.make_world("nao_ideal"), gsl.make_task("walk", duration=0.6))
+    gsl.write_trajectories(Path("log.parquet"), batch)
+    assert read(Path("log.parquet")).metadata["source"] == "gsl.roll_out"
