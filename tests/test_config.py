@@ -202,6 +202,18 @@ def test_help_shows_groups_settings_and_effects(capsys: pytest.CaptureFixture[st
     assert "backlash.width" in text
 
 
+def test_help_says_what_a_preset_means_and_what_two_share_once(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["iterate", "--help"]) == 0
+    text = capsys.readouterr().out
+    preset = text.partition("Settings of preset=quick")[2].partition("\n\n")[0].splitlines()[1:]
+    recipe = text.partition("Settings of recipe=default")[2].partition("\n\n")[0].splitlines()[1:]
+    assert all(len(line.split("  ")) > 2 and line.split("  ")[-1].strip() for line in [*preset, *recipe])
+    assert not any("cheetah" in line for line in preset)  # to which nothing here refers
+    assert text.count("penalty on the weights of the linear model") == 1
+    assert "  family        auto or linear " in text
+    assert len(text.splitlines()) < 220
+
+
 OF_ENVIRONMENTS = {  # what is for gymnasium environments, and goes with no robot
     "policy": ("mlp", "action_table"),
     "optimizer": ("policy_iteration", "trpo", "trpo_pendulum", "trpo_long"),

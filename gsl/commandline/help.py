@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import importlib
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from gsl.commandline.composer import camel_case, compose, effects, groups, opened, options
+from omegaconf import OmegaConf
+
+from gsl.commandline.composer import camel_case, compose, configuration_folder, effects, groups, opened, options
 from gsl.commandline.config import CommandSettings, resolved
 from gsl.commandline.known_settings import declared, plain
 from gsl.commandline.overrides import OPTIONAL_GROUPS
@@ -16,6 +19,8 @@ from gsl.core.setting import REQUIRED, Setting, settings_of
 from gsl.errors import ConfigError, GslError
 
 WIDEST = 34
+REFERRED_GROUPS = ("preset", "recipe")  # values without a class, to which settings refer
+NOTE = re.compile(r"(\w+):[^#]*#\s*(.+)")
 
 
 @dataclass(frozen=True)
@@ -57,25 +62,55 @@ def explained(command: str, typed: Sequence[str] = (), *, config_dir: Path | Non
             values = resolved(composition)
         except ConfigError:
             values = plain(composition.config)
-        return Explanation(found, chosen, dict(_sections(values, found)))
+        text = OmegaConf.to_yaml(composition.config)
+        sections = dict(_sections(values, found))
+        for group in REFERRED_GROUPS:
+            if group in sections:
+                notes = _notes(group, chosen[group], config_dir)
+                sections[group] = {
+                    name: replace(one, meaning=notes.get(name, one.meaning))
+                    for name, one in sections[group].items()
+                    if re.search(rf"\b{group}\.{name}\b", text)
+                }
+        return Explanation(found, chosen, {path: one for path, one in sections.items() if one})
+
+
+def _notes(group: str, name: str, config_dir: Path | None) -> dict[str, str]:
+    """Return the remarks beside the values of a yaml file, by key: what has no class says there what it means."""
+    places = [folder / group / f"{name}.yaml" for folder in (config_dir, configuration_folder()) if folder]
+    path = next((place for place in places if place.is_file()), None)
+    lines = path.read_text(encoding="utf-8").splitlines() if path else []
+    return {found[1]: found[2] for line in lines if (found := NOTE.match(line))}
 
 
 def write_help(command: str, typed: Sequence[str] = (), *, config_dir: Path | None = None) -> str:
     """Return the part of a command's help that comes from its configuration, with what is typed of it."""
     explanation = explained(command, typed, config_dir=config_dir)
     parts = [_table("Groups (KEY=NAME, * is the default):", list(_group_lines(explanation)))]
-    for path, settings in explanation.sections.items():
-        chosen = explanation.chosen.get(path)
-        title = (
-            f"Settings of {path}{f'={chosen}' if chosen else ''} ({path}.KEY=VALUE):"
-            if path
-            else "Settings (KEY=VALUE):"
-        )
-        parts.append(_table(title, [_setting_line(setting) for setting in settings.values()]))
-    paths = [f"{path}.effects" for path, settings in explanation.sections.items() if "effects" in settings]
-    if paths:
-        parts.append(_table(f"Effects ({' or '.join(paths)}.NAME.PARAMETER=VALUE):", list(_effect_lines())))
+    for paths, settings in _merged(explanation.sections):
+        names = [f"{path}={name}" if (name := explanation.chosen.get(path)) else path for path in paths]
+        keys = " or ".join(f"{path}.KEY=VALUE" for path in paths)
+        title = f"Settings of {' and '.join(names)} ({keys}):" if paths != [""] else "Settings (KEY=VALUE):"
+        parts.append(_table(title, [_setting_line(setting) for setting in settings]))
+    worlds = [f"{path}.effects" for path, settings in explanation.sections.items() if "effects" in settings]
+    if worlds:
+        parts.append(_table(f"Effects ({' or '.join(worlds)}.NAME.PARAMETER=VALUE):", list(_effect_lines())))
     return "\n".join(part for part in parts if part) + "\n"
+
+
+def _merged(sections: Mapping[str, Mapping[str, Setting]]) -> Iterator[tuple[list[str], list[Setting]]]:
+    """Yield settings with the paths that have the same ones; defaults that differ stand side by side."""
+    alike: dict[frozenset[tuple[str, str]], list[str]] = {}
+    for path, settings in sections.items():
+        alike.setdefault(frozenset((name, one.meaning) for name, one in settings.items()), []).append(path)
+    for paths in alike.values():
+        first = sections[paths[0]]
+        yield paths, [_side_by_side([sections[path][name] for path in paths]) for name in first]
+
+
+def _side_by_side(settings: Sequence[Setting]) -> Setting:
+    defaults = list(dict.fromkeys(_text(one.default) for one in settings))
+    return settings[0] if len(defaults) == 1 else replace(settings[0], default=" or ".join(defaults))
 
 
 def _sections(values: Mapping[str, Any], chosen: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Setting]]]:
