@@ -38,6 +38,27 @@ def test_every_lane_has_the_bits_of_a_float() -> None:
         np.testing.assert_array_equal(result[:, lane], single)
 
 
+@compiled
+def _functions(one: float, result: np.ndarray) -> None:
+    result[0], result[1], result[2] = np.sin(one), np.cos(one), np.tan(one)
+    result[3], result[4] = np.tanh(one), np.arctan(one)
+    result[5], result[6] = np.sqrt(abs(one)), np.log(1.0 + abs(one))
+
+
+@compiled
+def _functions_in_lanes(numbers: np.ndarray, result: np.ndarray) -> None:
+    _functions(side_by_side(numbers)[0], side_by_side(result))
+
+
+def test_a_law_may_use_the_functions_of_numpy() -> None:
+    numbers, result = np.random.default_rng(1).standard_normal((1, LANES)), np.zeros((7, LANES))
+    _functions_in_lanes(numbers, result)
+    for lane in range(LANES):
+        single = np.zeros(7)
+        _functions(numbers[0, lane], single)
+        np.testing.assert_array_equal(result[:, lane], single)
+
+
 def test_eight_never_lie_across_two_cache_lines() -> None:
     kept = [zeros_in_lanes(3, k) for k in range(1, 6)]
     assert all(one.shape == (3, k + 1, LANES) and not one.any() for k, one in enumerate(kept))

@@ -157,7 +157,9 @@ for _compare, _sign in ((operator.gt, ">"), (operator.lt, "<"), (operator.eq, "=
 _define(operator.neg, lanes, 1, _operation("fneg"))
 _define(abs, lanes, 1, _known("fabs"))
 _define(np.rint, lanes, 1, _known("rint"))
-_define(np.exp, lanes, 1, _one_by_one(np.exp))
+_define(np.sqrt, lanes, 1, _known("sqrt"))
+for _function in (np.exp, np.log, np.sin, np.cos, np.tan, np.tanh, np.arctan):
+    _define(_function, lanes, 1, _one_by_one(_function))
 _define(min, lanes, 2, _better("<"))
 _define(max, lanes, 2, _better(">"))
 
