@@ -45,3 +45,8 @@ def __getattr__(name: str) -> Any:
     from gsl import api
 
     return getattr(api, name)
+
+
+def __dir__() -> list[str]:
+    """Name what there is, for completion."""
+    return [*globals(), *__all__]

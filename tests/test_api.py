@@ -39,6 +39,20 @@ def test_a_world_has_the_settings_that_are_given() -> None:
     assert "torque_limit" in effects  # what makes it worn is still there
 
 
+def test_an_effect_takes_the_place_of_the_files() -> None:
+    before = gsl.make_world("nao_worn").effects  # type: ignore[attr-defined]
+    assert isinstance(before["coulomb_friction"], list)
+    world = gsl.make_world("nao_worn", effects={"coulomb_friction": {"torque": 0.3}, "torque_limit": {"factor": 0.5}})
+    after = world.effects  # type: ignore[attr-defined]
+    assert after == before | {"coulomb_friction": {"torque": 0.3}, "torque_limit": {"factor": 0.5}}
+
+
+@pytest.mark.parametrize("name", ["2024", "1e5", "null", "größe"])
+def test_texts_stay_texts(name: str, elsewhere: Path) -> None:
+    made = gsl.run("collect", world="nao_ideal", preset="toy", name=name, workers=1, task={"duration": 0.1})
+    assert made.folder == Path("runs") / name / "collect_real"
+
+
 def test_rollouts_are_trajectories_that_can_be_written(elsewhere: Path) -> None:
     world, task = gsl.make_world("nao_ideal"), gsl.make_task("walk", duration=0.6)
     batch = gsl.roll_out(world, task, episodes=2, seed=4)
@@ -46,7 +60,7 @@ def test_rollouts_are_trajectories_that_can_be_written(elsewhere: Path) -> None:
     again = gsl.roll_out(world, task, episodes=2, seed=4, workers=2)
     for one, other in zip(batch.episodes, again.episodes, strict=True):
         np.testing.assert_array_equal(one.position, other.position)
-    gsl.write_trajectories(Path("log.parquet"), batch)
+    gsl.write_trajectories("log.parquet", batch)
     back = gsl.read_trajectories("log.parquet")
     np.testing.assert_array_equal(back.episodes[1].position, batch.episodes[1].position)
 
@@ -76,8 +90,7 @@ def test_a_diagnosis_is_an_object_with_its_page(elsewhere: Path) -> None:
     assert "command_latency" in found.causes
     assert str(found).startswith(f"{found.verdict}: ")
     assert "srcdoc" in found._repr_html_()
-    diagnosed = gsl.make_world("xl330_pendulum", effects=found.effects)
-    assert "command_latency" in diagnosed.effects  # type: ignore[attr-defined]
+    assert "command_latency" in found.world.effects  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
@@ -85,10 +98,28 @@ def test_a_diagnosis_is_an_object_with_its_page(elsewhere: Path) -> None:
     [
         (lambda: gsl.make_world("nao_wron"), "no world called nao_wron; did you mean nao_worn"),
         (lambda: gsl.make_world("nao_worn", stp=1), "world.stp: no such setting; did you mean world.step"),
-        (lambda: gsl.make_world("nao_worn", effects={"backlsh": {}, "b": {"c": 1}}), "world.effects.b: no such effect"),
+        (
+            lambda: gsl.make_world("nao_worn", effects={"backlsh": {}}),
+            "effects.backlsh: no effect of this name; did you mean",
+        ),
+        (lambda: gsl.make_world("nao_worn", effects={"torque_limit": {}}), "effects.torque_limit.factor: has no value"),
+        (lambda: gsl.make_world("nao_worn", effects=3), "world.effects = 3: is a mapping of effects by name"),
+        (lambda: gsl.run(3), "command = 3: there is none of this name"),  # type: ignore[arg-type]
+        (lambda: gsl.run("collect", world=None), "world = null: takes the name of a file"),
+        (lambda: gsl.run("collect", name={1}), "settings = set: are numbers, texts"),
+        (lambda: gsl.run("collect", world=gsl.make_world("nao_ideal"), **{"world.step": 0.001}), "is below world"),
+        (lambda: gsl.roll_out("nao_ideal"), "world = nao_ideal: is no world; gsl.make_world makes one"),  # type: ignore
+        (lambda: gsl.roll_out(gsl.make_world("nao_ideal"), workers=0), "workers = 0: must not be 0"),
+        (lambda: gsl.roll_out(gsl.make_world("nao_ideal"), role="foo"), "role = foo"),
+        (lambda: gsl.roll_out(gsl.make_world("nao_ideal"), episodes=1.5), "episodes = 1.5"),  # type: ignore[arg-type]
+        (lambda: gsl.roll_out(gsl.make_world("nao_ideal"), parameters=["a"] * 15), "parameters = "),  # type: ignore
+        (lambda: gsl.diagnose("air", "nao_ideal", name="../evil"), "name = ../evil: must be a name in runs/"),
         (lambda: gsl.run("colect"), "command = colect: there is none of this name; did you mean collect?"),
         (lambda: gsl.run("collect", sim=gsl.make_world("nao_ideal")), "sim: gsl collect has no such setting"),
-        (lambda: gsl.roll_out(gsl.make_world("nao_ideal"), parameters=[1.0]), "parameters = 1: the policy has 15"),
+        (
+            lambda: gsl.roll_out(gsl.make_world("nao_ideal"), parameters=[1.0]),
+            "parameters = shape (1,): are 15 numbers",
+        ),
         (lambda: gsl.read_trajectories("nowhere"), "nowhere: there is no such path and no such run"),
     ],
 )

@@ -215,3 +215,79 @@ def test_a_grounding_that_nothing_is_known_of_is_checked_by_falls(home: Path) ->
     assert "TooFar is no grounding of gsl's: only the falls of π0 in it are checked" in said.err
     assert said.code == 1
     assert "π0 falls in 4 of 4 episodes of the grounded simulator. Let TooFar change less" in said.lines[-1]
+
+
+SIM_ALONE = """
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from gsl.core.interfaces import Trainable
+from gsl.core.setting import component, setting
+from gsl.grounding.ane import ActionNoise
+
+
+@component
+class FromSim(Trainable):
+    needs: ClassVar[tuple[str, ...]] = ("sim",)
+    model: Annotated[str, setting("path or run of train-grounding")] = ""
+
+    def learn(self, evidence, seed):
+        assert evidence.real is None
+        return {"sd": np.array(1e-4 * len(evidence.sim))}
+
+    def load(self, arrays):
+        return ActionNoise(sd=float(arrays["sd"]))
+"""
+
+
+def test_what_learns_from_the_simulator_alone_costs_no_real_data(home: Path) -> None:
+    (home / "own_sim.py").write_text(SIM_ALONE)
+    (home / "mine/grounding/sim_alone.yaml").write_text("_target_: own_sim.FromSim\nmodel: ''\n")
+    done("iterate", *OWN, *SMALL, "grounding=sim_alone", "optimizer=random_search", "name=alone", folder=home)
+    metrics = json.loads((home / "runs/alone/iterate/metrics.json").read_text())
+    assert metrics["learned_from"] == 0
+    assert not (home / "runs/alone/iteration_01/collect_real").exists()
+
+
+def test_a_model_that_a_chain_makes_itself_is_not_given(home: Path) -> None:
+    said = refused("iterate", *OWN, "grounding=shrink", "grounding.model=hand", "name=refused", folder=home)
+    assert said == "grounding.model: is made here; gsl optimize takes one that is there"
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("", "grounding = Lacking: has no setting `model`; add "),
+        ("    model: str = ''\n", "grounding = Lacking: has no method `learn`"),
+        (
+            "    model: str = ''\n    needs = ('air',)\n    learn = load = lambda self, *_: {}\n",
+            "grounding = air: its `needs`",
+        ),
+    ],
+)
+def test_a_class_that_lacks_something_is_refused_before_anything_is_collected(
+    body: str, said: str, home: Path, request: pytest.FixtureRequest
+) -> None:
+    number = request.node.callspec.indices["body"]
+    head = "from gsl.core.interfaces import Trainable\nfrom gsl.core.setting import component\n\n@component\n"
+    (home / f"own_lacking_{number}.py").write_text(f"{head}class Lacking(Trainable):\n    ...\n{body}")
+    (home / f"mine/grounding/lacking_{number}.yaml").write_text(f"_target_: own_lacking_{number}.Lacking\n")
+    assert refused("iterate", *OWN, f"grounding=lacking_{number}", "name=refused", folder=home).startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("returned", "said"),
+    [
+        ("None", "grounding: its learn() returned NoneType, not arrays by name"),
+        ("{'a': 'text'}", "grounding: its learn() returned <U4 as a, which are no numbers"),
+    ],
+)
+def test_what_is_no_array_is_refused(returned: str, said: str, iterated: Path, home: Path) -> None:
+    name = f"own_wrong_{abs(hash(returned))}"
+    (home / f"{name}.py").write_text(f"from own_grounding import *\n\n@component\nclass Wrong(Shrink):\n"
+                                     f"    def learn(self, evidence, seed):\n        return {returned}\n")  # fmt: skip
+    (home / f"mine/grounding/{name}.yaml").write_text(f"_target_: {name}.Wrong\nmodel: ''\n")
+    data = ("real=runs/own/iteration_01/collect_real", "sim=runs/own/iteration_01/collect_sim")
+    told = gsl("train-grounding", *OWN, f"+grounding@grounding={name}", *data, f"name={name}", folder=home)
+    assert (told.code, told.lines[-1]) == (2, f"gsl train-grounding: {said}")

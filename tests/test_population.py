@@ -99,6 +99,7 @@ def test_a_world_whose_effect_hooks_a_closure_goes_to_workers() -> None:
     world = BulletWorld(robot="nao", effects={})
     vars(world)["plant"] = replace(world.plant, hook=lambda motion, time: 0.0 * motion[0])
     assert pickle.loads(pickle.dumps(world)).plant.hook is None  # built anew from the effects, which have none
+    assert pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(world)))) == world
 
 
 def test_a_killed_worker_costs_only_its_own_jobs(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
-from gsl.commandline.config_errors import Vocabulary, translated, unfit, unknown_key
+from gsl.commandline.config_errors import Vocabulary, misshapen, translated, unfit, unknown_key
 from gsl.commandline.known_settings import declared, known_keys, plain
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
 from gsl.core.setting import Setting
@@ -31,7 +31,7 @@ from gsl.errors import ConfigError, InputError
 
 REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
 WHOLE = ("iterate", "compare", "reproduce")  # commands that make what a grounding refers to
-MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis|servo)")
+MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis|servo|model)")
 
 
 @dataclass(frozen=True)
@@ -100,6 +100,8 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
     except (CompactHydraException, OmegaConfBaseException, YAMLError) as error:
         words = _with_choices(command, arguments, vocabulary)
         raise unfit(command, arguments, unknown_key(error)) or translated(error, words) from error
+    except ValueError as error:
+        raise misshapen(arguments, error) from error
     _check_effects(composition)
     _check_referred(command, composition)
     _check_made(command, composition)

@@ -20,6 +20,7 @@ _UNKNOWN = re.compile(r"Could not (?:override|delete from config\.) '([^']+)'")
 _NO_OPTION = re.compile(r"Could not find '([^']+)/([^'/]*)'")
 _MISSING = re.compile(r"[Mm]issing mandatory value: (\S+)")
 _NO_PRIMARY = re.compile(r"Cannot find primary config '([^']+)'")
+_MERGED = re.compile(r"Error merging override (\S+)")
 _AMBIGUOUS = re.compile(r"Ambiguous value for argument '([^'=]+)=([^']*)'")
 _UNEXPECTED = re.compile(r"unexpected keyword argument '(\w+)'")
 _INSTANTIATED = re.compile(r"target '([^']+)'")
@@ -70,7 +71,22 @@ def translated(error: Exception, words: Vocabulary) -> Exception:
         return ConfigError(key, f"several values need --multirun; a list is written '{key}=[{value}]'")
     if primary := _NO_PRIMARY.search(text):
         return InputError(f"there is no {primary.group(1)}.yaml in the configuration")
+    if merged := _MERGED.search(text):
+        key, _, value = merged.group(1).lstrip("+~").partition("=")
+        shape = "a list or a mapping, another shape than what is there"
+        return ConfigError(key, f"is {shape}; set single values below it, or take a file without it", given=value)
     return InputError(f"configuration: {' '.join(text.split())}")
+
+
+def misshapen(arguments: Sequence[str], error: ValueError) -> ConfigError:
+    """Return the error for an argument that hydra stumbles over: a group without a name, or a key in a list."""
+    nameless = [one for one in arguments if one.endswith("=null") and "group" in str(error)]
+    if nameless:
+        return ConfigError(nameless[0].partition("=")[0].lstrip("+"), "takes the name of a file", given="null")
+    last = str(error).rpartition(" ")[2].strip("'")
+    keys = [key for one in arguments if last in (key := one.partition("=")[0].lstrip("+~")).split(".")]
+    where = keys[0].rpartition(".")[0] if keys else "configuration"
+    return ConfigError(where, "is a list of entries here, which have no names; set all of it: KEY=[{...}, {...}]")
 
 
 def resolution_error(error: Exception) -> Exception:

@@ -167,7 +167,7 @@ class Trainable(Grounding, Protocol):
         model: Path or run of `train-grounding`, a setting; empty before it has learned.
     """
 
-    needs: ClassVar[tuple[str, ...]]
+    needs: ClassVar[tuple[str, ...]] = (REAL, SIM)
     model: str
 
     def learn(self, evidence: Evidence, seed: int) -> Mapping[str, np.ndarray]:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from gsl.core.described import described
-from gsl.core.interfaces import Grounding, GroundingRun, Preparable, Prepared, Trainable, World
+from gsl.core.interfaces import REAL, SIM, Grounding, GroundingRun, Preparable, Prepared, Trainable, World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.effects.effect import together
@@ -28,6 +28,7 @@ from gsl.grounding.randomised import RandomisedEffects
 from gsl.storage.references import resolve
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
+from gsl.worlds.held import refuse_hook
 
 
 @component
@@ -89,6 +90,8 @@ class DiagnosedEffects:
     def check(self, world: World) -> None:
         """Refuse a world without effects, and what the inner grounding is not for."""
         having_effects(world)
+        if isinstance(world, BulletWorld) and not self.effects:
+            refuse_hook(world.plant)
         if isinstance(self.inner, Preparable):
             self.inner.check(world)
 
@@ -151,5 +154,13 @@ def with_innermost(grounding: Grounding, inner: Grounding) -> Grounding:
 
 
 def learned(grounding: Grounding) -> bool:
-    """Whether a grounding has models that learn from real trajectories."""
+    """Whether a grounding has models that learn from trajectories of a policy."""
     return isinstance(innermost(grounding), ActionTransformation | Trainable)
+
+
+def evidence_of(grounding: Grounding) -> tuple[str, ...]:
+    """Return of which worlds, `real` and `sim`, a grounding needs trajectories of a policy."""
+    inner = innermost(grounding)
+    if isinstance(inner, Trainable):
+        return inner.needs
+    return (REAL, SIM) if isinstance(inner, ActionTransformation) else ()

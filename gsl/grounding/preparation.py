@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gsl.core.checkpoint import read_checkpoint
-from gsl.core.interfaces import Grounding, HasMargins, Preparable, Prepared, Trainable, World
+from gsl.core.interfaces import REAL, SIM, Grounding, HasMargins, Preparable, Prepared, Trainable, World
 from gsl.errors import ConfigError
 from gsl.storage.references import resolve
 
@@ -39,6 +39,23 @@ def prepare(grounding: Grounding, world: World, settled: Mapping[str, Any] | Non
 def without_margins(grounding: Grounding) -> Grounding:
     """Return a grounding without the noise and the draws that a search has on top."""
     return grounding.without_margins() if isinstance(grounding, HasMargins) else grounding
+
+
+def check_own(grounding: Trainable) -> None:
+    """Refuse a class that could not learn or be loaded, before anything is collected for it.
+
+    Raises:
+        ConfigError: It lacks a part, or needs something else than trajectories.
+    """
+    kind = type(grounding)
+    if not isinstance(getattr(grounding, "model", None), str):
+        problem = 'has no setting `model`; add `model: Annotated[str, setting("path or run of train-grounding")] = ""`'
+        raise ConfigError("grounding", problem, given=kind.__name__)
+    for name in ("learn", "load"):
+        if getattr(kind, name) is getattr(Trainable, name):
+            raise ConfigError("grounding", f"has no method `{name}`", given=kind.__name__)
+    if strangers := [role for role in grounding.needs if role not in (REAL, SIM)]:
+        raise ConfigError("grounding", f"its `needs` are of {REAL} and {SIM}", given=str(strangers[0]))
 
 
 def _trained(grounding: Trainable) -> Path:

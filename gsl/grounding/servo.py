@@ -25,6 +25,7 @@ from gsl.models.servo_file import MAKER, read_members, read_servo
 from gsl.storage.references import resolve
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
+from gsl.worlds.held import refuse_hook
 from gsl.worlds.velocity_motors import check_servos
 
 # Of a joint's torque limit, at every step and constant: motions in the air do not show what loads of the ground do.
@@ -118,6 +119,7 @@ class LearnedServo:
         check_servos(world.motors)
         if world.servo is not None:
             raise ConfigError("grounding", "the simulator has a learned servo already; say grounding=none")
+        refuse_hook(world.plant)
         return world
 
     @property

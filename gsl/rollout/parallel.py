@@ -81,7 +81,7 @@ def arriving(
     function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Progress
 ) -> Iterator[tuple[int, Any]]:
     """Yield (index of job, `function(pickled shared, job)`) of all jobs, as they end."""
-    frozen = _frozen(shared)
+    frozen = _frozen(shared, workers)
     missing = list(range(len(jobs)))
     for _ in range(TRIES):
         for index, result in _arriving(function, frozen, jobs, tuple(missing), workers):
@@ -93,17 +93,21 @@ def arriving(
     raise GslError(f"worker processes died {TRIES} times in one batch of jobs; try workers=1 or look at free memory")
 
 
-def _frozen(shared: Any) -> bytes:
+def _frozen(shared: Any, workers: int) -> bytes:
     """Return what all workers need, pickled.
 
     Raises:
         GslError: A component of the user's own cannot be.
     """
     try:
-        return pickle.dumps(shared)
+        frozen = pickle.dumps(shared)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         advice = "give its object plain fields and functions of a module, no closures"
         raise GslError(f"a component cannot go to the worker processes ({error}); {advice}") from error
+    if workers != 1 and b"__main__" in frozen:
+        problem = "a class of this script or notebook cannot be found by worker processes"
+        raise GslError(f"{problem}; put it into a module of its own, or say workers=1")
+    return frozen
 
 
 def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequence[int], workers: int) -> Iterator[Any]:

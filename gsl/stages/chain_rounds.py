@@ -18,9 +18,10 @@ from gsl.core.interfaces import (
 from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.diagnosis_file import read_diagnosis
-from gsl.grounding.effects import DiagnosedEffects, innermost, learned, switched_on, with_innermost
+from gsl.grounding.effects import DiagnosedEffects, evidence_of, innermost, switched_on, with_innermost
 from gsl.grounding.gat import ActionTransformation, check_known
 from gsl.grounding.none import NoGrounding
+from gsl.grounding.preparation import check_own
 from gsl.grounding.servo import LearnedServo
 from gsl.stages.chain import Links
 from gsl.stages.chain_training import train_own, train_transformation
@@ -64,10 +65,10 @@ class Chain(Links):
         if isinstance(inner, ActionTransformation):
             self._check_joints(inner)
             self._check_models(inner)
-        if not learned(grounding):
-            return
+        if isinstance(inner, Trainable):
+            check_own(inner)
         for role, count in {REAL: sum(self.budget.real), SIM: sum(self.budget.sim)}.items():
-            if count < FEWEST:
+            if role in evidence_of(grounding) and count < FEWEST:
                 problem = f"{several(count, 'episode')} with neighbours; {FEWEST} are the least for a model: {WHY}"
                 raise ConfigError(f"budget.{role}_episodes", problem)
 

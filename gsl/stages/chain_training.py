@@ -27,7 +27,7 @@ def train_own(
     """Collect what a grounding needs, let it learn below `home`, and return it with its model."""
     data = collect(chain, home, previous, seed, console, roles=grounding.needs)
     real, sim = (str(data[role]) if role in data else None for role in (REAL, SIM))
-    stage = TrainGrounding(grounding, real, sim, seed=seed)
+    stage = TrainGrounding(grounding, real, sim, seed=seed, earlier=chain.earlier if real else ())
     made = built(stage, home / stage.kind, console)
     settings: Any = grounding  # a frozen dataclass, as every component
     trained: Grounding = replace(settings, model=str(made.folder))

@@ -44,6 +44,7 @@ from gsl.storage import documents
 from gsl.training.servo_folds import servo_errors
 from gsl.validation.learned_replay import LearnedReplay, Simulated
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.held import refuse_hook
 from gsl.worlds.velocity_motors import check_servos
 
 TABLE, DATA = "table.md", "folds.json"
@@ -92,6 +93,7 @@ class CrossValidate:
     def __post_init__(self) -> None:
         """Refuse what cannot be fitted to all joints, or is to be left out, or replayed."""
         check_servos(self.sim.motors)
+        refuse_hook(self.sim.plant)
         if not self.usual:
             raise ConfigError("usual", "names at least one effect to compare with")
         everywhere = {one.effect for one in library(lumped(self.sim.plant.robot)) if one.on_joints}

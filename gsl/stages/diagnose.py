@@ -33,6 +33,7 @@ from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.diagnosis_report import PAGE, REPORT, SIMULATOR, WORLD, report_of
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.held import refuse_hook
 from gsl.worlds.velocity_motors import check_servos
 
 DEFAULT_ROBOT = "nao"  # that commands mean which name none
@@ -70,6 +71,7 @@ class Diagnose:
     def __post_init__(self) -> None:
         """Refuse a simulator that logs cannot be replayed in."""
         check_servos(self.sim.motors)
+        refuse_hook(self.sim.plant)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""

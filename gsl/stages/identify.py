@@ -27,6 +27,7 @@ from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.diagnosis_report import REPORT
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.held import refuse_hook
 from gsl.worlds.velocity_motors import check_servos
 
 WORLD = "world/identified.yaml"
@@ -51,6 +52,7 @@ class Identify:
     def __post_init__(self) -> None:
         """Refuse a simulator that logs cannot be replayed in."""
         check_servos(self.sim.motors)
+        refuse_hook(self.sim.plant)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""

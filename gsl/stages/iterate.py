@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from gsl.core.console import Console
-from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, Trainable, World
+from gsl.core.interfaces import REAL, SIM, Grounding, Learner, Policy, Search, Task, Trainable, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
 from gsl.core.words import in_unit
 from gsl.errors import ConfigError, Refused
-from gsl.grounding.effects import innermost, learned
+from gsl.grounding.effects import evidence_of, innermost, learned
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.preparation import MAKER, without_margins
 from gsl.models.config import ModelConfig
@@ -25,6 +25,7 @@ from gsl.rollout.rollout import Scenario
 from gsl.stages.chain import Budget
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.diagnosis_plan import EXCITATION, DiagnosisPlan, flown
+from gsl.stages.train_forward import TrainForward
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policies import write_policies
@@ -165,7 +166,7 @@ class Iterate:
 
     @property
     def _collected_real(self) -> int:
-        return sum(self.budget.real) if self.learned else 0
+        return sum(self.budget.real) if REAL in evidence_of(self.grounding) else 0
 
     def _diagnosed(self, home: Path, rounds: Rounds, console: Console) -> Grounding:
         """Return the grounding with its diagnosis: an excitation knows no policy, so that one serves all iterations."""
@@ -186,8 +187,8 @@ class Iterate:
         place = home / FIRST
         search = Artifact(place / "optimize", manifest.read(place / "optimize"))
         scenario = Scenario(self.sim, self.task, self.policy, SIM, without_margins(first)).prepared(search.metrics)
-        if self.learned:
-            maker = MAKER if isinstance(innermost(first), Trainable) else "train_forward"
+        maker = MAKER if isinstance(innermost(first), Trainable) else TrainForward.kind
+        if (place / maker / HELDOUT).is_file():
             heldout = read(place / maker / HELDOUT)
             walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
             draw_walk_and_joint(folder, scenario, walk)

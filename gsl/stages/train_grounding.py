@@ -13,10 +13,10 @@ from gsl.core.console import Console
 from gsl.core.interfaces import REAL, SIM, Evidence, Trainable
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.grounding.preparation import KIND, MAKER, MODEL
+from gsl.grounding.preparation import KIND, MAKER, MODEL, check_own
 from gsl.storage.checkpoints import write_checkpoint
 from gsl.storage.trajectories import data_file, read, write
-from gsl.training.data import FALLS, HELDOUT, of_policy, parts
+from gsl.training.data import FALLS, HELDOUT, aggregated, earlier_batch, of_policy, parts
 
 
 @component
@@ -30,22 +30,26 @@ class TrainGrounding:
     sim: Annotated[str | None, setting("simulated trajectories of the same policies")] = None
     heldout: Annotated[float, setting("share of the real trajectories that is held out", gt=0, lt=1)] = 0.2
     seed: Annotated[int, setting("of the split and of the fit", ge=0)] = 1
+    earlier: Annotated[tuple[str, ...], setting("real trajectories of earlier policies, to learn from as well")] = ()
 
     def __post_init__(self) -> None:
         """Refuse a grounding without the trajectories that it needs.
 
         Raises:
-            ConfigError: They are missing, or it needs something else.
+            ConfigError: They are missing, or its class could not learn.
         """
+        check_own(self.grounding)
         for role in self.grounding.needs:
-            if role not in (REAL, SIM):
-                raise ConfigError("grounding.needs", f"is of {REAL} and {SIM}", given=role)
             if getattr(self, role) is None:
                 raise ConfigError(role, f"is missing; the grounding learns from {role} trajectories")
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files of trajectories, or the artifacts."""
-        named = {role: reference for role in (REAL, SIM) if (reference := getattr(self, role)) is not None}
+        named: dict[str, str] = {}
+        for role in (REAL, SIM):
+            if (reference := getattr(self, role)) is not None:
+                named[role] = reference
+        named |= {f"earlier_{n}": one for n, one in enumerate(self.earlier, start=1)}
         files = {role: data_file(reference) for role, reference in named.items()}
         return {role: path if path == Path(named[role]) else path.parent for role, path in files.items()}
 
@@ -54,7 +58,8 @@ class TrainGrounding:
         console.status("the grounding learns")
         real, count = None, 0
         if self.real is not None:
-            data = parts(data_file(self.real), other=SIM, share=self.heldout, seed=self.seed)
+            newest = parts(data_file(self.real), other=SIM, share=self.heldout, seed=self.seed)
+            data = aggregated(newest, [earlier_batch(data_file(one), newest.training) for one in self.earlier])
             episodes = (*data.training.episodes, *data.validation.episodes)
             labels = [one for part in (data.training, data.validation) for one in part.metadata["episodes"]]
             real = replace(data.training, episodes=episodes, metadata={**data.training.metadata, "episodes": labels})
@@ -63,7 +68,22 @@ class TrainGrounding:
             write(folder / HELDOUT, replace(data.heldout, metadata={**data.heldout.metadata, FALLS: falls}))
             count = len(real)
         sim = None if self.sim is None else read(data_file(self.sim))
-        arrays = self.grounding.learn(Evidence(real, sim), self.seed)
+        arrays = _arrays(self.grounding.learn(Evidence(real, sim), self.seed))
         name = f"{type(self.grounding).__module__}.{type(self.grounding).__qualname__}"
         write_checkpoint(folder / MODEL, arrays, {"kind": KIND, "class": name})
         return {"trajectories": count, "arrays": {key: list(values.shape) for key, values in arrays.items()}}
+
+
+def _arrays(learned: Any) -> dict[str, np.ndarray]:
+    """Return what a grounding has learned as arrays of numbers.
+
+    Raises:
+        ConfigError: It is something else.
+    """
+    if not isinstance(learned, Mapping):
+        raise ConfigError("grounding", f"its learn() returned {type(learned).__name__}, not arrays by name")
+    arrays = {str(name): np.asarray(values) for name, values in learned.items()}
+    for name, values in arrays.items():
+        if values.dtype.kind not in "biuf":
+            raise ConfigError("grounding", f"its learn() returned {values.dtype} as {name}, which are no numbers")
+    return arrays

@@ -15,7 +15,7 @@ from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
 from gsl.core.unit import Unit
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects, learned
+from gsl.grounding.effects import DiagnosedEffects, evidence_of, learned
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
@@ -141,7 +141,7 @@ class Compare:
         for iteration in range(1, self.iterate.iterations + 1):
             place = below / cell.world / cell.method / name / (f"iteration_{iteration:02d}" if iteration > 1 else "")
             apart = learned(grounding) or flight is not None or iteration > 1
-            spent += sum(self.iterate.budget.real) if learned(grounding) else 0
+            spent += sum(self.iterate.budget.real) if REAL in evidence_of(grounding) else 0
             out = place if apart else below / "sim" / cell.method / name
             at = seed_of_round(seed, iteration)
             ready, found, measured = chain.round(place, grounding, previous, at, console, search=out)

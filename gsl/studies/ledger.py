@@ -23,7 +23,13 @@ from gsl.studies.duration import duration_told
 from gsl.studies.ledger_file import MADE_BY, RECIPE, Figures, read
 
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
-MADE = ("forward_model", "inverse_model", "diagnosis", "servo")  # names of what a trial makes; a world's are files
+MADE = (
+    "forward_model",
+    "inverse_model",
+    "diagnosis",
+    "servo",
+    "model",
+)  # names of what a trial makes; a world's are files
 NUMBER = ("number", "trial")  # what rows call their trial
 # Settings that came after trials were written down, at what changes nothing.
 LATER = {"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim", "rested": False,

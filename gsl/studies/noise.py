@@ -18,7 +18,7 @@ from gsl.core.setting import component, setting
 from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
-from gsl.grounding.effects import learned
+from gsl.grounding.effects import evidence_of, learned
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.policy import sized
@@ -195,7 +195,7 @@ class NoiseStudy:
                 first = place = home / f"iteration_{number:02d}"
             at, only = seed_of_round(seed, number), BEST if self.choice == SIM else ""
             _, found, measured = chain.round(place, grounding, start, at, console, search=first, only=only)
-            spent += _steps(chain.shared.get(REAL, place)) if learned(grounding) else 0
+            spent += _steps(chain.shared.get(REAL, place)) if REAL in evidence_of(grounding) else 0
             told = measured.metrics
             if self.choice == SIM:
                 value, promised = told["last"]["value"], found.metrics["best_value_sim"]

@@ -2,7 +2,8 @@
 
 A group of joints takes a step only if held-out motions say so: numbers, which are few, if these come nearer, a network
 if they come nearer by a good share, significantly. Half of them also say when to stop, the others are for the report.
-Where a log knows of three conditions or more, such as gains, the same has to hold under each one that is left out.
+Where a log knows of three conditions or more, such as gains, each is left out in turn, and the same has to hold of all
+windows that were left out, together.
 """
 
 from __future__ import annotations

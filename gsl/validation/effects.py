@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.interfaces import Trainable
 from gsl.grounding.diagnosis_file import Diagnosis, read_diagnosis
 from gsl.grounding.effects import DiagnosedEffects, switched_on
 from gsl.grounding.gat import ActionTransformation
@@ -51,7 +52,7 @@ def check_diagnosed_effects(grounding: DiagnosedEffects, scenario: Scenario, gat
     about = {"effects": list(found.causes), "diagnosis": found.verdict}
     inside = replace(scenario, world=switched_on(scenario.world, found), grounding=grounding.inner)
     ready, checked = check_grounding(inside, gate)
-    own, path = isinstance(grounding.inner, ActionTransformation | LearnedServo), gate.folder / REPORT
+    own, path = isinstance(grounding.inner, ActionTransformation | LearnedServo | Trainable), gate.folder / REPORT
     before = json.loads(path.read_text(encoding="utf-8")) if own and path.exists() else {}
     ready = replace(ready, world=grounding.drawn(ready.world, found))
     if grounding.draws or not own:

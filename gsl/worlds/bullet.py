@@ -78,10 +78,8 @@ class BulletWorld:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave a plant with a torque hook out: a worker builds its own, as a hook need not be a module's function."""
-        state = dict(vars(self))
-        if self.plant.hook is not None:
-            del state["plant"]
-        return state
+        hooked = self.plant.hook is not None
+        return {name: value for name, value in vars(self).items() if not (hooked and name == "plant")}
 
     @property
     def layout(self) -> Layout:

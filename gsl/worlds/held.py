@@ -73,10 +73,7 @@ class Held:
         Raises:
             ConfigError: It has a torque hook, which only Bullet calls.
         """
-        if plant.hook is not None:
-            name = getattr(plant.hook, "__qualname__", type(plant.hook).__qualname__)
-            problem = f"the torque hook {name} acts in Bullet alone, and logs in the air are replayed without it"
-            raise ConfigError("effects", f"{problem}; leave its effect out here, or write it as a law of the servo")
+        refuse_hook(plant)
         servo = packed(plant.servo, plant.robot.supply_voltage, plant.law)
         pushes = [row for push in plant.pushes for row in _aimed(push, plant.robot)]
         tree = chain(plant, plant.servo.armature - servo.rows[ROTOR])
@@ -108,6 +105,18 @@ class Held:
         clock = np.full(len(paths), -settle * self.period)
         told = self.replay(Windows(np.ascontiguousarray(commands), motion, clock))
         return [one[settle - 1 : settle + len(path)] for one, path in zip(told, paths, strict=True)]
+
+
+def refuse_hook(plant: Plant) -> None:
+    """Refuse a plant that replays in the air would not do justice to.
+
+    Raises:
+        ConfigError: It has a torque hook, which only Bullet calls.
+    """
+    if plant.hook is not None:
+        name = getattr(plant.hook, "__qualname__", type(plant.hook).__qualname__)
+        problem = f"the torque hook {name} acts in Bullet alone, and logs in the air are replayed without it"
+        raise ConfigError("effects", f"{problem}; leave its effect out here, or write it as a law of the servo")
 
 
 def shares(windows: int, threads: int) -> list[slice]:

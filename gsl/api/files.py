@@ -1,0 +1,29 @@
+"""Trajectory files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gsl.core.trajectory import Batch
+from gsl.storage.trajectories import data_file
+from gsl.storage.trajectories import read as read_file
+from gsl.storage.trajectories import write as write_file
+
+
+def read_trajectories(reference: Path | str) -> Batch:
+    """Return the trajectories of a file, or of a run of collect or import.
+
+    Raises:
+        TrajectoryError: The file breaks the contract (docs/files.md).
+        ArtifactError: There is none.
+    """
+    return read_file(data_file(str(reference)))
+
+
+def write_trajectories(path: Path | str, batch: Batch) -> None:
+    """Write trajectories to a file, whole or not at all.
+
+    Raises:
+        TrajectoryError: They break the contract (docs/files.md).
+    """
+    write_file(Path(path), batch)

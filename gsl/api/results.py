@@ -1,0 +1,93 @@
+"""What a stage has made, as an object that shows itself in a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from gsl.commandline.config import instantiated
+from gsl.core.interfaces import World
+from gsl.grounding.diagnosis_file import read_diagnosis
+from gsl.grounding.effects import switched_on
+from gsl.report.account import account
+from gsl.storage.artifact import Artifact
+from gsl.storage.diagnosis_report import PAGE, report_of
+
+_FRAME = 'style="width: 100%; height: 600px; border: 0"'
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a stage has made; in a notebook it shows its tables.
+
+    Attributes:
+        artifact: Its folder and manifest.
+    """
+
+    artifact: Artifact
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the artifact."""
+        return self.artifact.folder
+
+    @property
+    def metrics(self) -> Mapping[str, Any]:
+        """The figures that the stage reported."""
+        return self.artifact.metrics
+
+    def _repr_html_(self) -> str:
+        return "".join(
+            f"<p><b>{escape(told.title)}</b></p>{_table(told.columns, told.rows)}<p>{escape(told.caption or '')}</p>"
+            for told in account(self.artifact)
+        )
+
+
+@dataclass(frozen=True)
+class Verdict(Result):
+    """What a diagnosis says; in a notebook it shows its page."""
+
+    @property
+    def report(self) -> Mapping[str, Any]:
+        """Everything that was found (docs/diagnose.md)."""
+        return report_of(self.folder)
+
+    @property
+    def verdict(self) -> str:
+        """One of `no_gap`, `causes`, `inseparable` and `unknown`."""
+        return str(self.report["verdict"])
+
+    @property
+    def causes(self) -> list[str]:
+        """Names of the effects that cause the gap."""
+        return [one["effect"] for one in self.report["causes"]]
+
+    @property
+    def effects(self) -> Mapping[str, Any]:
+        """What the simulator lacks, as in a world's `effects:`."""
+        return dict(self.report["effects"])
+
+    @property
+    def world(self) -> World:
+        """The simulator with what it lacks."""
+        return switched_on(instantiated(self.artifact.config["sim"]), read_diagnosis(str(self.folder), "diagnose"))
+
+    @property
+    def summary(self) -> str:
+        """The same in a sentence or two."""
+        return str(self.report["summary"])
+
+    def __str__(self) -> str:
+        return f"{self.verdict}: {self.summary}"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe srcdoc="{escape((self.folder / PAGE).read_text(encoding="utf-8"))}" {_FRAME}></iframe>'
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [(columns, "th"), *((row, "td") for row in rows)]
+    cells = ["".join(f"<{tag}>{escape(str(cell))}</{tag}>" for cell in line) for line, tag in lines]
+    return "<table>" + "".join(f"<tr>{line}</tr>" for line in cells) + "</table>"

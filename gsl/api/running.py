@@ -1,0 +1,84 @@
+"""Stages from keyword arguments, and the diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import is_dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from gsl.api.files import write_trajectories
+from gsl.api.overrides import overrides
+from gsl.api.results import Result, Verdict
+from gsl.commandline.composer import compose, configuration_folder, opened
+from gsl.commandline.config import CommandSettings, execute, resolved
+from gsl.commandline.overrides import file_of
+from gsl.core.console import Silent
+from gsl.core.described import described
+from gsl.core.interfaces import World
+from gsl.core.trajectory import Batch
+from gsl.core.validation import did_you_mean, make
+from gsl.errors import ConfigError
+from gsl.report.console import Console
+from gsl.storage import manifest
+from gsl.storage.artifact import Artifact
+from gsl.storage.hashing import file_hash
+
+
+def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = True, **settings: Any) -> Result:
+    """Run a stage and return what it has made; what is there already and unchanged is not made again.
+
+    Args:
+        command: Such as `collect` or `train-forward`; `gsl --help` lists them.
+        config_dir: A folder of yaml files of your own.
+        quiet: Whether progress and tables are not shown.
+        **settings: As KEY=VALUE on the command line: `world="nao_worn"`, `name="mine"`, `task={"duration": 2.0}`, or
+            `**{"task.duration": 2.0}`. A component, such as a world of `make_world`, goes as it is.
+
+    Raises:
+        InputError: A setting or a file is wrong.
+        GslError: The stage failed.
+    """
+    command = str(command)
+    commands = sorted(path.stem for path in configuration_folder().glob("*.yaml"))
+    if (name := file_of(command)) not in commands:
+        raise ConfigError("command", f"there is none of this name{did_you_mean(name, commands)}", given=command)
+    objects = {key: value for key, value in settings.items() if is_dataclass(value)}
+    plain = {key: value for key, value in settings.items() if key not in objects}
+    for key in plain:
+        if (whole := key.partition(".")[0]) in objects:
+            raise ConfigError(key, f"is below {whole}, which goes as it is; set it there")
+    with opened(None if config_dir is None else Path(config_dir)):
+        config = resolved(compose(command, list(overrides(plain))))
+    for key, value in objects.items():
+        if key not in config:
+            raise ConfigError(key, f"gsl {command} has no such setting")
+        config[key] = described(value)
+    named = ", ".join(f"{key}={value!r}" for key, value in settings.items())
+    document = execute(command, f"gsl.run({command!r}, {named})", config, Silent() if quiet else Console())
+    folder = Path(document["folder"])
+    made = Artifact(folder, manifest.read(folder), unchanged=document["unchanged"])
+    return Verdict(made) if made.manifest.kind == "diagnose" else Result(made)
+
+
+def diagnose(log: Batch | Path | str, world: World | str, *, name: str = "diagnosis", **settings: Any) -> Verdict:
+    """Return where a simulator's gap to a log lies, and what causes it.
+
+    Args:
+        log: Trajectories in the air: a batch, a file, or a run of collect or import.
+        world: The simulator, or its name.
+        name: Of the run, below runs/.
+        **settings: Of `gsl diagnose`, such as `tolerance=0.001`.
+    """
+    make(CommandSettings, {"name": name})
+    if isinstance(log, Batch):
+        with TemporaryDirectory() as place:
+            written = Path(place) / "log.parquet"
+            write_trajectories(written, log)
+            path = Path("runs") / name / f"log_{file_hash(written)[:12]}.parquet"  # another log, another file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(written.read_bytes())
+        log = path
+    found = run("diagnose", real=str(log), sim=world, name=name, **settings)
+    assert isinstance(found, Verdict), "a diagnosis has a verdict"
+    return found
