@@ -177,7 +177,7 @@ def test_what_is_held_out_is_not_learned_from(iterated: Path) -> None:
 def test_the_same_by_hand(iterated: Path, home: Path) -> None:
     """What `iterate` does, stage by stage: the same model comes out."""
     data = ("real=runs/own/iteration_01/collect_real", "sim=runs/own/iteration_01/collect_sim")
-    done("train-grounding", *OWN, "+grounding@grounding=shrink", *data, "name=hand", folder=home)
+    done("train-grounding", *OWN, "grounding=shrink", *data, "name=hand", folder=home)
     here, there = (
         read_checkpoint(home / f"runs/{place}/train_grounding" / MODEL, kind=KIND)[0]
         for place in ("hand", "own/iteration_01")
@@ -198,7 +198,7 @@ def test_both_appear_in_compare(iterated: Path, home: Path) -> None:
 def test_what_is_missing_is_said_in_one_line(home: Path) -> None:
     said = refused("optimize", *OWN, "grounding=shrink", "name=refused", folder=home)
     assert said == "grounding.model: is missing; name a run of gsl train-grounding"
-    said = refused("train-grounding", *OWN, "+grounding@grounding=shrink", "name=refused", folder=home)
+    said = refused("train-grounding", *OWN, "grounding=shrink", "name=refused", folder=home)
     assert said == "real: is missing; the grounding learns from real trajectories"
     said = refused("optimize", *OWN, "grounding=shrink", "grounding.most=-1", "name=refused", folder=home)
     assert "grounding.most" in said
@@ -289,5 +289,43 @@ def test_what_is_no_array_is_refused(returned: str, said: str, iterated: Path, h
                                      f"    def learn(self, evidence, seed):\n        return {returned}\n")  # fmt: skip
     (home / f"mine/grounding/{name}.yaml").write_text(f"_target_: {name}.Wrong\nmodel: ''\n")
     data = ("real=runs/own/iteration_01/collect_real", "sim=runs/own/iteration_01/collect_sim")
-    told = gsl("train-grounding", *OWN, f"+grounding@grounding={name}", *data, f"name={name}", folder=home)
+    told = gsl("train-grounding", *OWN, f"grounding={name}", *data, f"name={name}", folder=home)
     assert (told.code, told.lines[-1]) == (2, f"gsl train-grounding: {said}")
+
+
+def test_after_an_edit_of_ones_class_it_learns_anew(iterated: Path, home: Path) -> None:
+    data = ("real=runs/own/iteration_01/collect_real", "sim=runs/own/iteration_01/collect_sim")
+    path, command = home / "own_edited.py", ("train-grounding", *OWN, "grounding=edited", *data, "name=edited")
+    path.write_text(GROUNDING)
+    (home / "mine/grounding/edited.yaml").write_text("_target_: own_edited.Shrink\nmodel: ''\n")
+    done(*command, folder=home)
+    path.write_text(GROUNDING.replace("real / sim", "sim / real"))
+    assert refused(*command, folder=home).startswith("runs/edited/train_grounding: was built otherwise")
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (
+            "[step[:3] for step in steps]",
+            "optimizer: its ask() returned a candidate of shape (3,); the policy has",
+        ),
+        ("[]", "optimizer: its ask() returned no candidate"),
+        ("None", "optimizer: its ask() returned no list of candidates: "),
+        (
+            "[np.nan * step for step in steps]",
+            "optimizer: its ask() returned a candidate with a number that is not",
+        ),
+        ("[1 / 0]", "own_bad_4.Run.ask failed (own_bad_4.py, line 29): ZeroDivisionError: division by zero"),
+    ],
+)
+def test_what_an_optimiser_asks_for_is_checked(
+    asked: str, said: str, home: Path, request: pytest.FixtureRequest
+) -> None:
+    number = request.node.callspec.indices["asked"]
+    text = OPTIMISER.replace("[self.best + step for step in steps]", asked)
+    (home / f"own_bad_{number}.py").write_text(text)
+    (home / f"mine/optimizer/bad_{number}.yaml").write_text(f"_target_: own_bad_{number}.RandomSearch\n")
+    told = gsl("optimize", *OWN, *SMALL, "grounding=none", f"optimizer=bad_{number}", f"name=bad_{number}", folder=home)
+    assert told.code in (1, 2)
+    assert told.lines[-1].startswith(f"gsl optimize: {said}")

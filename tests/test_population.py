@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import joblib
 import numpy as np
 import pytest
 from scenarios import QUIET, arm, walk
@@ -42,6 +43,12 @@ def test_the_number_and_order_of_workers_change_no_bit() -> None:
     jobs = _jobs(scenario)
     alone, together, reversed_ = _run(scenario, jobs, 1), _run(scenario, jobs, 2), _run(scenario, jobs[::-1], 2)
     assert _bytes(alone) == _bytes(together) == _bytes(reversed_[::-1])
+
+
+def test_so_few_workers_that_one_is_left_are_none_beside_this_process() -> None:
+    scenario = walk()
+    jobs = _jobs(scenario, 2)
+    assert _bytes(_run(scenario, jobs, 1)) == _bytes(_run(scenario, jobs, -joblib.cpu_count()))
 
 
 def test_an_episode_is_the_summary_of_its_trajectory() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gsl.core.trajectory import Batch
+from gsl.errors import ConfigError
 from gsl.storage.trajectories import data_file
 from gsl.storage.trajectories import read as read_file
 from gsl.storage.trajectories import write as write_file
@@ -26,4 +27,9 @@ def write_trajectories(path: Path | str, batch: Batch) -> None:
     Raises:
         TrajectoryError: They break the contract (docs/files.md).
     """
-    write_file(Path(path), batch)
+    place = Path(path)
+    if not isinstance(batch, Batch):
+        raise ConfigError("batch", "is no batch, as roll_out and read_trajectories return", given=str(batch))
+    if place.is_dir() or not place.parent.is_dir():
+        raise ConfigError("path", "is no file in a folder that exists", given=str(path))
+    write_file(place, batch)

@@ -39,6 +39,9 @@ class Result:
         """The figures that the stage reported."""
         return self.artifact.metrics
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.folder.as_posix()})"
+
     def _repr_html_(self) -> str:
         return "".join(
             f"<p><b>{escape(told.title)}</b></p>{_table(told.columns, told.rows)}<p>{escape(told.caption or '')}</p>"

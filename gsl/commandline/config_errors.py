@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -122,9 +123,18 @@ def instantiation_error(error: InstantiationException) -> BaseException:
             f"{path}.{name}".lstrip("."), f"no such setting{did_you_mean(name, settings_of(get_object(target)))}"
         )
     if text.startswith("Error locating target"):
-        reason = str(cause).splitlines()[1] if cause is not None and "\n" in str(cause) else str(cause)
+        reason = _lacking(target) or (str(cause).splitlines()[1] if cause and "\n" in str(cause) else str(cause))
         return ConfigError(f"{path}._target_".lstrip("."), f"cannot be loaded: {reason}", given=target)
     return cause or error
+
+
+def _lacking(target: str) -> str:
+    """Return that a module has no such class, if that is why it cannot be loaded; nothing otherwise."""
+    place, _, name = target.rpartition(".")
+    module = sys.modules.get(place)
+    if module is None or hasattr(module, name):
+        return ""
+    return f"{place} has no class {name}{did_you_mean(name, [one for one in vars(module) if one[:1].isupper()])}"
 
 
 def _of_pydantic(error: ValidationError, target: Callable[..., Any], path: str) -> ConfigError:

@@ -11,7 +11,16 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
-from gsl.commandline.composer import camel_case, compose, configuration_folder, effects, groups, opened, options
+from gsl.commandline.composer import (
+    Composition,
+    camel_case,
+    compose,
+    configuration_folder,
+    effects,
+    groups,
+    opened,
+    options,
+)
 from gsl.commandline.config import CommandSettings, resolved
 from gsl.commandline.known_settings import declared, plain
 from gsl.commandline.overrides import OPTIONAL_GROUPS
@@ -56,7 +65,7 @@ def explained(command: str, typed: Sequence[str] = (), *, config_dir: Path | Non
             composition = compose(command, [])
         keys = {choice.partition("@")[2] or choice: choice for choice in composition.chosen}
         found = {key: options(choice.partition("@")[0]) for key, choice in keys.items()}
-        found |= {group: options(group) for group in OPTIONAL_GROUPS if group in groups()}
+        found |= {group: options(group) for group in OPTIONAL_GROUPS if group in groups() and _fits(group, composition)}
         chosen = {key: composition.chosen[choice] for key, choice in keys.items()}
         try:
             values = resolved(composition)
@@ -73,6 +82,11 @@ def explained(command: str, typed: Sequence[str] = (), *, config_dir: Path | Non
                     if re.search(rf"\b{group}\.{name}\b", text)
                 }
         return Explanation(found, chosen, {path: one for path, one in sections.items() if one})
+
+
+def _fits(group: str, composition: Composition) -> bool:
+    """Whether a command can choose from a group without a default: an experiment always, others if it has the key."""
+    return group == "experiment" or group in composition.config
 
 
 def _notes(group: str, name: str, config_dir: Path | None) -> dict[str, str]:

@@ -18,7 +18,7 @@ from gsl.errors import ConfigError, InputError
 COMMAND_KEYS = ("name", "out", "force", "trust")
 """Settings of the command, not of the stage; every command takes them, whether its yaml names them or not."""
 
-OPTIONAL_GROUPS = ("experiment",)
+OPTIONAL_GROUPS = ("experiment", "grounding")
 """Groups a command may choose from without having a default."""
 
 FILE_GROUPS = ("mapping",)

@@ -93,3 +93,7 @@ class Batch:
     def __len__(self) -> int:
         """Number of episodes."""
         return len(self.episodes)
+
+    def __repr__(self) -> str:
+        seconds = sum(len(one) for one in self.episodes) * self.control_period
+        return f"Batch({len(self)} episodes, {seconds:.1f} s, {len(self.joints)} joints)"

@@ -8,6 +8,7 @@ from typing import Any
 
 from gsl.core.checkpoint import read_checkpoint
 from gsl.core.interfaces import REAL, SIM, Grounding, HasMargins, Preparable, Prepared, Trainable, World
+from gsl.core.own_code import named
 from gsl.errors import ConfigError
 from gsl.storage.references import resolve
 
@@ -31,8 +32,13 @@ def prepare(grounding: Grounding, world: World, settled: Mapping[str, Any] | Non
         return grounding.prepare(world, settled or {})
     if isinstance(grounding, Trainable):
         place = _trained(grounding)
+        check_own(grounding)
         arrays, _ = read_checkpoint(place / MODEL if place.is_dir() else place, kind=KIND)
-        return Prepared(world, grounding.load(arrays))
+        with named(grounding, "load"):
+            loaded = grounding.load(arrays)
+        if not isinstance(loaded, Grounding):
+            raise ConfigError("grounding", f"its load() returned {type(loaded).__name__}, which has no start()")
+        return Prepared(world, loaded)
     return Prepared(world, grounding)
 
 

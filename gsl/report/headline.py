@@ -74,7 +74,7 @@ def _train_servo(metrics: Metrics, unit: Unit) -> str:
 
 
 def _train_grounding(metrics: Metrics, unit: Unit) -> str:
-    sizes = [f"{name} {' x '.join(map(str, shape))}" for name, shape in metrics["arrays"].items()]
+    sizes = [f"{name} ({' x '.join(map(str, shape)) or 1} numbers)" for name, shape in metrics["arrays"].items()]
     return f"learned {', '.join(sizes)} from {several(metrics['trajectories'], 'real episode')}"
 
 

@@ -116,7 +116,7 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
     from joblib.externals.loky.process_executor import TerminatedWorkerError
     from joblib.parallel import get_active_backend
 
-    if workers == 1:
+    if workers == 1 or joblib.effective_n_jobs(workers) == 1:  # a job in this process must not wait for its parent
         yield from ((index, function(frozen, jobs[index])) for index in missing)
         return
     parent = os.getpid() if type(get_active_backend()[0]).__name__ == "LokyBackend" else 0

@@ -1,11 +1,17 @@
-"""The files that components read by themselves, such as a world's robot: parents of whatever is made with them."""
+"""The files that components read by themselves, such as a world's robot: parents of whatever is made with them.
+
+The source of a user's own class is one of them: after an edit of it an artifact is made anew.
+"""
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
+
+from gsl.core.own_code import is_own
 
 
 def read_files(thing: Any) -> dict[str, Path]:
@@ -22,7 +28,14 @@ def _found(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
         parts = {field.name: getattr(thing, field.name) for field in fields(thing)}
         own: Mapping[str, Path] = getattr(thing, "read_files", {})
         yield from ((f"{where}{name}", path) for name, path in own.items())
+        yield from ((f"{where}_target_{k or ''}", path) for k, path in enumerate(_sources(type(thing))))
     else:
         return
     for name, part in parts.items():
         yield from _found(part, f"{where}{name}.")
+
+
+def _sources(kind: type) -> list[Path]:
+    """Return the files of a class and of what it derives from, gsl's own and Python's left out."""
+    found = [inspect.getsourcefile(one) for one in kind.__mro__ if is_own(one)]
+    return list(dict.fromkeys(Path(one) for one in found if one))
