@@ -22,11 +22,12 @@ from gsl.models.free_run import TICKS as FREE
 from gsl.models.free_run import predicted_error, segments
 from gsl.models.multi_step import MultiStep, travelled
 from gsl.models.network import Network
-from gsl.stages.train_forward import TrainForward, fitted
+from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import TrainInverse
 from gsl.storage.models import FILES, FORWARD, INVERSE, read_forward_model, read_inverse_model
 from gsl.storage.trajectories import write
 from gsl.training.data import Parts
+from gsl.training.forward import fit_forward
 from gsl.validation.model_requirements import as_needed, looking_ahead
 
 QUIET: Any = SimpleNamespace(status=lambda text: None, table=lambda title, columns, rows: None)
@@ -137,7 +138,7 @@ def test_a_member_whose_draw_is_over_at_once_is_fitted_to_single_ticks() -> None
     batch = a_batch(SLOW, "real", pi0=2, others=2)
     over = tuple(an_episode(SLOW, seed, steps=8) for seed in range(4))
     parts = Parts(replace(batch, episodes=over), batch, batch)
-    model, _ = fitted(ModelConfig(family="mlp", hidden=(4,), epochs=1, multi_step=10), parts, 1)
+    model, _ = fit_forward(ModelConfig(family="mlp", hidden=(4,), epochs=1, multi_step=10), parts, 1)
     assert np.isfinite(model.effects(np.zeros((1, model.network.inputs)))).all()
 
 

@@ -84,6 +84,6 @@ def test_a_search_with_it_goes_on_from_its_log(tmp_path: Path) -> None:
 
 
 def test_a_learner_knows_the_mean_alone() -> None:
-    with pytest.raises(ConfigError, match="objective.*is for optimizer=cma_es"):
+    with pytest.raises(ConfigError, match="objective.*is for a search such as cma_es"):
         check_objective("cvar", Trpo(steps=1024))
     check_objective("mean", Trpo(steps=1024))

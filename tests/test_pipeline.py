@@ -30,12 +30,12 @@ def test_every_stage_leaves_a_complete_artifact(chain: Path) -> None:
 def test_an_iteration_whose_grounding_is_refused_leaves_what_the_one_before_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    judge = Gate._judge
+    judge = Gate.judge
 
     def judged(gate: Gate, problems: Sequence[str], advice: str) -> None:
         judge(gate, ["it is no nearer"] if "iteration_02" in gate.folder.parts else [], advice)
 
-    monkeypatch.setattr(Gate, "_judge", judged)
+    monkeypatch.setattr(Gate, "judge", judged)
     monkeypatch.setattr(Rounds, "rising", True)
     line = ("iterate", *NAMED, "grounding=gat", "optimizer.generations=1", "iterations=3")
     said = done(*line, folder=tmp_path)
@@ -47,7 +47,7 @@ def test_an_iteration_whose_grounding_is_refused_leaves_what_the_one_before_foun
     one, other = ((place / "policies.json").read_text() for place in places)
     assert one == other and not (tmp_path / "runs/chain/iteration_02/optimize").exists()
     assert "(unchanged)" in done(*line, folder=tmp_path).out
-    monkeypatch.setattr(Gate, "_judge", lambda gate, problems, advice: judge(gate, ["it is no nearer"], advice))
+    monkeypatch.setattr(Gate, "judge", lambda gate, problems, advice: judge(gate, ["it is no nearer"], advice))
     assert "is refused: it is no nearer" in gsl(*line, "name=other", folder=tmp_path).lines[-1]
 
 

@@ -16,7 +16,7 @@ from gsl.errors import ArtifactError
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
-from gsl.stages import chain
+from gsl.stages import chain_rounds
 from gsl.stages.values import Values
 from gsl.studies.duration import duration_told
 from gsl.studies.ledger import Ledger, recipe
@@ -63,7 +63,7 @@ SHORT = ("iterate.budget.episodes=2", "iterate.optimizer.generations=1", "iterat
 
 @pytest.mark.parametrize("what", KEPT)
 def test_a_table_is_one_command(what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chain, "Values", partial(Values, count=8))  # of the forty that rank a simulator
+    monkeypatch.setattr(chain_rounds, "Values", partial(Values, count=8))  # of the forty that rank a simulator
     left_out = [f"~methods.{name}" for name in OFFERED[what] if name not in KEPT[what]]
     left_out += ["~worlds.nao_weak"] if what == "table2" else []
     left_out += ["~worlds.nao_harsh", "~worlds.nao_drawn_b"] if what == "worlds" else []

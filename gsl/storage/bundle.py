@@ -12,6 +12,7 @@ from gsl.errors import ConfigError
 
 RUNNER = "gsl.runner.main"
 _STAND_INS = {f"gsl.core.{name}": f"gsl.runner.stand_in.{name}" for name in ("setting", "compiled", "validation")}
+_STAND_INS["gsl"] = "gsl.runner.stand_in.face"
 _THERE = {*sys.stdlib_module_names, "numpy"}
 
 
@@ -29,7 +30,7 @@ def bundled(modules: tuple[str, ...]) -> dict[str, bytes]:
             continue
         known.add(name)
         path = _source(_STAND_INS.get(name, name), modules[-1])
-        below = "/__init__.py" if path.name == "__init__.py" else ".py"
+        below = "/__init__.py" if path.name == "__init__.py" or name == "gsl" else ".py"
         files[name.replace(".", "/") + below] = path.read_bytes()
         waiting += [*_needed(path, name), *([name.rpartition(".")[0]] if "." in name else [])]
     return dict(sorted(files.items()))

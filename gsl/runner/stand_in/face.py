@@ -1,0 +1,1 @@
+"""gsl beside a robot: its names for Python are left out."""
