@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from gsl.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from gsl.api import (
         Result,
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
         write_trajectories,
     )
 
-__version__ = "0.1.0"
 __all__ = [
     "Result",
     "Verdict",

@@ -12,11 +12,11 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from gsl import __version__
 from gsl.commandline.completion import CONFIG_DIR, complete, name_of, user_folder
 from gsl.commandline.failure import INTERRUPTED, leave_quietly, report
 from gsl.core.interruption import ignore, listen
 from gsl.report.console import Console
+from gsl.version import __version__
 
 TYPED = "gsl.typed"
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import platform
 import subprocess
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
-import gsl
+from gsl.version import PACKAGE, __version__
 
 LIBRARIES = (
     *("numpy", "pybullet", "gymnasium", "torch", "cma", "numba", "pandas", "pyarrow"),
@@ -18,7 +17,7 @@ LIBRARIES = (
 
 def versions() -> dict[str, str | None]:
     """Return the versions of gsl, Python and the libraries; None for one that is not installed."""
-    return {"gsl": gsl.__version__, "python": platform.python_version()} | {name: _version(name) for name in LIBRARIES}
+    return {"gsl": __version__, "python": platform.python_version()} | {name: _version(name) for name in LIBRARIES}
 
 
 def _version(library: str) -> str | None:
@@ -38,7 +37,7 @@ def commit() -> dict[str, Any] | None:
 
 
 def _git(*arguments: str) -> str | None:
-    command = ["git", "-C", str(Path(gsl.__file__).parent), *arguments]
+    command = ["git", "-C", str(PACKAGE), *arguments]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=5, check=True)
     except (OSError, subprocess.SubprocessError):

@@ -14,12 +14,12 @@ from typing import Any
 
 import gymnasium
 
-import gsl
 from gsl.errors import ConfigError
+from gsl.version import PACKAGE
 from gsl.worlds.mujoco import without_remarks
 
 _log = logging.getLogger("gsl")
-_INSTALLED = (*(Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib")), Path(gsl.__file__).parent)
+_INSTALLED = (*(Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib")), PACKAGE)
 
 
 def made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-import gsl
 from gsl.errors import ConfigError, InputError
 from gsl.storage.importers.formats import ENDS, is_bag, readable, stem
+from gsl.version import PACKAGE
 
-HOME = Path(gsl.__file__).parents[1]
+HOME = PACKAGE.parent
 
 
 class Place(NamedTuple):
