@@ -243,7 +243,7 @@ def test_drawn_effects_and_members_of_a_servo_go_together(folder: Path, tmp_path
     assert isinstance(ready.world, EnsembleWorld) and ready.grounding == NoGrounding()
     assert [one.servo_member for one in ready.world.members] == [k % 3 for k in range(DRAWS)]
     assert len({str(one.effects) for one in ready.world.members}) == DRAWS
-    assert scenario.prepared(about) == ready
+    assert scenario.prepare(about) == ready
     report = json.loads((tmp_path / "grounding.json").read_text())
     assert report["acceptable"] and report["drawn"]["acceptable"]
     nominal = replace(both, inner=replace(servo, servo=str(folder / "runs/several/train_servo")))

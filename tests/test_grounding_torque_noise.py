@@ -70,7 +70,7 @@ def test_noise_on_a_servo_is_what_motions_leave_unexplained_or_a_share_of_the_li
 
 def test_without_noise_an_episode_has_the_bits_it_had() -> None:
     scenario = walk(TorqueNoise(step=0.0, constant=0.0))
-    assert scenario.prepared().world == WORLD and scenario.prepared().grounding == NoGrounding()
+    assert scenario.prepare().world == WORLD and scenario.prepare().grounding == NoGrounding()
 
 
 def test_on_top_of_effects_both_are_there(tmp_path: Path) -> None:
@@ -79,7 +79,7 @@ def test_on_top_of_effects_both_are_there(tmp_path: Path) -> None:
     ready, report = check_grounding(scenario, Gate(WalkEngine().initial, tmp_path, QUIET, accept=False, seed=1))
     assert report["grounding_acceptable"] and report["effects"] == ["command_latency"]
     assert (ready.world.plant.servo.delay == 0.01).all() and (noise(ready.world) > 0.0).all()  # type: ignore[attr-defined]
-    assert scenario.prepared(report) == ready
+    assert scenario.prepare(report) == ready
 
 
 def test_noise_in_which_pi0_falls_is_refused(tmp_path: Path) -> None:

@@ -114,7 +114,8 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     assert again[:2] == rows and [one["number"] for one in again] == [1, 1, 2, 2]
     assert not list((tmp_path / "runs/on").rglob("trial_01"))
     table = (tmp_path / "runs/on/reproduce/table.md").read_text()
-    assert f"Made: trial 1 ({rows[0]['method']}) by a1b2c3d; trials 1 ({rows[1]['method']}), 2 by " in table
+    assert f"Made by a1b2c3d: trial 1 ({rows[0]['method']}). Made by " in table
+    assert f": trials 1 ({rows[1]['method']}), 2." in table
     assert len(json.loads((tmp_path / "runs/on/trials.json").read_text())) == 5  # nothing that was known is lost
     second = "first=2", "trials=1", "name=second", "known=runs/on/reproduce/trials.json"
     assert "2 of this study's 2 results are in" in done("reproduce", "fig5", *few, *second, folder=tmp_path).err
@@ -122,7 +123,7 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     done("reproduce", "fig5", *few, "first=2", "trials=1", "name=alone", folder=tmp_path)  # run, and not known
     alone = json.loads((tmp_path / "runs/alone/reproduce/trials.json").read_text())
     assert [{**one, "made_by": ""} for one in alone] == [{**one, "made_by": ""} for one in again[2:]]
-    assert " 1 trial (2); " in (tmp_path / "runs/second/reproduce/table.md").read_text()
+    assert " 1 trial (2). " in (tmp_path / "runs/second/reproduce/table.md").read_text()
 
 
 def test_a_file_that_holds_no_trials_is_refused(tmp_path: Path) -> None:
@@ -369,7 +370,7 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     assert refused.lines == ["gsl reproduce budget: budgets = [6,6]: are to rise, the least of them first"]
     assert points[1]["bare"] == points[4]["bare"]  # measured on the same trajectories
     assert (folder / "budget.png").stat().st_size > 10_000
-    assert " otherwise. 1 trial. Made: trial 1 by " in (folder / "table.md").read_text()
+    assert " otherwise. 1 trial. Made by " in (folder / "table.md").read_text()
     assert "for all of its results" in said.err
     assert "gat, 4 trajectories, trial 1: grounded simulator against" in said.err
     (tmp_path / "half.json").write_text((folder / "points.json").read_text())

@@ -10,22 +10,14 @@
 Names and settings are those of the command line (`gsl COMMAND --help`), and so are the checks and their messages.
 """
 
-from gsl.api.components import make_grounding, make_policy, make_task, make_world
-from gsl.api.files import read_trajectories, write_trajectories
-from gsl.api.results import Result, Verdict
-from gsl.api.rolling import roll_out
-from gsl.api.running import diagnose, run
-
-__all__ = [
-    "Result",
-    "Verdict",
-    "diagnose",
-    "make_grounding",
-    "make_policy",
-    "make_task",
-    "make_world",
-    "read_trajectories",
-    "roll_out",
-    "run",
-    "write_trajectories",
-]
+from gsl.api.components import make_grounding as make_grounding
+from gsl.api.components import make_policy as make_policy
+from gsl.api.components import make_task as make_task
+from gsl.api.components import make_world as make_world
+from gsl.api.files import read_trajectories as read_trajectories
+from gsl.api.files import write_trajectories as write_trajectories
+from gsl.api.results import Result as Result
+from gsl.api.results import Verdict as Verdict
+from gsl.api.rolling import roll_out as roll_out
+from gsl.api.running import diagnose as diagnose
+from gsl.api.running import run as run

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from gsl.api.overrides import overrides
 from gsl.commandline.composer import compose, opened
-from gsl.commandline.config import instantiated, resolved
+from gsl.commandline.config import instantiate_settings, resolved
 from gsl.core.interfaces import Grounding, Policy, Task, World
 from gsl.core.validation import config_error
 from gsl.errors import ConfigError
@@ -33,7 +33,7 @@ def make_world(name: str, *, config_dir: Path | str | None = None, **settings: A
         ConfigError: There is no such file or setting, or a value is impossible.
     """
     effects = settings.pop("effects", None)
-    world: World = _made("world", name, config_dir, settings, World)
+    world: World = _make("world", name, config_dir, settings, World)
     if effects is None:
         return world
     if not isinstance(effects, Mapping):
@@ -48,23 +48,23 @@ def make_world(name: str, *, config_dir: Path | str | None = None, **settings: A
 
 def make_task(name: str, *, config_dir: Path | str | None = None, **settings: Any) -> Task:
     """Return a task by the name of its yaml file; arguments as those of `make_world`."""
-    return _made("task", name, config_dir, settings, Task)
+    return _make("task", name, config_dir, settings, Task)
 
 
 def make_policy(name: str, *, config_dir: Path | str | None = None, **settings: Any) -> Policy:
     """Return a family of policies by the name of its yaml file; arguments as those of `make_world`."""
-    return _made("policy", name, config_dir, settings, Policy)
+    return _make("policy", name, config_dir, settings, Policy)
 
 
 def make_grounding(name: str, *, config_dir: Path | str | None = None, **settings: Any) -> Grounding:
     """Return a grounding by the name of its yaml file; arguments as those of `make_world`."""
-    return _made("grounding", name, config_dir, settings, Grounding)
+    return _make("grounding", name, config_dir, settings, Grounding)
 
 
-def _made(group: str, name: str, config_dir: Path | str | None, settings: Mapping[str, Any], kind: Any) -> Any:
+def _make(group: str, name: str, config_dir: Path | str | None, settings: Mapping[str, Any], kind: Any) -> Any:
     with opened(None if config_dir is None else Path(config_dir)):
         config = resolved(compose(ROLES[group], [f"{group}={name}", *overrides(settings, f"{group}.")]))
-    made = instantiated(config[group])
+    made = instantiate_settings(config[group])
     if not isinstance(made, kind):
         raise ConfigError(group, f"is no {group}", given=name)
     return made

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from gsl.commandline.config import instantiated
+from gsl.commandline.config import instantiate_settings
 from gsl.core.interfaces import World
 from gsl.grounding.diagnosis_file import read_diagnosis
 from gsl.grounding.effects import switched_on
@@ -76,7 +76,9 @@ class Verdict(Result):
     @property
     def world(self) -> World:
         """The simulator with what it lacks."""
-        return switched_on(instantiated(self.artifact.config["sim"]), read_diagnosis(str(self.folder), "diagnose"))
+        return switched_on(
+            instantiate_settings(self.artifact.config["sim"]), read_diagnosis(str(self.folder), "diagnose")
+        )
 
     @property
     def summary(self) -> str:

@@ -71,7 +71,7 @@ def roll_out(
             raise ConfigError(name, f"is no {name}; gsl.make_{name} makes one", given=str(given))
     family = sized(family, world)
     chosen = family.initial if parameters is None else _numbers(parameters, family)
-    scenario = Scenario(world, task, family, how.role, grounding).prepared()
+    scenario = Scenario(world, task, family, how.role, grounding).prepare()
     jobs = [Job(chosen, derived_seed(how.seed, "rollout", k)) for k in range(how.episodes)]
     with Silent().progress(how.episodes, "rolling out") as progress:
         done = trajectories(scenario, jobs, workers=how.workers, progress=progress)

@@ -77,7 +77,7 @@ def prepared(config: Mapping[str, Any]) -> tuple[Any, dict[str, Any], CommandSet
     settings = {key: value for key, value in config.items() if key not in dropped}
     for path in _missing(settings, ""):
         raise missing(path)
-    stage = instantiated(settings)
+    stage = instantiate_settings(settings)
     described(stage)  # refuses what could not be written down afterwards
     return stage, settings, own
 
@@ -96,7 +96,7 @@ def resolved(composition: Composition) -> dict[str, Any]:
     return {str(key): value for key, value in container.items()}
 
 
-def instantiated(mapping: Mapping[str, Any]) -> Any:
+def instantiate_settings(mapping: Mapping[str, Any]) -> Any:
     """Return the object that a mapping with `_target_` describes.
 
     Raises:

@@ -101,7 +101,7 @@ def write_help(command: str, typed: Sequence[str] = (), *, config_dir: Path | No
     """Return the part of a command's help that comes from its configuration, with what is typed of it."""
     explanation = explained(command, typed, config_dir=config_dir)
     parts = [_table("Groups (KEY=NAME, * is the default):", list(_group_lines(explanation)))]
-    for paths, settings in _merged(explanation.sections):
+    for paths, settings in _merge(explanation.sections):
         names = [f"{path}={name}" if (name := explanation.chosen.get(path)) else path for path in paths]
         keys = " or ".join(f"{path}.KEY=VALUE" for path in paths)
         title = f"Settings of {' and '.join(names)} ({keys}):" if paths != [""] else "Settings (KEY=VALUE):"
@@ -112,7 +112,7 @@ def write_help(command: str, typed: Sequence[str] = (), *, config_dir: Path | No
     return "\n".join(part for part in parts if part) + "\n"
 
 
-def _merged(sections: Mapping[str, Mapping[str, Setting]]) -> Iterator[tuple[list[str], list[Setting]]]:
+def _merge(sections: Mapping[str, Mapping[str, Setting]]) -> Iterator[tuple[list[str], list[Setting]]]:
     """Yield settings with the paths that have the same ones; defaults that differ stand side by side."""
     alike: dict[frozenset[tuple[str, str]], list[str]] = {}
     for path, settings in sections.items():

@@ -18,7 +18,7 @@ def is_own(kind: type) -> bool:
 
 
 @contextmanager
-def named(thing: Any, method: str) -> Iterator[None]:
+def name_failures(thing: Any, method: str) -> Iterator[None]:
     """Within, whatever a method of a user's own object raises becomes one line.
 
     Args:

@@ -8,7 +8,7 @@ from typing import Any
 
 from gsl.core.checkpoint import read_checkpoint
 from gsl.core.interfaces import REAL, SIM, Grounding, HasMargins, Preparable, Prepared, Trainable, World
-from gsl.core.own_code import named
+from gsl.core.own_code import name_failures
 from gsl.errors import ConfigError
 from gsl.storage.references import resolve
 
@@ -19,7 +19,7 @@ def parents_of(grounding: Any, path: str = "grounding") -> Mapping[str, Path]:
     """Return the artifacts that a grounding is made of, by role; `path` is the setting that it is."""
     if isinstance(grounding, Preparable):
         return grounding.parents(path)
-    return {f"{path}.model": _trained(grounding)} if isinstance(grounding, Trainable) else {}
+    return {f"{path}.model": _find_model(grounding)} if isinstance(grounding, Trainable) else {}
 
 
 def prepare(grounding: Grounding, world: World, settled: Mapping[str, Any] | None = None) -> Prepared:
@@ -31,10 +31,10 @@ def prepare(grounding: Grounding, world: World, settled: Mapping[str, Any] | Non
     if isinstance(grounding, Preparable):
         return grounding.prepare(world, settled or {})
     if isinstance(grounding, Trainable):
-        place = _trained(grounding)
+        place = _find_model(grounding)
         check_own(grounding)
         arrays, _ = read_checkpoint(place / MODEL if place.is_dir() else place, kind=KIND)
-        with named(grounding, "load"):
+        with name_failures(grounding, "load"):
             loaded = grounding.load(arrays)
         if not isinstance(loaded, Grounding):
             raise ConfigError("grounding", f"its load() returned {type(loaded).__name__}, which has no start()")
@@ -64,7 +64,7 @@ def check_own(grounding: Trainable) -> None:
         raise ConfigError("grounding", f"its `needs` are of {REAL} and {SIM}", given=str(strangers[0]))
 
 
-def _trained(grounding: Trainable) -> Path:
+def _find_model(grounding: Trainable) -> Path:
     if not grounding.model:
         raise ConfigError("grounding.model", "is missing; name a run of gsl train-grounding")
     return resolve(grounding.model, kind=MAKER)

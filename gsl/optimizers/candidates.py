@@ -9,7 +9,7 @@ import numpy as np
 from gsl.errors import ConfigError
 
 
-def checked_candidates(asked: Any, count: int) -> list[np.ndarray]:
+def check_candidates(asked: Any, count: int) -> list[np.ndarray]:
     """Return candidates as arrays, shape (count,) each.
 
     Args:

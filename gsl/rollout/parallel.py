@@ -81,7 +81,7 @@ def arriving(
     function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Progress
 ) -> Iterator[tuple[int, Any]]:
     """Yield (index of job, `function(pickled shared, job)`) of all jobs, as they end."""
-    frozen = _frozen(shared, workers)
+    frozen = _pickle(shared, workers)
     missing = list(range(len(jobs)))
     for _ in range(TRIES):
         for index, result in _arriving(function, frozen, jobs, tuple(missing), workers):
@@ -93,7 +93,7 @@ def arriving(
     raise GslError(f"worker processes died {TRIES} times in one batch of jobs; try workers=1 or look at free memory")
 
 
-def _frozen(shared: Any, workers: int) -> bytes:
+def _pickle(shared: Any, workers: int) -> bytes:
     """Return what all workers need, pickled.
 
     Raises:

@@ -43,7 +43,7 @@ class Scenario:
         planned = self.task.duration / self.world.layout.control_period
         return round(min(planned, LONGEST))
 
-    def prepared(self, settled: Mapping[str, Any] | None = None) -> Scenario:
+    def prepare(self, settled: Mapping[str, Any] | None = None) -> Scenario:
         """Return the scenario with a grounding ready to act, in the world that it makes.
 
         Args:

@@ -186,7 +186,7 @@ class Iterate:
         """Draw what the first iteration's grounding makes of real motions that nothing was learned from, and a walk."""
         place = home / FIRST
         search = Artifact(place / "optimize", manifest.read(place / "optimize"))
-        scenario = Scenario(self.sim, self.task, self.policy, SIM, without_margins(first)).prepared(search.metrics)
+        scenario = Scenario(self.sim, self.task, self.policy, SIM, without_margins(first)).prepare(search.metrics)
         maker = MAKER if isinstance(innermost(first), Trainable) else TrainForward.kind
         if (place / maker / HELDOUT).is_file():
             heldout = read(place / maker / HELDOUT)

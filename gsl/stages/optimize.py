@@ -11,13 +11,13 @@ import numpy as np
 
 from gsl.core.console import Console, Progress
 from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, World
-from gsl.core.own_code import named
+from gsl.core.own_code import name_failures
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.preparation import parents_of, without_margins
-from gsl.optimizers.candidates import checked_candidates
+from gsl.optimizers.candidates import check_candidates
 from gsl.optimizers.objective import CVAR, Objective, Quantile, check_objective, objective_values
 from gsl.policies.policy import sized
 from gsl.rollout.parallel import Job, Workers, episodes
@@ -116,20 +116,20 @@ class Optimize:
         self, optimizer: Search, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Console
     ) -> Iterator[Winner]:
         """Yield the best candidate of each generation of a search."""
-        with named(optimizer, "start"):
+        with name_failures(optimizer, "start"):
             search = optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
         total = optimizer.generations * optimizer.candidates * self.rollouts
         with console.progress(total, "optimising in simulation") as progress:
             for index in range(optimizer.generations):
-                with named(search, "ask"):
-                    candidates = checked_candidates(search.ask(), len(first))
+                with name_failures(search, "ask"):
+                    candidates = check_candidates(search.ask(), len(first))
                 generation = log.read(index)
                 if generation is None:
                     generation = self._evaluated(scenario, candidates, index, progress)
                     log.append(generation)
                 else:
                     progress.advance(len(candidates) * self.rollouts)
-                with named(search, "tell"):
+                with name_failures(search, "tell"):
                     search.tell(generation.values)
                 best = int(np.argmax(generation.values))
                 means = generation.means or generation.values
@@ -152,7 +152,7 @@ class Optimize:
         """Return the winners that do not fall in the grounded simulator, and what to report of all."""
         if not (self.screening and foretells_falls(self.grounding)):
             return winners, {}
-        scenario = replace(bare, grounding=without_margins(self.grounding)).prepared(checked)
+        scenario = replace(bare, grounding=without_margins(self.grounding)).prepare(checked)
         parameters = {winner.policy.name: vector(self.policy, winner.policy) for winner in winners}
         seed = derived_seed(self.seed, self.kind)
         results = screen(scenario, parameters, self.screening, seed, workers=self.workers, console=console)

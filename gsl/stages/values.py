@@ -49,7 +49,7 @@ class Values:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the values."""
-        scenario = Scenario(self.world, self.task, self.policy, REAL, self.grounding).prepared(self.found)
+        scenario = Scenario(self.world, self.task, self.policy, REAL, self.grounding).prepare(self.found)
         rng = np.random.default_rng(derived_seed(self.seed, self.kind))
         thetas = [neighbour(self.policy, self.policy.initial, self.spread, rng) for _ in range(self.count)]
         jobs = [Job(theta, derived_seed(self.seed, self.kind, index)) for index, theta in enumerate(thetas)]

@@ -151,7 +151,7 @@ class Budget:
         ready = chain.ready(place, self.methods[method], None, seed, console)
         found = chain.search(place / "optimize", ready, None, seed, console)
         measured = chain.measure(place / "evaluate", found, seed, console)
-        acting = Scenario(chain.sim, chain.task, chain.policy, SIM, ready).prepared(found.metrics).grounding
+        acting = Scenario(chain.sim, chain.task, chain.policy, SIM, ready).prepare(found.metrics).grounding
         assert isinstance(acting, LoadedTransformation), "its world is a robot"
         env: Any = chain.sim.make()
         drawn = derived_seed(seed, "replays")

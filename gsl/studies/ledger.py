@@ -186,7 +186,7 @@ class Ledger:
         made = _made(self._rows())
         if len(made) > 1:
             self._console.status(f"these trials were made by {len(made)} versions of gsl; the table says which")
-        return f"Made: {'; '.join(f'{trials} by {name}' for name, trials in made.items())}."
+        return " ".join(f"Made by {name}: {trials}." for name, trials in made.items())
 
     def _whose(self, key: str) -> Path:
         """Return the file that a trial stands in."""

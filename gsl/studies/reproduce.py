@@ -82,7 +82,8 @@ def _sizes(study: Compare) -> str:
         f"{optimizer.generations} generations of {optimizer.candidates} candidates, {budget.rollouts} rollouts each"
     )
     measured = f"{budget.episodes} for the choice, {budget.check} for the check, {budget.confirmation} for the report"
-    return f"{trials_of(study.first, study.trials)}; {searched}; {budget.learned}; {measured}."
+    trials = trials_of(study.first, study.trials)
+    return f"{trials}. A search: {searched}. {budget.learned.capitalize()}. Real episodes: {measured}."
 
 
 def _draw(path: Path, trials: Sequence[Trial], study: Compare, drawn: Drawn) -> None:

@@ -93,23 +93,25 @@ def learn_servo(
     with ThreadPoolExecutor(threads) as pool:
         bench = ServoBench(exp, Replays(plant, step, exp.period, threads, pool), start)
 
-        def refused(old: Sequence[ServoModel], new: Sequence[ServoModel], likely: float, worth: float) -> set[str]:
+        def refuse_groups(
+            old: Sequence[ServoModel], new: Sequence[ServoModel], likely: float, worth: float
+        ) -> set[str]:
             pairs = zip(splits[1:], old[1:], new[1:], strict=True)
             unseen = [Duel(part.test, before, after) for part, before, after in pairs]
             seen = Duel(parts.held, old[0], new[0])
-            return bench.refused([seen], likely, worth) | bench.refused(unseen, likely, worth)
+            return bench.refuse([seen], likely, worth) | bench.refuse(unseen, likely, worth)
 
         def network(part: Split, begun: ServoModel) -> tuple[ServoModel, list[Progress]]:
             return bench.network(cut_windows(exp, part.train, SHORT), part.judge, begun, MOST)
 
         begun, fitted = [start] * len(splits), [bench.numbers(part.train) for part in splits]
-        unfit = refused(begun, fitted, LIKELY, 0.0)
+        unfit = refuse_groups(begun, fitted, LIKELY, 0.0)
         numbers = [with_groups(*pair, unfit) for pair in zip(fitted, begun, strict=True)]
         if walks:
             on_both = bench.numbers_with(walks, parts.train, numbers[0])
             numbers[0] = bench.kept_on_foot(walks, parts.held, numbers[0], on_both)
         networks, ways = zip(*map(network, splits, numbers), strict=True)
-        bare = refused(numbers, networks, 1.0 - CHANCE, WORTH)
+        bare = refuse_groups(numbers, networks, 1.0 - CHANCE, WORTH)
         model = with_groups(networks[0], numbers[0], bare)
         change = bench.change(Duel(parts.test, start, model))
         worse = tuple(name for name, share in change.items() if np.quantile(share, CHANCE) > 0.0)
@@ -120,7 +122,7 @@ def learn_servo(
 
         def member(begun: ServoModel, index: np.ndarray) -> ServoModel:
             new = bench.network(some.chosen(index), parts.judge, begun, ITERATIONS)[0]
-            return with_groups(new, begun, bare | bench.refused([Duel(parts.held, begun, new)], 1.0 - CHANCE, WORTH))
+            return with_groups(new, begun, bare | bench.refuse([Duel(parts.held, begun, new)], 1.0 - CHANCE, WORTH))
 
         others = further(
             members - 1, lambda rng: bench.numbers_of_some(parts.train, numbers[0], rng), worse, member,

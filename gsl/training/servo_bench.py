@@ -125,7 +125,7 @@ class ServoBench:
         after = np.concatenate([self.residuals(one.windows, one.new) for one in duels])
         return relative_changes(before, after, sample, self.group, self.start.groups)
 
-    def refused(self, duels: Sequence[Duel], likely: float, worth: float) -> set[str]:
+    def refuse(self, duels: Sequence[Duel], likely: float, worth: float) -> set[str]:
         """Return the groups whose cost does not fall by a share.
 
         Args:

@@ -108,7 +108,7 @@ def examine(grounding: Any, scenario: Scenario, gate: Gate) -> Passed:
     """Check a grounding by its kind: `grounding` is the scenario's own. Of an unknown kind only π0's falls are."""
     if not isinstance(grounding, NoGrounding):
         warn_uncharged(scenario.world, gate.console, SIM, "the grounded action")
-    ready = scenario.prepared()
+    ready = scenario.prepare()
     if isinstance(grounding, NoGrounding | ActionNoise | RandomChoice):
         return Passed(ready, {})
     kind = type(grounding).__name__

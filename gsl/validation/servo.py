@@ -45,7 +45,7 @@ def check_servo(
 @examine.register
 def check_learned_servo(grounding: LearnedServo, scenario: Scenario, gate: Gate) -> Passed:
     """Switch a learned servo on, if it is near enough to the log that it was learned from."""
-    ready, place = scenario.prepared(), grounding.at_its_place().servo
+    ready, place = scenario.prepare(), grounding.at_its_place().servo
     report = check_servo(place, ready, gate.parameters, gate.seed_of("check"), ensemble=grounding.ensemble)
     gate.report(report)
     for line in report["remarks"]:

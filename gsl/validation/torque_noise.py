@@ -10,7 +10,7 @@ from gsl.validation.gate import Gate, Passed, examine
 @examine.register
 def check_torque_noise(grounding: TorqueNoise, scenario: Scenario, gate: Gate) -> Passed:
     """Switch torque noise on; all that can be checked of it is whether π0 keeps its feet."""
-    ready = scenario.prepared()
+    ready = scenario.prepare()
     gate.console.status(grounding.description)
     advice = "Lower grounding.step or grounding.constant"
     return Passed(ready, gate.check_falls(ready, f"with {grounding.description}", advice))

@@ -17,7 +17,7 @@ from gsl.validation.uncharged import warn_uncharged
 
 def check_trained(grounding: Trainable, scenario: Scenario, gate: Gate) -> Passed:
     """Compare the grounded simulator with real trajectories that the grounding has not learned from."""
-    ready = scenario.prepared()
+    ready = scenario.prepare()
     place = resolve(grounding.model, kind=MAKER)
     heldout = (place.parent if place.is_file() else place) / HELDOUT
     if scenario.world.layout.states or not heldout.is_file():
