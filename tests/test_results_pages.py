@@ -102,7 +102,7 @@ def test_a_page_tells_what_is_committed(typed: list[str], tmp_path: Path) -> Non
     assert text.strip() in table.read_text(encoding="utf-8")
     foretold = foretelling(trials).strip()
     assert foretold in table.read_text(encoding="utf-8")
-    assert bool(foretold) == ("What tells beforehand" in table.read_text(encoding="utf-8"))
+    assert bool(foretold) == ("What predicts falls" in table.read_text(encoding="utf-8"))
 
 
 def trials_of(*names: str) -> list[Trial]:
