@@ -61,8 +61,8 @@ def foretelling(trials: Sequence[Trial]) -> str:
         rows.append((*told, *(_told(telling, figure) for figure in PREDICTORS.values())))
     head = (
         "What predicts falls: how often, of two policies of a search, the larger figure is that of the policy which\n"
-        "falls more often in the choice. 0.5 is chance. Shares are means over the trials that have such a pair and whose\n"
-        f"policies were kept. They have a 95 % interval where {FEWEST} trials or more differ.\n"
+        "falls more often in the choice. 0.5 is chance. Shares are means over the trials that have such a pair\n"
+        f"and whose policies were kept. They have a 95 % interval where {FEWEST} trials or more differ.\n"
     )
     titles = ("worlds", "grounding", "iteration", "tried that fell", "trials with such a pair", *PREDICTORS)
     return "\n".join([head, table(titles, rows)])
