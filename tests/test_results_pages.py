@@ -102,7 +102,7 @@ def test_a_page_tells_what_is_committed(typed: list[str], tmp_path: Path) -> Non
     assert text.strip() in table.read_text(encoding="utf-8")
     foretold = foretelling(trials).strip()
     assert foretold in table.read_text(encoding="utf-8")
-    assert bool(foretold) == ("What tells beforehand" in table.read_text(encoding="utf-8"))
+    assert bool(foretold) == ("What predicts falls" in table.read_text(encoding="utf-8"))
 
 
 def trials_of(*names: str) -> list[Trial]:
@@ -116,7 +116,7 @@ def trials_of(*names: str) -> list[Trial]:
 def test_the_aims_of_table_2_stand_beside_its_trials() -> None:
     """Of the first ten trials, of all twenty, and of ten in which the real world is the simulator."""
     ten, twenty = trials_of("table2"), trials_of("table2", "table2_again")
-    whole = (ROOT / "docs/results/README.md").read_text(encoding="utf-8")
+    whole = (ROOT / "docs/results/table2.md").read_text(encoding="utf-8")
     rows = next(rows for _, titles, rows in tables(whole) if titles[:3] == ["real world", "trials", "grounding"])
     assert len(rows) == 20
     for place, count, named, gain, more, without, unimproved, spent in rows:
@@ -215,5 +215,6 @@ def test_a_page_repeats_its_tables_to_the_letter() -> None:
                 repeated[page.stem] += 1
                 same = [(len(part), worlds) for part in of for worlds, below in part.items() if below == rows]
                 assert any(count == 1 or all(name in before for name in worlds) for count, worlds in same), page
-    once = ("budget", "fig5", "fig13", "garat", "linear-walk", "table2-paper", "table3", "table4", "torque", "worlds")
-    assert repeated == {**dict.fromkeys(once, 1), "table2": 2, "fig12": 2, "replays": 3}
+    once = ("budget", "fig5", "garat", "table2-paper", "table3", "table4", "torque", "worlds")
+    several = {"linear-walk": 2, "table2": 2, "fig13": 2, "fig12": 4, "replays": 3}
+    assert repeated == {**dict.fromkeys(once, 1), **several}

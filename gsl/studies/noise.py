@@ -226,8 +226,9 @@ class NoiseStudy:
         chosen = several(budget.episodes, "real episode")
         return [
             *below,
-            f"In each round the real world chose the best of {policies} policies, those of the",
-            f"generations and the one it began with, by {chosen} each; values are of {budget.confirmation} others.",
+            f"In each round the real world chose the best of {policies} policies, by {chosen} each.",
+            "They are those of the generations and the one it began with.",
+            f"Values are of {budget.confirmation} other episodes.",
         ]
 
     def _chain(self, sim: World) -> Chain:

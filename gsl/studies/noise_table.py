@@ -111,9 +111,11 @@ class NoiseTable:
             for place in self.places
         ]
         shown = [self.shown[method] for method in self.methods]
-        start = " In brackets trials that are where they began, which do not count." if self.chosen else ""
-        few = "of a few episodes (a search's are those that chose it, and flatter it)"
-        below = f"Mean return where a policy was learned, {few}, and in real.{start}"
+        start = " In brackets: trials that ended where they began. They do not count." if self.chosen else ""
+        below = (
+            "Mean return where a policy was learned -> in the real world. The first is of few episodes; those of a\n"
+            f"search also chose the policy, which flatters it.{start}"
+        )
         return [markdown(self._titled(*shown), rows), below, ""]
 
     def _differences(self) -> list[str]:
@@ -130,7 +132,7 @@ class NoiseTable:
             rows.append(self._row(place, *told, *([self.shown[best]] if best else [])))
         others = [*(["none"] if "none" in self.methods else []), *(["best ane"] if noisy else [])]
         titles = [f"{name} - {other}" for other in others for name in learned]
-        below = "Paired differences with 95 % intervals, which know nothing of the choice of the best width."
+        below = "Paired differences with 95 % intervals. These do not count that the best width was chosen."
         return [markdown(self._titled(*titles, *(["best ane"] if noisy else [])), rows), below, ""]
 
     @property

@@ -60,11 +60,11 @@ def foretelling(trials: Sequence[Trial]) -> str:
         told = (cell.worlds, cell.method, str(cell.iteration), *counts)
         rows.append((*told, *(_told(telling, figure) for figure in PREDICTORS.values())))
     head = (
-        "What tells beforehand who falls: of two policies of a search, one of which falls more often in the choice,\n"
-        "how often that is the one with the larger figure (.5 is chance; a mean over the trials that have such two,\n"
-        f"of those whose policies were kept; 95 % of {FEWEST} trials or more that differ):\n"
+        "What predicts falls: how often, of two policies of a search, the larger figure is that of the policy which\n"
+        "falls more often in the choice. 0.5 is chance. Shares are means over the trials that have such a pair\n"
+        f"and whose policies were kept. They have a 95 % interval where {FEWEST} trials or more differ.\n"
     )
-    titles = ("worlds", "grounding", "iteration", "tried that fell", "trials with such two", *PREDICTORS)
+    titles = ("worlds", "grounding", "iteration", "tried that fell", "trials with such a pair", *PREDICTORS)
     return "\n".join([head, table(titles, rows)])
 
 
