@@ -9,6 +9,7 @@ import yaml
 from example_stage import ExampleWorld
 
 from gsl.cli import call
+from gsl.commandline.failure import describe_failure
 from gsl.commandline.composer import compose, configuration_folder, opened
 from gsl.commandline.config import prepared, resolved
 from gsl.commandline.multirun import job_level
@@ -136,7 +137,7 @@ def test_wrong_usage_is_one_line_too(arguments: list[str], message: str, capsys:
     ("how", "exit_code", "message"),
     [
         ("known", 1, "gsl collect: the robot is on fire; put it out\n"),
-        ("bug", 1, "gsl collect: internal error: ZeroDivisionError: division by zero in two lines; GSL_TRACEBACK=1"),
+        ("bug", 1, "gsl collect: example_stage.Count.run failed (example_stage.py, line 50): ZeroDivisionError: division by"),
         ("ctrl-c", 130, "gsl collect: interrupted; the same command goes on from what is built\n"),
     ],
 )
@@ -146,6 +147,11 @@ def test_a_stage_that_fails_leaves_nothing_behind(
     assert call(["collect", f"fails={how}"]) == exit_code
     assert capsys.readouterr().err.startswith(message)
     assert [path for path in elsewhere.rglob("*") if path.is_file()] == []
+
+
+def test_a_fault_of_gsls_is_an_internal_error() -> None:
+    line = "internal error: ZeroDivisionError: division by zero in two lines; GSL_TRACEBACK=1 shows where"
+    assert describe_failure(ZeroDivisionError("division by zero\nin two lines")) == (line, 1)
 
 
 def test_a_traceback_is_there_for_who_asks(monkeypatch: pytest.MonkeyPatch) -> None:

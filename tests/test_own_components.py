@@ -329,3 +329,13 @@ def test_what_an_optimiser_asks_for_is_checked(
     told = gsl("optimize", *OWN, *SMALL, "grounding=none", f"optimizer=bad_{number}", f"name=bad_{number}", folder=home)
     assert told.code in (1, 2)
     assert told.lines[-1].startswith(f"gsl optimize: {said}")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_own_code_that_fails_in_a_rollout_is_one_line(workers: int, home: Path) -> None:
+    (home / "own_fault.py").write_text(PLAIN.replace("action + 0.7", "action + np.ones(3)"))
+    (home / "mine/grounding/fault.yaml").write_text("_target_: own_fault.TooFar\n")
+    sizes = ("preset=toy", "task.duration=1.6", f"workers={workers}")
+    told = gsl("optimize", *OWN, *sizes, "grounding=fault", "accept=true", f"name=fault_{workers}", folder=home)
+    fault = "own_fault.TooFar.transform failed (own_fault.py, line 12): NameError: name 'np' is not defined"
+    assert told.code == 1 and fault in told.lines[-1] and "internal" not in told.err

@@ -6,6 +6,7 @@ import os
 import sys
 
 from gsl.core.interruption import asked
+from gsl.core.own_code import describe_own
 from gsl.errors import GslError, Waiting
 from gsl.report.console import Console
 
@@ -22,16 +23,18 @@ def report(failure: BaseException, console: Console, *, command: str = "gsl") ->
         return failure.exit_code
     if os.environ.get("GSL_TRACEBACK") == "1":
         raise failure
-    message, exit_code = described(failure)
+    message, exit_code = describe_failure(failure)
     return console.error(message, exit_code, command=command)
 
 
-def described(failure: BaseException) -> tuple[str, int]:
+def describe_failure(failure: BaseException) -> tuple[str, int]:
     """Return one line about a failure, and the exit code."""
     if isinstance(failure, GslError):
         return str(failure), failure.exit_code
     if isinstance(failure, OSError) and failure.filename is not None:
         return f"{failure.filename}: {failure.strerror}", 1
+    if (line := describe_own(failure)) is not None:
+        return f"{line}; GSL_TRACEBACK=1 shows more", 1
     text = " ".join(str(failure).split())
     return f"internal error: {type(failure).__name__}: {text}; GSL_TRACEBACK=1 shows where", 1
 

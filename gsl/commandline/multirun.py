@@ -18,7 +18,7 @@ from omegaconf import DictConfig
 
 from gsl.commandline.composer import Composition
 from gsl.commandline.config import RUNS, execute, resolved
-from gsl.commandline.failure import described, report
+from gsl.commandline.failure import describe_failure, report
 from gsl.commandline.overrides import file_of, key_of
 from gsl.report.console import Console
 from gsl.storage.documents import write_json
@@ -59,7 +59,7 @@ def run_job(config: DictConfig, *, command: str, line: str, swept: Sequence[str]
         values = resolved(Composition(config, (), {}, ()))
         outcome = {"job": level, "exit_code": 0, **execute(command, line, values, console, level=level)}
     except Exception as failure:
-        message, _ = described(failure)
+        message, _ = describe_failure(failure)
         outcome = {"job": level, "exit_code": report(failure, Console(), command=f"gsl {command}"), "error": message}
     write_json(Path(hydra.runtime.output_dir) / RESULT, outcome)
     return outcome.get("metrics", {}).get("objective")

@@ -1,15 +1,18 @@
-"""Errors in a user's own classes, as one line that names the class, the method and the place."""
+"""Errors in a user's own code, as one line that names the function and the place."""
 
 from __future__ import annotations
 
+import sysconfig
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from pathlib import Path
 
 from gsl.errors import GslError
 
 OURS = "gsl"
+FOLDERS = {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
+"""Where Python and its packages lie: what fails there without a caller elsewhere is not a user's own."""
 
 
 def is_own(kind: type) -> bool:
@@ -17,26 +20,36 @@ def is_own(kind: type) -> bool:
     return kind.__module__.partition(".")[0] not in (OURS, "builtins", "abc", "typing")
 
 
-@contextmanager
-def name_failures(thing: Any, method: str) -> Iterator[None]:
-    """Within, whatever a method of a user's own object raises becomes one line.
+def describe_own(error: BaseException) -> str | None:
+    """Return where a user's own code failed and how, None if no code of a user's was running."""
+    own = [frame for frame, _ in traceback.walk_tb(error.__traceback__) if _is_own_file(frame.f_code.co_filename)]
+    if not own:
+        return None
+    line = next(line for frame, line in reversed([*traceback.walk_tb(error.__traceback__)]) if frame is own[-1])
+    code = own[-1].f_code
+    name = f"{own[-1].f_globals.get('__name__', '')}.{code.co_qualname}"
+    text = " ".join(str(error).split())
+    return f"{name} failed ({Path(code.co_filename).name}, line {line}): {type(error).__name__}: {text}"
 
-    Args:
-        thing: Whose method is called.
-        method: Its name.
+
+@contextmanager
+def name_failures() -> Iterator[None]:
+    """Within, whatever a user's own code raises becomes one line: a traceback does not cross to another process.
 
     Raises:
-        GslError: It has raised something, and is not gsl's.
+        GslError: A user's own code has raised something else.
     """
     try:
         yield
     except GslError:
         raise
     except Exception as error:
-        if not is_own(type(thing)):
+        if (line := describe_own(error)) is None:
             raise
-        frame = traceback.extract_tb(error.__traceback__)[-1]
-        place = f"{frame.filename.rpartition('/')[2]}, line {frame.lineno}"
-        text = " ".join(str(error).split())
-        name = f"{type(thing).__module__}.{type(thing).__qualname__}.{method}"
-        raise GslError(f"{name} failed ({place}): {type(error).__name__}: {text}") from error
+        raise GslError(line) from error
+
+
+def _is_own_file(name: str) -> bool:
+    path = Path(name)
+    ours = Path(__file__).parents[1]
+    return path.is_file() and not any(folder in path.parents for folder in (ours, *FOLDERS))

@@ -8,7 +8,6 @@ from typing import Any
 
 from gsl.core.checkpoint import read_checkpoint
 from gsl.core.interfaces import REAL, SIM, Grounding, HasMargins, Preparable, Prepared, Trainable, World
-from gsl.core.own_code import name_failures
 from gsl.errors import ConfigError
 from gsl.storage.references import resolve
 
@@ -34,8 +33,7 @@ def prepare(grounding: Grounding, world: World, settled: Mapping[str, Any] | Non
         place = _find_model(grounding)
         check_own(grounding)
         arrays, _ = read_checkpoint(place / MODEL if place.is_dir() else place, kind=KIND)
-        with name_failures(grounding, "load"):
-            loaded = grounding.load(arrays)
+        loaded = grounding.load(arrays)
         if not isinstance(loaded, Grounding):
             raise ConfigError("grounding", f"its load() returned {type(loaded).__name__}, which has no start()")
         return Prepared(world, loaded)

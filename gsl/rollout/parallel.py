@@ -19,6 +19,7 @@ from pydantic import AfterValidator
 
 from gsl.core.console import Progress
 from gsl.core.interruption import processes_starting
+from gsl.core.own_code import name_failures
 from gsl.core.setting import setting
 from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
@@ -134,7 +135,8 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
 def _numbered(function: Any, frozen: bytes, job: Any, index: int, parent: int) -> tuple[int, Any]:
     if parent:
         _end_with_parent(parent)
-    return index, function(frozen, job)
+    with name_failures():
+        return index, function(frozen, job)
 
 
 @lru_cache(maxsize=1)

@@ -11,7 +11,6 @@ import numpy as np
 
 from gsl.core.console import Console, Progress
 from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, World
-from gsl.core.own_code import name_failures
 from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
@@ -116,21 +115,18 @@ class Optimize:
         self, optimizer: Search, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Console
     ) -> Iterator[Winner]:
         """Yield the best candidate of each generation of a search."""
-        with name_failures(optimizer, "start"):
-            search = optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
+        search = optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
         total = optimizer.generations * optimizer.candidates * self.rollouts
         with console.progress(total, "optimising in simulation") as progress:
             for index in range(optimizer.generations):
-                with name_failures(search, "ask"):
-                    candidates = check_candidates(search.ask(), len(first))
+                candidates = check_candidates(search.ask(), len(first))
                 generation = log.read(index)
                 if generation is None:
                     generation = self._evaluated(scenario, candidates, index, progress)
                     log.append(generation)
                 else:
                     progress.advance(len(candidates) * self.rollouts)
-                with name_failures(search, "tell"):
-                    search.tell(generation.values)
+                search.tell(generation.values)
                 best = int(np.argmax(generation.values))
                 means = generation.means or generation.values
                 yield Winner(self._record(index, candidates[best], means[best]), generation.values[best])

@@ -11,7 +11,6 @@ import numpy as np
 
 from gsl.core.console import Console
 from gsl.core.interfaces import REAL, SIM, Evidence, Trainable
-from gsl.core.own_code import name_failures
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.grounding.preparation import KIND, MAKER, MODEL, check_own
@@ -69,8 +68,7 @@ class TrainGrounding:
             write(folder / HELDOUT, replace(data.heldout, metadata={**data.heldout.metadata, FALLS: falls}))
             count = len(real)
         sim = None if self.sim is None else read(data_file(self.sim))
-        with name_failures(self.grounding, "learn"):
-            learned = self.grounding.learn(Evidence(real, sim), self.seed)
+        learned = self.grounding.learn(Evidence(real, sim), self.seed)
         arrays = _arrays(learned)
         name = f"{type(self.grounding).__module__}.{type(self.grounding).__qualname__}"
         write_checkpoint(folder / MODEL, arrays, {"kind": KIND, "class": name})
