@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 
 from gsl.errors import ConfigError, GslError
 from gsl.worlds.bullet import BulletEnv
-from gsl.worlds.engine import Reading
+from gsl.worlds.physics import Reading
 from gsl.worlds.start import Start
 
 SECONDS = 0.8

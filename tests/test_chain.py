@@ -12,8 +12,9 @@ from gsl.core.lanes import LANES
 from gsl.core.plant import Plant, Push, nominal
 from gsl.robots.nao import nao
 from gsl.worlds.chain import COLUMNS, Pushed, accelerate, chain, nothing
-from gsl.worlds.engine import Engine, Physics
+from gsl.worlds.engine import Engine
 from gsl.worlds.held import Held, Windows
+from gsl.worlds.physics import Physics
 from gsl.worlds.servo import encoder_motion, servo_torque
 from gsl.worlds.servo_state import COMMANDS, first_state
 from gsl.worlds.start import resting

@@ -9,9 +9,9 @@ import yaml
 from example_stage import ExampleWorld
 
 from gsl.cli import call
-from gsl.commandline.failure import describe_failure
 from gsl.commandline.composer import compose, configuration_folder, opened
 from gsl.commandline.config import prepared, resolved
+from gsl.commandline.failure import describe_failure
 from gsl.commandline.multirun import job_level
 from gsl.core.described import described, rebuilt
 from gsl.errors import ConfigError
@@ -137,7 +137,11 @@ def test_wrong_usage_is_one_line_too(arguments: list[str], message: str, capsys:
     ("how", "exit_code", "message"),
     [
         ("known", 1, "gsl collect: the robot is on fire; put it out\n"),
-        ("bug", 1, "gsl collect: example_stage.Count.run failed (example_stage.py, line 50): ZeroDivisionError: division by"),
+        (
+            "bug",
+            1,
+            "gsl collect: example_stage.Count.run failed (example_stage.py, line 50): ZeroDivisionError: division by",
+        ),
         ("ctrl-c", 130, "gsl collect: interrupted; the same command goes on from what is built\n"),
     ],
 )

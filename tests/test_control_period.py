@@ -10,7 +10,8 @@ from gsl.core.plant import nominal
 from gsl.effects.effect import applied, built
 from gsl.robots.nao import nao
 from gsl.worlds.bullet_c import NO_HANDLE, client_handle
-from gsl.worlds.engine import Engine, Physics
+from gsl.worlds.engine import Engine
+from gsl.worlds.physics import Physics
 from gsl.worlds.start import resting
 
 

@@ -8,7 +8,8 @@ from gsl.core.dynamics import forward_kinematics, jacobian, mass_matrix
 from gsl.core.plant import nominal
 from gsl.robots.nao import nao
 from gsl.robots.urdf import urdf
-from gsl.worlds.engine import Engine, Physics
+from gsl.worlds.engine import Engine
+from gsl.worlds.physics import Physics
 from gsl.worlds.start import resting
 
 Y = np.array([0.0, 1.0, 0.0])

@@ -12,8 +12,9 @@ from gsl.core.plant import Contact, Push, nominal
 from gsl.errors import GslError
 from gsl.robots.nao import nao
 from gsl.worlds.bullet import BulletEnv
-from gsl.worlds.engine import Engine, Physics
+from gsl.worlds.engine import Engine
 from gsl.worlds.ground import FLAT, REACH, random_heights
+from gsl.worlds.physics import Physics
 from gsl.worlds.pushes import overlap
 from gsl.worlds.start import resting
 

@@ -5,7 +5,8 @@ from gsl.core.body import lumped
 from gsl.core.plant import nominal
 from gsl.robots.nao import CONTROLLED, FOOT_HEIGHT, HIP_OFFSET_Y, HIP_OFFSET_Z, THIGH, TIBIA, nao
 from gsl.robots.nao_legs import leg_angles
-from gsl.worlds.engine import Engine, Physics
+from gsl.worlds.engine import Engine
+from gsl.worlds.physics import Physics
 from gsl.worlds.start import resting
 
 MIRROR = np.diag([1.0, -1.0, 1.0])

@@ -10,7 +10,8 @@ from gsl.core.body import Robot, lumped
 from gsl.core.dynamics import forward_kinematics, jacobian, mass_matrix
 from gsl.core.plant import GRAVITY, Plant, nominal
 from gsl.robots.nao import nao
-from gsl.worlds.engine import Engine, Physics
+from gsl.worlds.engine import Engine
+from gsl.worlds.physics import Physics
 from gsl.worlds.rotor import carried_inertia
 from gsl.worlds.start import resting
 

@@ -6,7 +6,8 @@ from gsl.core.dynamics import forward_kinematics
 from gsl.core.plant import nominal
 from gsl.robots.nao import nao
 from gsl.robots.urdf import principal_axes, urdf
-from gsl.worlds.engine import Engine, Physics
+from gsl.worlds.engine import Engine
+from gsl.worlds.physics import Physics
 from gsl.worlds.rotor import carried_inertia, rotors
 from gsl.worlds.start import resting
 

@@ -16,7 +16,8 @@ from gsl.diagnosis import nuisance
 from gsl.diagnosis.records import OnGround, Pieces
 from gsl.diagnosis.replay import Effects
 from gsl.effects.effect import applied, built
-from gsl.worlds.engine import Engine, Physics, Reading
+from gsl.worlds.engine import Engine
+from gsl.worlds.physics import Physics, Reading
 from gsl.worlds.servo_state import COMMANDS
 from gsl.worlds.start import lowest_point
 

@@ -10,7 +10,8 @@ from gsl.core.body import lumped
 from gsl.diagnosis.diagnose import Findings
 from gsl.diagnosis.nuisance import calibrated
 from gsl.effects.effect import applied, built
-from gsl.worlds.engine import Engine, Physics
+from gsl.worlds.engine import Engine
+from gsl.worlds.physics import Physics
 from gsl.worlds.servo_state import COMMANDS
 from gsl.worlds.start import resting
 

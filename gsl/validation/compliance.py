@@ -17,7 +17,7 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.impedance import impedance
 from gsl.core.interfaces import Grounding
-from gsl.core.plant import Hook, Plant, noiseless
+from gsl.core.plant import Plant, noiseless
 from gsl.core.seeds import derived_seed, grounding_generator
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
@@ -28,6 +28,7 @@ AMPLITUDE = 0.35  # of the swing [joint's effort]: 4 times a worn servo's fricti
 SETTLING, CYCLES = 1, 3  # cycles before the measurement and in it
 RATE, MOST = 0.3, 1.4  # of the rising load [effort/s], and where it ends [effort]: in 3 s to the nominal limit
 DRAG = 0.25  # on a joint that gives way [effort·s/rad]: without it the load would also have to move its inertia
+BEFORE = -1e-9  # latest time of a clock before an episode, whose zero is rounded [s]
 YIELDED = 0.1  # deflection beyond the linear one at which a joint has given way [rad]: 5 times the NAO's at its limit
 
 
@@ -100,13 +101,15 @@ def measure(world: Any, grounding: Grounding, seed: int) -> Compliance:
     quiet = getattr(grounding, "expected", grounding)
     effort = np.array([robot.joint(name).effort for name in robot.motors])
     found, apart = np.zeros((4, len(robot.motors))), isinstance(grounding, NoGrounding) and separate(world.plant)
+    env = BulletEnv(held, plant=replace(noiseless(held.plant), pushes=()))
     for number, loaded in enumerate(rounds(robot) if apart else np.eye(len(robot.motors), dtype=bool)):
         swing = Swing(AMPLITUDE * effort * loaded, held.step)
-        hold(held, quiet, swing, swing.duration, derived_seed(seed, "swing", number))
+        hold(env, quiet, swing, swing.duration, derived_seed(seed, "swing", number))
         found[:3, loaded] = swing.answer()[:, loaded]
         rising = Ramp(RATE * effort * loaded * inwards(robot), DRAG * effort * loaded, found[0])
-        hold(held, quiet, rising, MOST / RATE, derived_seed(seed, "yield", number))
+        hold(env, quiet, rising, MOST / RATE, derived_seed(seed, "yield", number))
         found[3, loaded] = np.where(rising.yielded, rising.torque, MOST * effort)[loaded]
+    env.close()
     return Compliance(robot.motors, joint_groups(robot), *found)
 
 
@@ -119,23 +122,27 @@ class Swing:
     """
 
     def __init__(self, amplitude: np.ndarray, step: float) -> None:
-        self._amplitude, self._step = amplitude, step
+        self._amplitude, self._step, self.drag = amplitude, step, np.zeros_like(amplitude)
         self._rows: list[np.ndarray] = []
-        self._times: list[float] = []
+        self._times: list[np.ndarray] = []
         self.done = False
         self.duration = (SETTLING + CYCLES) / FREQUENCY
 
-    def __call__(self, motion: np.ndarray, time: float) -> np.ndarray:
-        """Note the joints' positions and return the load."""
-        if time < 0.0:
-            return np.zeros_like(self._amplitude)
-        self._times.append(time)
-        self._rows.append(motion[0].copy())
-        return self._amplitude * math.sin(2.0 * math.pi * FREQUENCY * time)
+    def act(self, times: np.ndarray) -> np.ndarray:
+        """Return the load [N·m], (T,) -> (T, n_motors)."""
+        return np.outer(np.where(times < 0.0, 0.0, np.sin(2.0 * np.pi * FREQUENCY * times)), self._amplitude)
+
+    def note(self, times: np.ndarray, path: np.ndarray) -> None:
+        """Take in the joints' motion, shape (T, 2, n_motors)."""
+        if times[0] > BEFORE:
+            self._times.append(times)
+            self._rows.append(path[:, 0].copy())
 
     def answer(self) -> np.ndarray:
-        """Return stiffness, damping and the stiffness' standard error, shape (3, n_motors)."""
-        times, rows = np.array(self._times), np.array(self._rows)
+        """Return stiffness, damping and the stiffness' standard error, shape (3, n_motors); infinite if none acted."""
+        if not self._times:
+            return np.full((3, len(self._amplitude)), np.inf)
+        times, rows = np.concatenate(self._times), np.concatenate(self._rows)
         load = np.outer(np.sin(2.0 * np.pi * FREQUENCY * times), self._amplitude)
         first = [SETTLING / FREQUENCY + k / FREQUENCY for k in range(CYCLES)]
         parts = [(times >= start - 0.5 * self._step) & (times < start + 1.0 / FREQUENCY) for start in first]
@@ -160,22 +167,28 @@ class Ramp:
     """
 
     def __init__(self, rate: np.ndarray, drag: np.ndarray, stiffness: np.ndarray) -> None:
-        self._rate, self._drag, usable = rate, drag, np.isfinite(stiffness) & (stiffness > 0.0)
+        self._rate, self._drag, self.drag = rate, drag, np.zeros_like(drag)
+        usable = np.isfinite(stiffness) & (stiffness > 0.0)
         self._softness = np.where(usable, 1.0 / np.where(usable, stiffness, 1.0), 0.0)
         self._still: np.ndarray | None = None
         self.yielded, self.torque = np.zeros(len(rate), dtype=bool), np.zeros(len(rate))
 
-    def __call__(self, motion: np.ndarray, time: float) -> np.ndarray:
-        """Note what has given way and return the load."""
-        if time < 0.0:
-            return np.zeros_like(self._rate)
+    def act(self, times: np.ndarray) -> np.ndarray:
+        """Return the load without its drag [N·m], (T,) -> (T, n_motors)."""
+        self.drag = np.where(self.yielded | (times[0] <= BEFORE), 0.0, self._drag)
+        return np.outer(np.maximum(times, 0.0), np.where(self.yielded, 0.0, self._rate))
+
+    def note(self, times: np.ndarray, path: np.ndarray) -> None:
+        """Take in the joints' motion, shape (T, 2, n_motors), and what has given way."""
+        if times[0] <= BEFORE:
+            return
         if self._still is None:
-            self._still = motion[0].copy()
-        load = self._rate * time - self._drag * motion[1]
-        beyond = np.sign(self._rate) * (motion[0] - self._still - self._softness * load)
-        new = (beyond > YIELDED) & ~self.yielded
-        self.torque[new], self.yielded[new] = np.abs(load[new]), True
-        return np.where(self.yielded, 0.0, load)
+            self._still = path[0, 0].copy()
+        load = np.outer(times, self._rate) - self.drag * path[:, 1]
+        beyond = np.sign(self._rate) * (path[:, 0] - self._still - self._softness * load) > YIELDED
+        new, first = beyond.any(axis=0) & ~self.yielded, beyond.argmax(axis=0)
+        self.torque[new] = np.abs(load[first, np.arange(len(first))])[new]
+        self.yielded |= new
 
     @property
     def done(self) -> bool:
@@ -183,18 +196,15 @@ class Ramp:
         return bool((self.yielded | (self._rate == 0.0)).all())
 
 
-def hold(world: BulletWorld, grounding: Grounding, load: Swing | Ramp, duration: float, seed: int) -> None:
-    """Hold the stance for some time [s] or until the load is done; no push acts besides, but a user's own torque."""
-    plant = noiseless(world.plant)
-    env = BulletEnv(world, plant=replace(plant, hook=_both(load, plant.hook), pushes=()))
+def hold(env: BulletEnv, grounding: Grounding, load: Swing | Ramp, duration: float, seed: int) -> None:
+    """Hold the stance for some time [s] or until the load is done."""
     run = grounding.start(env.layout, grounding_generator(seed))
-    action = stance(world.plant.robot)
-    observation, _ = env.reset(seed=seed, options={"posture": action})
-    for _ in range(math.ceil(duration / world.period)):
+    action = stance(env.world.plant.robot)
+    observation, _ = env.reset(seed=seed, options={"posture": action, "load": load})
+    for _ in range(math.ceil(duration / env.world.period)):
         observation, *_ = env.step(run.transform(observation, action))
         if load.done:
             break
-    env.close()
 
 
 def stance(robot: Robot) -> np.ndarray:
@@ -238,9 +248,3 @@ def joint_groups(robot: Robot) -> Mapping[str, tuple[str, ...]]:
     rest = tuple(one for one in robot.motors if one not in inside)
     every = {**groups, ("others" if groups else "all"): rest}
     return {name: members for name, members in every.items() if members}
-
-
-def _both(load: Swing | Ramp, own: Hook | None) -> Hook:
-    if own is None:
-        return load
-    return lambda motion, time: load(motion, time) + own(motion, time)

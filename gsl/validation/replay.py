@@ -16,7 +16,7 @@ from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import actions, usable
 from gsl.models.free_run import TICKS
 from gsl.worlds.bullet import BulletEnv
-from gsl.worlds.engine import Reading
+from gsl.worlds.physics import Reading
 from gsl.worlds.start import Start
 
 PAST = 6  # ticks for which a grounding watches the real robot before, at least; as many as its models look back

@@ -23,9 +23,10 @@ from gsl.errors import ConfigError, GslError
 from gsl.models.servo import having_servo
 from gsl.models.servo_file import read_servo, servo_file
 from gsl.robots.catalogue import read_files, robot
-from gsl.worlds.engine import Engine, Physics, Reading
+from gsl.worlds.engine import Engine
 from gsl.worlds.fits import check_base, check_periods, check_plant
 from gsl.worlds.ground import REACH, random_heights
+from gsl.worlds.physics import Physics, Reading
 from gsl.worlds.start import Start, resting
 from gsl.worlds.torque_noise import TorqueNoise
 from gsl.worlds.velocity_motors import Motors, check_motors
@@ -127,7 +128,8 @@ class BulletEnv(gymnasium.Env):
         Args:
             seed: Of the start noise, of an uneven ground and of every noise.
             options: `posture`, desired joint positions at the start [rad], shape (n_joints,), by default all zero;
-                or `start`, a `Start` to take up as it is, without noise or settling.
+                or `start`, a `Start` to take up as it is, without noise or settling; `load`, a `Load` from outside in
+                place of torque noise.
         """
         super().reset(seed=seed)
         options = options or {}
@@ -140,7 +142,7 @@ class BulletEnv(gymnasium.Env):
         before = 0 if options.get("start") else round(self.world.settle / self.world.period)
         surface = self._surface()
         self._middle = None if surface is None else start.reading.place[:2]
-        self._engine.load(start.reading, start.commands, -before * self.world.period, surface)
+        self._engine.load(start.reading, start.commands, -before * self.world.period, surface, options.get("load"))
         reading = self._engine.read()
         self._noise = self._torque_noise()
         for _ in range(before):

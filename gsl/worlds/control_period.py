@@ -53,6 +53,8 @@ class Memory(NamedTuple):
         spin: Angular velocity of the base in world axes, then in base axes [rad/s], shape (2, 3).
         load: What the motors bear besides their servos at each physics step of the control period [N·m], shape
             (substeps, n), or (0, n) if they never do.
+        drag: Taken off that load per speed [N·m·s/rad], shape (n,).
+        path: Motion at each physics step where there are loads, shape (substeps, 2, n), or (0, 2, n).
         torque: Of the motors [N·m], shape (n,).
         push: Torque on the base in its inertial axes [N·m], shape (3,).
         work: Scratch, shape (n, 18).
@@ -63,6 +65,8 @@ class Memory(NamedTuple):
     motion: np.ndarray
     spin: np.ndarray
     load: np.ndarray
+    drag: np.ndarray
+    path: np.ndarray
     torque: np.ndarray
     push: np.ndarray
     work: np.ndarray
@@ -77,6 +81,8 @@ def first_memory(servo: ServoState, loads: int = 0) -> Memory:
         motion=np.zeros((2, n)),
         spin=np.zeros((2, 3)),
         load=np.zeros((loads, n)),
+        drag=np.zeros(n),
+        path=np.zeros((loads, 2, n)),
         torque=np.zeros(n),
         push=np.zeros(3),
         work=np.zeros((n, 18)),
@@ -98,7 +104,8 @@ def torques(drive: Drive, memory: Memory, turn: np.ndarray, k: int, step: float,
     servo_torque(drive.servo, memory.servo, memory.motion, k * step, step, period, memory.torque)
     if len(memory.load) > 0:
         for i in range(len(memory.torque)):
-            memory.torque[i] += memory.load[k, i]
+            memory.torque[i] += memory.load[k, i] - memory.drag[i] * memory.motion[1, i]
+            memory.path[k, 0, i], memory.path[k, 1, i] = memory.motion[0, i], memory.motion[1, i]
     world, base = memory.spin[0], memory.spin[1]
     for k in range(3):
         base[k] = world[0] * turn[0, k] + world[1] * turn[1, k] + world[2] * turn[2, k]

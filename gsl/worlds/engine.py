@@ -6,9 +6,8 @@ import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,59 +19,14 @@ from gsl.worlds.base_frame import base_motion
 from gsl.worlds.bullet_c import NO_HANDLE, client_handle
 from gsl.worlds.control_period import Drive, first_memory, in_c, in_python, read_joints
 from gsl.worlds.ground import PLANE, lay
+from gsl.worlds.physics import Load, Physics, Reading
 from gsl.worlds.pushes import aimed, apply_push, overlap
 from gsl.worlds.rotor import carried_inertia, rotors
 from gsl.worlds.servo import encoder_motion
 from gsl.worlds.servo_state import ROTOR, first_state, packed
-from gsl.worlds.velocity_motors import Motors, VelocityMotors
+from gsl.worlds.velocity_motors import VelocityMotors
 
 NOTHING = -1  # Bullet's number of a robot that is not loaded yet
-
-
-@dataclass(frozen=True)
-class Physics:
-    """How the engine computes.
-
-    Attributes:
-        step: Physics period [s].
-        iterations: Of the constraint solver.
-        period: Control period [s], a multiple of `step`.
-        floating: Whether the base moves freely above a plane; else it is held in the air.
-        motors: What turns the joints; see velocity_motors.py.
-    """
-
-    step: float
-    iterations: int
-    period: float
-    floating: bool
-    motors: Motors = "servo"
-
-    @property
-    def substeps(self) -> int:
-        """Physics steps in a control period."""
-        return round(self.period / self.step)
-
-
-class Reading(NamedTuple):
-    """What can be measured of the robot at one moment; base quantities are of the base's link frame.
-
-    Attributes:
-        motion: Motor positions [rad] and velocities [rad/s], shape (2, n_motors).
-        place: Base position in world axes [m], shape (3,).
-        quaternion: Base orientation, x y z w.
-        velocity: Of the base in world axes [m/s], shape (3,).
-        gyro: Angular velocity in base axes [rad/s], shape (3,).
-        up: Cosine of the base's tilt.
-        foot_force: Normal force on each foot [N], shape (n_feet,).
-    """
-
-    motion: np.ndarray
-    place: np.ndarray
-    quaternion: tuple[float, ...]
-    velocity: np.ndarray
-    gyro: np.ndarray
-    up: float
-    foot_force: tuple[float, ...]
 
 
 class Engine:
@@ -135,8 +89,9 @@ class Engine:
         self.body = NOTHING
 
     def load(
-        self, reading: Reading, commands: np.ndarray, clock: float = 0.0, heights: np.ndarray | None = None
-    ) -> None:
+        self, reading: Reading, commands: np.ndarray, clock: float = 0.0, heights: np.ndarray | None = None,
+        outside: Load | None = None,
+    ) -> None:  # fmt: skip
         """Start from nothing in a measured state.
 
         Args:
@@ -144,7 +99,9 @@ class Engine:
             commands: Targets so far, newest first [rad], shape (k, n_motors); the oldest one stands for all before.
             clock: Time since the episode began [s], negative before it.
             heights: Of an uneven ground, its middle where the robot is, see `ground.random_heights`.
+            outside: Torques on the motors, in place of those that `run` is given.
         """
+        self._load = outside
         b, client, physics = self.bullet, self.client, self.physics
         if self.body == NOTHING or heights is not None:
             self._begin(heights, *reading.place[:2].tolist())
@@ -196,6 +153,9 @@ class Engine:
         memory.servo.commands[0] = targets
         if load is not None:
             memory.load[:] = load
+        times = memory.servo.clock[0] + np.arange(physics.substeps) * physics.step
+        if self._load is not None:
+            memory.load[:], memory.drag[:] = self._load.act(times), self._load.drag
         rest = (physics.floating, physics.substeps, physics.step, physics.period, self._drive, memory, self._base_turn)
         if self._motors is not None:
             outside, steps = self._outside if self.plant.pushes else None, (physics.substeps, physics.step)
@@ -206,6 +166,8 @@ class Engine:
             in_python(self.bullet, self.client, self.body, self.joints, *rest)
         else:
             in_c(self.handle, self.body, self._places, *rest)
+        if self._load is not None and self._motors is None:
+            self._load.note(times, memory.path)
         memory.servo.clock[0] += physics.period
 
     def read(self) -> Reading:
@@ -276,7 +238,7 @@ class Engine:
         self.bullet.setJointMotorControlArray(
             self.body, self.joints, self.bullet.VELOCITY_CONTROL, forces=[0.0] * n, physicsClientId=self.client
         )
-        loads = self.physics.substeps if self.plant.torque_noise.any() else 0
+        loads = self.physics.substeps if self.plant.torque_noise.any() or self._load is not None else 0
         self._memory = first_memory(first_state(commands, self.read().motion, self.physics.step, clock), loads)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from gsl.core.body import Robot, Shape
 from gsl.core.dynamics import forward_kinematics
 from gsl.robots.frames import euler
-from gsl.worlds.engine import Reading
+from gsl.worlds.physics import Reading
 
 CLEARANCE = 5e-4  # of the lowest sole above the ground [m]
 HELD_AT = 1.0  # height of a base that is held in the air [m]
