@@ -53,9 +53,11 @@ class BlindReveal:
         about = f"{len(labels)} cases; every seal holds ({seals})."
         (folder / TABLE).write_text(markdown(marks, about), encoding="utf-8")
         judged = [one for one in figures(marks[OURS]) if one.met is not None]
+        met = sum(bool(one.met) for one in judged)
         return {
+            "headline": f"{met} of {len(judged)} thresholds are met in {len(labels)} cases",
             "cases": len(labels),
-            "met": sum(bool(one.met) for one in judged),
+            "met": met,
             "judged": len(judged),
             "figures": {f"{one.name}, {one.generator}": one.value for one in judged},
         }

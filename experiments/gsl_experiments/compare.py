@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -14,6 +14,7 @@ from gsl.core.layout import check_alike
 from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
 from gsl.core.unit import Unit
+from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, evidence_of, learned
 from gsl.stages.chain_rounds import Chain
@@ -23,7 +24,7 @@ from gsl.stages.values import ranked
 from gsl.storage.artifact import Artifact
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.gymnasium import try_out
-from gsl_experiments.comparison import summaries
+from gsl_experiments.comparison import Summary, summaries
 from gsl_experiments.comparison_table import markdown
 from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl_experiments.sizes import First, PresetName, numbers, sizes_of, trials_of
@@ -74,7 +75,13 @@ class Compare:
         text = "\n".join(filter(None, (markdown(summary, found, Unit.of(self.iterate.task)), foretelling(found))))
         sizes = f"{sizes_of(self.preset_name)} {trials_of(self.first, self.trials)}."
         (folder / TABLE).write_text(f"{text}\n{sizes} {made}\n", encoding="utf-8")
-        return {"trials": self.trials, "summaries": [one._asdict() for one in summary]}
+        return self.metrics(summary)
+
+    def metrics(self, summary: Sequence[Summary]) -> dict[str, Any]:
+        """Return the summaries, and the line that `gsl runs` shows."""
+        methods = ", ".join(dict.fromkeys(one.method for one in summary))
+        headline = f"{several(self.trials, 'trial')} of {methods}"
+        return {"headline": headline, "trials": self.trials, "summaries": [one._asdict() for one in summary]}
 
     def carried_out(
         self, folder: Path, console: Console, seconds: Callable[[], float] | None = None

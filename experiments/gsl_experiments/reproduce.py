@@ -65,7 +65,7 @@ class Reproduce(Compare):
         (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
         (folder / TRIALS).write_text(one_by_one(trials, task), encoding="utf-8")
         _draw(folder / FIGURE, trials, self, self.table.drawn(trials, task))
-        return {"trials": self.trials, "summaries": [one._asdict() for one in summaries(trials)]}
+        return self.metrics(summaries(trials))
 
 
 def _named(table: PaperTable) -> set[str]:

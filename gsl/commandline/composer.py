@@ -31,7 +31,7 @@ from gsl.effects import __path__ as effects_path
 from gsl.errors import ConfigError, InputError
 
 REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
-WHOLE = ("iterate", "compare", "reproduce")  # commands that make what a grounding refers to
+WHOLE = "iterate"  # the command, and the setting of others, that makes what a grounding refers to
 MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis|servo|model)")
 
 
@@ -186,7 +186,7 @@ def _check_referred(command: str, composition: Composition) -> None:
 
 def _check_made(command: str, composition: Composition) -> None:
     """Refuse models and diagnoses that a command would make anew."""
-    if command.startswith(WHOLE):
+    if command == WHOLE or WHOLE in composition.config:
         for key in filter(MADE.fullmatch, map(key_of, composition.overrides)):
             raise ConfigError(key, "is made here; gsl optimize takes one that is there")
 

@@ -72,10 +72,10 @@ def load(entry_point: EntryPoint) -> Any:
             app.command(name)(found)
         return get_group(app).commands[name]
     except (Exception, SystemExit) as error:
-        text = " ".join(str(error).split())
         package = entry_point.dist.name if entry_point.dist else entry_point.module
-        said = f"the package {package} brings this command, and {entry_point.value} cannot be loaded"
-        raise GslError(f"{said}: {type(error).__name__}: {text}") from error
+        why = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        problem = f"{entry_point.value} of the package {package} cannot be loaded: {why}"
+        raise GslError(f"{problem}; repair that package or uninstall it") from error
 
 
 def is_group(name: str) -> bool:
