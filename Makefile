@@ -2,7 +2,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test iterate real xl330 so101 logs-of-so101 menagerie go2 check clean FORCE
+.PHONY: help install demo test iterate real xl330 so101 logs-of-so101 menagerie go2 check clean FORCE
 
 VENV ?= .venv
 GSL ?= $(VENV)/bin/gsl
@@ -14,6 +14,8 @@ DEMO ?= name=demo beside=true force=true
 
 help: ## Show this.
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /make \1|/' | column -t -s '|'
+
+install: $(INSTALLED) ## Install gsl, its experiments and its benchmarks from this folder into .venv.
 
 demo: $(INSTALLED) ## Improve a walk for a "real" robot that the optimiser never touches; some minutes.
 	$(GSL) iterate $(DEMO)
@@ -58,7 +60,7 @@ check: $(INSTALLED) ## Check style, format and types.
 
 clean: ## Remove caches and build files; runs/ and the virtual environment stay.
 	rm -rf .mypy_cache .pytest_cache .ruff_cache build dist *.egg-info
-	find gsl tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find gsl experiments benchmarks tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(INSTALLED): pyproject.toml
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-HOUSE = Path(__file__).parents[1] / "gsl"
+PLOT = Path(__file__).parents[1]
+HOUSE = PLOT / "gsl"
 FLOORS = (  # from the ground up: a room imports from lower floors alone
     ("errors", "version"),
     ("core",),
@@ -18,12 +19,12 @@ FLOORS = (  # from the ground up: a room imports from lower floors alone
     ("worlds", "storage", "optimizers"),
     ("grounding",),
     ("rollout", "report"),
-    ("diagnosis", "real_robot", "benchmarks", "commandline"),
-    ("training", "blind", "api"),
-    ("validation", "gym"),
-    ("stages", "cli"),
-    ("studies", "__main__"),
+    ("diagnosis", "real_robot", "commandline"),
+    ("training", "api", "cli"),
+    ("validation", "gym", "__main__"),
+    ("stages",),
 )
+BESIDE = ("experiments/gsl_experiments", "benchmarks/gsl_benchmarks")  # above all floors: each imports gsl and itself
 COMPOSING = ("config", "composer", "config_errors", "known_settings", "multirun")
 ONLY = {
     "hydra": tuple(f"commandline/{name}.py" for name in COMPOSING),
@@ -49,6 +50,11 @@ def files(place: str) -> list[Path]:
     return sorted((HOUSE / place).rglob("*.py")) or [HOUSE / f"{place}.py"]
 
 
+def every_file() -> list[Path]:
+    """The files of gsl and of the packages beside it."""
+    return [*files("."), *(path for place in BESIDE for path in sorted((PLOT / place).rglob("*.py")))]
+
+
 def test_every_room_has_its_floor() -> None:
     rooms = {path.stem for path in HOUSE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
     assert sorted(room for floor in FLOORS for room in floor) == sorted(rooms - {"__init__"})
@@ -58,8 +64,18 @@ def test_every_room_has_its_floor() -> None:
 def test_imports_run_down(number: int, room: str) -> None:
     below = {other for floor in FLOORS[:number] for other in floor}
     for path in files(room):
-        rooms = {name.split(".")[1] for name in imported(path) if name.startswith("gsl.")}
+        names = [name for name in imported(path) if name.startswith("gsl")]
+        assert not [name for name in names if not name.startswith("gsl.")], f"{path} knows what is beside gsl"
+        rooms = {name.split(".")[1] for name in names}
         assert rooms <= {room} | below, f"{path.relative_to(HOUSE)} imports {sorted(rooms - {room} - below)}"
+
+
+@pytest.mark.parametrize("place", BESIDE)
+def test_a_package_beside_gsl_knows_no_other(place: str) -> None:
+    own = place.rpartition("/")[2]
+    for path in (PLOT / place).rglob("*.py"):
+        packages = {name.split(".")[0] for name in imported(path) if name.startswith("gsl")}
+        assert packages <= {"gsl", own}, path
 
 
 @pytest.mark.parametrize("library", ONLY)
@@ -73,12 +89,12 @@ def test_a_heavy_library_has_its_own_files(library: str) -> None:
 
 
 def test_only_the_console_prints() -> None:
-    for path in files("."):
+    for path in every_file():
         calls = (node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Call))
         printing = [call for call in calls if isinstance(call.func, ast.Name) and call.func.id == "print"]
         assert not printing or path.name == "console.py", path
 
 
 def test_no_file_has_two_ideas() -> None:
-    long = {path.name: n for path in files(".") if (n := len(path.read_text(encoding="utf-8").splitlines())) > 300}
+    long = {path.name: n for path in every_file() if (n := len(path.read_text(encoding="utf-8").splitlines())) > 300}
     assert long == {}

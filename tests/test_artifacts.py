@@ -120,7 +120,7 @@ def test_a_changed_setting_is_refused_by_name(out: Path) -> None:
 
 def test_changed_sources_are_refused_as_gsl_itself(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     built(Doubling(), out)
-    monkeypatch.setattr("gsl.storage.identity.sources_hash", lambda: "other")
+    monkeypatch.setattr("gsl.storage.identity.sources_hash", lambda _: "other")
     with pytest.raises(ArtifactError, match="gsl itself"):
         built(Doubling(), out)
 

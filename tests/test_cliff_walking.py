@@ -11,13 +11,13 @@ import pytest
 from commands import done
 
 from gsl.core.table import Table
-from gsl.core.table_episodes import played
 from gsl.core.trajectory import Trajectory
 from gsl.errors import InputError
 from gsl.grounding.states import TableTransformation
 from gsl.models.counts import Counts, counted
 from gsl.worlds.cliff_walking import CliffWalking
 from gsl.worlds.gymnasium import GymnasiumWorld
+from gsl_experiments.table_episodes import played
 
 DOWN = 2
 EDGE = {0.0: 98.70, 0.1: 73.62, 0.5: 23.05, 0.8: -3.83, 1.0: -10.90}  # the path along the edge, exact

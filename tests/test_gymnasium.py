@@ -36,7 +36,6 @@ from gsl.rollout.rl_env import GroundedSimulator
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.storage.models import read_forward_model, read_inverse_model
 from gsl.storage.trajectories import read, write
-from gsl.studies.noise_table import Point
 from gsl.tasks.own_reward import OwnReward
 from gsl.training.data import Parts
 from gsl.training.states import forward_of_states, inverse_of_states
@@ -45,6 +44,7 @@ from gsl.validation.values_of_states import ValueReport, value_report
 from gsl.worlds.control_cost import Charged, Quadratic
 from gsl.worlds.environments import own_module
 from gsl.worlds.gymnasium import GymnasiumWorld
+from gsl_experiments.noise_table import Point
 
 CART = GymnasiumWorld(env_id="examples.cart:Cart")
 POLE = GymnasiumWorld(env_id="CartPole-v1")

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsl.blind.walks import Walks
 from gsl.core.body import lumped
 from gsl.core.plant import GRAVITY, Plant, nominal
 from gsl.diagnosis import nuisance
@@ -15,6 +14,7 @@ from gsl.diagnosis.on_ground import Walking, _heights, _moving, jitter_error
 from gsl.effects.effect import applied, built
 from gsl.robots.nao import nao
 from gsl.worlds.bullet import BulletWorld
+from gsl_benchmarks.blind.walks import Walks
 
 NONE = np.zeros(0)
 

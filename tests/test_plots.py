@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from gsl.core.statistics import mean_interval
-from gsl.report.budget_curve import Line, budget_curve_figure
 from gsl.report.grounding_errors import grounding_errors, grounding_errors_figure
 from gsl.report.joint_trace import Traces, joint_trace, joint_trace_figure
 from gsl.report.learning_curve import Point, Search, learning_curve, learning_curve_figure, points, search
-from gsl.report.noise_bars import Bars, noise_bars_figure
-from gsl.report.noise_curve import Curve, noise_curve_figure
 from gsl.report.style import GAT, SGAT, spread
-from gsl.report.trial_dots import Dots, trial_dots_figure
+from gsl_experiments.budget_curve import Line, budget_curve_figure
+from gsl_experiments.noise_bars import Bars, noise_bars_figure
+from gsl_experiments.noise_curve import Curve, noise_curve_figure
+from gsl_experiments.trial_dots import Dots, trial_dots_figure
 
 PI0 = {"name": "pi0", "generation": None, "value_sim": None, "value": 0.19, "interval": [0.18, 0.20], "falls": 0}
 STABLE = {

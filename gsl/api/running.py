@@ -10,7 +10,7 @@ from typing import Any
 from gsl.api.files import write_trajectories
 from gsl.api.overrides import overrides
 from gsl.api.results import Result, Verdict
-from gsl.commandline.composer import compose, configuration_folder, opened
+from gsl.commandline.composer import commands, compose, opened
 from gsl.commandline.config import CommandSettings, execute, resolved
 from gsl.commandline.overrides import file_of
 from gsl.core.console import Silent
@@ -40,9 +40,8 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
         GslError: The stage failed.
     """
     command = str(command)
-    commands = sorted(path.stem for path in configuration_folder().glob("*.yaml"))
-    if (name := file_of(command)) not in commands:
-        raise ConfigError("command", f"there is none of this name{did_you_mean(name, commands)}", given=command)
+    if (name := file_of(command)) not in commands():
+        raise ConfigError("command", f"there is none of this name{did_you_mean(name, commands())}", given=command)
     objects = {key: value for key, value in settings.items() if is_dataclass(value)}
     plain = {key: value for key, value in settings.items() if key not in objects}
     for key in plain:

@@ -24,13 +24,14 @@ from yaml import YAMLError
 from gsl.commandline.config_errors import Vocabulary, misshapen, translated, unfit, unknown_key
 from gsl.commandline.known_settings import declared, known_keys, plain
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
+from gsl.commandline.plugins import folders
 from gsl.core.setting import Setting
 from gsl.core.validation import did_you_mean
 from gsl.effects import __path__ as effects_path
 from gsl.errors import ConfigError, InputError
 
 REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
-WHOLE = ("iterate", "compare", "reproduce")  # commands that make what a grounding refers to
+WHOLE = "iterate"  # the command, and the setting of others, that makes what a grounding refers to
 MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis|servo|model)")
 
 
@@ -51,15 +52,22 @@ class Composition:
     swept: tuple[str, ...]
 
 
-class UserConfiguration(SearchPathPlugin):
-    """Puts the user's folder of yaml files before ours, so that a file of the same name wins."""
+class OtherConfiguration(SearchPathPlugin):
+    """Puts the user's folder of yaml files before ours, so that a file of the same name wins, and plugins' behind."""
 
     folder: ClassVar[Path | None] = None
 
     def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
-        """Add the folder, if there is one."""
+        """Add the folders that there are."""
         if self.folder is not None:
             search_path.prepend("gsl-user", f"file://{self.folder}", anchor=SearchPathQuery(provider="main"))
+        for folder in folders():
+            search_path.append(f"gsl-{folder.parent.name}", f"file://{folder}")
+
+
+def commands() -> list[str]:
+    """Return the names of the yaml files of all stages, ours and those of plugins."""
+    return sorted(path.stem for folder in (configuration_folder(), *folders()) for path in folder.glob("*.yaml"))
 
 
 def configuration_folder() -> Path:
@@ -78,8 +86,8 @@ def opened(config_dir: Path | None) -> Iterator[None]:
     """
     if config_dir is not None and not config_dir.is_dir():
         raise InputError(f"--config-dir {config_dir}: there is no such folder")
-    UserConfiguration.folder = config_dir.resolve() if config_dir is not None else None
-    Plugins.instance().register(UserConfiguration)
+    OtherConfiguration.folder = config_dir.resolve() if config_dir is not None else None
+    Plugins.instance().register(OtherConfiguration)
     with initialize_config_dir(config_dir=str(configuration_folder()), version_base="1.3", job_name="gsl"):
         yield
 
@@ -178,7 +186,7 @@ def _check_referred(command: str, composition: Composition) -> None:
 
 def _check_made(command: str, composition: Composition) -> None:
     """Refuse models and diagnoses that a command would make anew."""
-    if command.startswith(WHOLE):
+    if command == WHOLE or WHOLE in composition.config:
         for key in filter(MADE.fullmatch, map(key_of, composition.overrides)):
             raise ConfigError(key, "is made here; gsl optimize takes one that is there")
 

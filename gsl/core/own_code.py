@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import sysconfig
 import traceback
 from collections.abc import Iterator
@@ -18,6 +19,15 @@ FOLDERS = {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "
 def is_own(kind: type) -> bool:
     """Whether a class is not gsl's but somebody's own."""
     return kind.__module__.partition(".")[0] not in (OURS, "builtins", "abc", "typing")
+
+
+def package_of(kind: type) -> Path | None:
+    """Return the folder of the package that a class comes from, or the file of a lone module; None if it is gsl's."""
+    name = kind.__module__.partition(".")[0]
+    file = getattr(sys.modules.get(name), "__file__", None) if is_own(kind) else None
+    if file is None:
+        return None
+    return Path(file).parent if Path(file).name == "__init__.py" else Path(file)
 
 
 def describe_own(error: BaseException) -> str | None:

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gsl.core.unit import Unit
-from gsl.core.words import in_unit, several
+from gsl.core.words import in_unit
 from gsl.models.free_run import TICKS
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.evaluation_cells import cells, columns
 from gsl.report.headline import unit_of
-from gsl.storage.artifact import Artifact
+from gsl.storage.artifact import METRICS, Artifact
 from gsl.storage.diagnosis_report import report_of
+from gsl.storage.hashing import CIRCUMSTANCES
 
 
 class Told(NamedTuple):
@@ -29,10 +30,10 @@ class Told(NamedTuple):
 
 
 def account(artifact: Artifact) -> list[Told]:
-    """Return the results of an artifact; of an unknown kind or of another version's, its metrics by name."""
-    tell = _TELLERS.get(artifact.manifest.kind)
+    """Return the results of an artifact; where no table tells them, its metrics by name."""
+    tell = _TELLERS.get(artifact.manifest.kind, _of_others)
     try:
-        told = tell(artifact.folder, artifact.metrics, unit_of(artifact)) if tell else _plain(artifact)
+        told = tell(artifact.folder, artifact.metrics, unit_of(artifact))
         return [told] if isinstance(told, Told) else told
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return [_plain(artifact)]
@@ -178,30 +179,15 @@ def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     return Told(in_unit("grounded simulation learning", unit.name), titles, rows, "\n".join(below))
 
 
-def _compare(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    below = f"differences and every trial: {folder.as_posix()}/table.md"
-    trials = several(metrics["summaries"][0]["trials"], "trial")
-    return Told(f"{trials} of each method", *_markdown(folder / "table.md"), below)
-
-
-def _reproduce(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    if "trials" not in metrics:  # figures alone
-        figures = ", ".join(sorted(path.name for path in folder.glob("*.png")))
-        return Told("what came out", *_markdown(folder / "table.md"), f"figures: {folder.as_posix()}/ ({figures})")
-    below = f"every trial: {folder.as_posix()}/trials.json, tables: {folder.as_posix()}/table.md"
-    return Told(
-        f"ours, and the paper's ({several(metrics['trials'], 'trial')})", *_markdown(folder / "table.md"), below
-    )
+def _of_others(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    """Return the first table that a stage of another package has written, and where the rest is."""
+    page = min(folder.glob("*.md"))
+    others = ", ".join(sorted(path.name for path in folder.iterdir() if path.name not in (*CIRCUMSTANCES, METRICS)))
+    return Told(str(metrics.get("headline", "what came out")), *_markdown(page), f"{folder.as_posix()}/: {others}")
 
 
 def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     return Told(in_unit("worlds", unit.name), *_markdown(folder / "table.md"))
-
-
-def _blind_reveal(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    met = f"{metrics['met']} of {metrics['judged']} thresholds are met"
-    below = f"{met}; every wrong answer, by truth and strength: {folder.as_posix()}/results.md"
-    return Told(f"blind benchmark, {metrics['cases']} cases", *_markdown(folder / "results.md"), below)
 
 
 def _markdown(path: Path) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -260,8 +246,5 @@ _TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told | list[Tol
     "optimize": _optimize,
     "evaluate": _evaluate,
     "iterate": _iterate,
-    "compare": _compare,
-    "reproduce": _reproduce,
     "survey": _survey,
-    "blind_reveal": _blind_reveal,
 }

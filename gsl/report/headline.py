@@ -19,10 +19,10 @@ def unit_of(artifact: Artifact) -> Unit:
 
 
 def headline(artifact: Artifact) -> str:
-    """Return what came out, nothing for an artifact of an unknown kind or of another version's metrics."""
+    """Return what came out; a stage of another package says it in its metrics, one of another version nothing."""
     tell = _TELLERS.get(artifact.manifest.kind)
     try:
-        return tell(artifact.metrics, unit_of(artifact)) if tell else ""
+        return tell(artifact.metrics, unit_of(artifact)) if tell else str(artifact.metrics.get("headline", ""))
     except (OSError, ValueError, KeyError, TypeError):
         return ""
 
@@ -110,11 +110,6 @@ def _iterate(metrics: Metrics, unit: Unit) -> str:
     return f"{told}, {unit.ended(after)}; {metrics['real_episodes']} real episodes"
 
 
-def _compare(metrics: Metrics, unit: Unit) -> str:
-    methods = dict.fromkeys(one["method"] for one in metrics["summaries"])
-    return f"{several(metrics['trials'], 'trial')} of {', '.join(methods)}"
-
-
 def _values(metrics: Metrics, unit: Unit) -> str:
     return f"{metrics['policies']} policies, {falls(metrics['falls'])}"
 
@@ -139,8 +134,6 @@ _TELLERS: Mapping[str, Callable[[Metrics, Unit], str]] = {
     "optimize": _optimize,
     "evaluate": _evaluate,
     "iterate": _iterate,
-    "compare": _compare,
-    "reproduce": _compare,
     "survey": _survey,
     "values": _values,
     "answer": _answer,

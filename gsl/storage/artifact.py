@@ -15,6 +15,7 @@ import yaml
 
 from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
+from gsl.core.own_code import package_of
 from gsl.core.unit import Unit
 from gsl.errors import ArtifactError
 from gsl.storage import documents, manifest
@@ -87,7 +88,7 @@ def build(
         ArtifactError: `out` is something else, or was built otherwise and `force` is not set, or is being built.
         GslError: The folder is full or cannot be written.
     """
-    identity = identify(stage.kind, config, _sources(stage))
+    identity = identify(stage.kind, config, _sources(stage), package_of(type(stage)))
     with locked(out), stoppable(), explained(out.parent):
         forced = getattr(stage, "forced", "rebuilds it")
         if (existing := _existing(out, identity, config, force=force, forced=forced)) is not None:

@@ -28,10 +28,17 @@ def contents_hash(kind: str, hashes: Mapping[str, str]) -> str:
 
 
 @functools.cache
-def sources_hash() -> str:
-    """Return the hash of gsl's sources, read once a process."""
+def sources_hash(other: Path | None = None) -> str:
+    """Return the hash of gsl's sources, and of another package's Python files; read once a process.
+
+    Args:
+        other: Folder of the package, or a file if it is one.
+    """
     digest = hashlib.sha256()
-    for path in sorted(path for path in PACKAGE.rglob("*") if path.is_file() and "__pycache__" not in path.parts):
-        digest.update(f"{path.relative_to(PACKAGE).as_posix()}\0{path.stat().st_size}\0".encode())
-        digest.update(path.read_bytes())
+    own = (path for path in PACKAGE.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    others = [] if other is None else [other] if other.is_file() else other.rglob("*.py")
+    for place, paths in ((PACKAGE, own), (other or PACKAGE, others)):
+        for path in sorted(paths):
+            digest.update(f"{path.relative_to(place).as_posix()}\0{path.stat().st_size}\0".encode())
+            digest.update(path.read_bytes())
     return digest.hexdigest()

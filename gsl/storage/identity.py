@@ -27,7 +27,7 @@ class Identity:
         kind: What the stage makes.
         settings: Its settings by dotted name, without those that say where a parent lies.
         parents: Hash of each parent's contents by role.
-        sources: Hash of gsl's sources.
+        sources: Hash of gsl's sources, and of the stage's package.
     """
 
     kind: str
@@ -50,10 +50,13 @@ class Identity:
 WITHOUT_EFFECT = ("workers", "requests")  # settings of components on which no result depends
 
 
-def identify(kind: str, config: Mapping[str, Any], parents: Mapping[str, Path]) -> Identity:
+def identify(
+    kind: str, config: Mapping[str, Any], parents: Mapping[str, Path], package: Path | None = None
+) -> Identity:
     """Return the identity of a stage; parents enter by role and contents, so that folders can move.
 
     A setting says where a parent lies when its dotted name is the parent's role, or when its text is the parent's path.
+    The sources are gsl's, and those of the `package` that the stage comes from if that is another one.
     """
     places = {os.path.abspath(path) for path in parents.values()}
     settings = {
@@ -62,7 +65,7 @@ def identify(kind: str, config: Mapping[str, Any], parents: Mapping[str, Path]) 
         if not (isinstance(value, str) and (name in parents or os.path.abspath(value) in places))
     }
     hashes = {role: content_hash(path) for role, path in parents.items()}
-    return Identity(kind, settings, hashes, sources_hash())
+    return Identity(kind, settings, hashes, sources_hash(package))
 
 
 def without(told: Any, idle: Callable[[str, Any], bool]) -> Any:

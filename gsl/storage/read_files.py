@@ -28,7 +28,7 @@ def _found(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
         parts = {field.name: getattr(thing, field.name) for field in fields(thing)}
         own: Mapping[str, Path] = getattr(thing, "read_files", {})
         yield from ((f"{where}{name}", path) for name, path in own.items())
-        if where:  # of the stage itself gsl's sources say enough
+        if where:  # the stage itself is part of its identity, with its whole package
             yield from ((f"{where}_target_{k or ''}", path) for k, path in enumerate(_sources(type(thing))))
     else:
         return

@@ -1,0 +1,75 @@
+"""The files of a blind benchmark: cases that are handed out, labels that are not, answers that are sealed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gsl.core.trajectory import Batch
+from gsl.errors import ArtifactError
+from gsl.storage.documents import write_json
+from gsl.storage.references import resolve
+from gsl.storage.trajectories import read, write
+from gsl_benchmarks.blind.seals import VERSION, check_files
+
+CASES, SEALS = "cases", "seals.json"  # of the data
+LOG, REFERENCE, CASE = "log.parquet", "reference.parquet", "case.json"  # of a case
+LABELS, SECRET = "labels.json", "secret.txt"  # of the labels
+ANSWERS, BASELINES, SEAL = "answers", "baselines", "seal.json"  # of the answers
+
+
+def found(reference: str, file: str, kind: str) -> Path:
+    """Return a file of a folder that anyone wrote, or of the artifact of `kind` that a path or a run's name stands for.
+
+    Raises:
+        ArtifactError: There is none.
+    """
+    place = Path(reference)
+    folder = place if (place / file).is_file() else resolve(reference, kind=kind)
+    if not (folder / file).is_file():
+        raise ArtifactError(folder, f"holds no {file}; is this a folder of gsl {kind.replace('_', ' ')}?")
+    return folder / file
+
+
+def write_case(folder: Path, log: Batch, reference: Batch | None, case: Mapping[str, Any]) -> None:
+    """Write a case's folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write(folder / LOG, log)
+    if reference is not None:
+        write(folder / REFERENCE, reference)
+    write_json(folder / CASE, case)
+
+
+def read_case(folder: Path) -> tuple[Batch, Batch | None, dict[str, Any]]:
+    """Return log, reference if there is one, and what case.json says."""
+    reference = folder / REFERENCE
+    return read(folder / LOG), read(reference) if reference.exists() else None, document(folder / CASE)
+
+
+def seals_of(path: Path) -> dict[str, Any]:
+    """Return the seals of all cases, by name, having checked that the cases' files are those that were sealed.
+
+    Raises:
+        GslError: A file was changed, is missing or is new.
+    """
+    cases: dict[str, Any] = document(path)["cases"]
+    for name, seal in cases.items():
+        check_files(path.parent / CASES / name, seal["files"])
+    return cases
+
+
+def document(path: Path) -> dict[str, Any]:
+    """Return a JSON document of this version, with or without a version number.
+
+    Raises:
+        ArtifactError: It is none.
+    """
+    try:
+        read_in: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ArtifactError(path, "cannot be read as JSON; copy it again") from error
+    if not isinstance(read_in, dict) or read_in.get("schema_version", VERSION) != VERSION:
+        raise ArtifactError(path, f"is of another version; this gsl reads {VERSION}")
+    return read_in

@@ -1,0 +1,155 @@
+"""Answer a blind benchmark: diagnose every case from its log, with no access to labels, and seal what was said."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from gsl.core.console import Console, Progress
+from gsl.core.setting import component, setting
+from gsl.core.validation import make
+from gsl.diagnosis.logs import check_log, on_ground
+from gsl.diagnosis.options import Options
+from gsl.rollout.parallel import Workers, in_parallel
+from gsl.storage import documents
+from gsl.storage.hashing import file_hash
+from gsl.storage.trajectories import read
+from gsl.worlds.bullet import BulletWorld
+from gsl_benchmarks.blind.answer import Question, answered, answered_by_baselines
+from gsl_benchmarks.blind.files import (
+    ANSWERS,
+    BASELINES,
+    CASE,
+    CASES,
+    LOG,
+    REFERENCE,
+    SEAL,
+    SEALS,
+    document,
+    found,
+    read_case,
+    seals_of,
+)
+from gsl_benchmarks.blind.seals import VERSION, files_below, total
+
+BEGUN = "data.json"
+
+
+class _Task(NamedTuple):
+    """A case to answer: its folder, the answers' folder, and what chance is known to gain there."""
+
+    case: Path
+    folder: Path
+    nulls: tuple[float, ...] | None
+
+
+@component
+class BlindAnswer:
+    """Every answer is a file; a run that was stopped goes on with the cases that have none.
+
+    What chance gains is measured once for each set of commands, on its first case, and used for the others.
+    """
+
+    kind: ClassVar[str] = "blind_answer"
+    progress: ClassVar[str] = BEGUN
+
+    data: Annotated[str, setting("folder of the cases, of gsl blind make or of one's own", min_length=1)]
+    baselines: Annotated[bool, setting("answer with four simpler methods as well")] = False
+    most: Annotated[int, setting("effects at once, at most", ge=1, le=6)] = 4
+    duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
+    nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
+    workers: Workers = -1
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the seals of the data, which hold the hash of every file of it."""
+        return {"data": found(self.data, SEALS, "blind_make")}
+
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
+        """Write an answer for each case, and the hash of all."""
+        seals = self.parents()["data"]
+        cases = [seals.parent / CASES / name for name in seals_of(seals)]
+        documents.write_json(folder / BEGUN, {"schema_version": VERSION, "seals": file_hash(seals)})
+        (folder / ANSWERS).mkdir(exist_ok=True)
+        leaders = _leaders(cases) if self.nulls else {case: case for case in cases}
+        with console.progress(len(cases), "answering") as progress:
+            self._all(set(leaders.values()), {}, folder, progress)
+            self._all(set(cases), leaders, folder, progress)
+        answers = [document(_file(folder, case)) for case in cases]
+        hashes = files_below(folder / ANSWERS)
+        for place in sorted((folder / BASELINES).glob("*")):
+            hashes |= {f"{place.name}/{name}": sha for name, sha in files_below(place).items()}
+        sealed = {"schema_version": VERSION, "data": file_hash(seals), "answers": hashes, "total": total(hashes)}
+        documents.write_json(folder / SEAL, sealed)
+        seconds = [one["seconds"] for one in answers]
+        words = [one["verdict"] for one in answers]
+        return {
+            "cases": len(answers),
+            "verdicts": {word: words.count(word) for word in sorted(set(words))},
+            "median_seconds": float(np.median(seconds)),
+            "longest_seconds": max(seconds),
+            "seal": sealed["total"],
+        }
+
+    def _all(self, cases: Iterable[Path], leaders: Mapping[Path, Path], folder: Path, progress: Progress) -> None:
+        """Answer the cases that have no answer yet; those with a leader use what chance gained there."""
+        missing = [case for case in sorted(cases) if not _file(folder, case).exists()]
+        tasks = [_Task(case, folder, _nulls(folder, leaders.get(case))) for case in missing]
+        options = Options(most=self.most, duels=self.duels, nulls=self.nulls, threads=1)
+        in_parallel(_answer, (options, self.baselines), tasks, self.workers, progress)
+
+
+def _leaders(cases: Sequence[Path]) -> dict[Path, Path]:
+    """Return for each case the first one with the same commands, simulator and manner of calibration.
+
+    One that has the whole library leads before one that has not.
+    """
+    asked = {case: document(case / CASE) for case in cases}
+    first: dict[str, Path] = {}
+    leaders = {}
+    for case in sorted(cases, key=lambda one: (bool(asked[one].get("without")), one)):
+        log = read(case / LOG)
+        digest = hashlib.sha256(
+            documents.text([asked[case]["sim"], (case / REFERENCE).exists(), on_ground(log)]).encode()
+        )
+        for episode in log.episodes:
+            digest.update(np.round(episode.action, 6).tobytes())
+        leaders[case] = first.setdefault(digest.hexdigest(), case)
+    return leaders
+
+
+def _nulls(folder: Path, leader: Path | None) -> tuple[float, ...] | None:
+    return None if leader is None else tuple(document(_file(folder, leader))["null_gains"])
+
+
+def _file(folder: Path, case: Path) -> Path:
+    return folder / ANSWERS / f"{case.name}.json"
+
+
+def _answer(frozen: bytes, task: _Task) -> None:
+    """Answer one case; its own answer is written last, for it says that the case is done."""
+    options, baselines = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
+    question, without = _question(task.case)
+    asked = replace(options, without=tuple(without))
+    for name, told in (answered_by_baselines(question, asked, _quiet) if baselines else {}).items():
+        (task.folder / BASELINES / name).mkdir(parents=True, exist_ok=True)
+        documents.write_json(task.folder / BASELINES / name / f"{task.case.name}.json", told)
+    told = answered(question, asked, known_nulls=task.nulls, tick=_quiet)
+    documents.write_json(_file(task.folder, task.case), told)
+
+
+def _question(folder: Path) -> tuple[Question, list[str]]:
+    log, reference, asked = read_case(folder)
+    world = make(BulletWorld, asked["sim"], where=f"{folder.name}.sim")
+    question = Question(log, reference, world.plant, world.step, on_ground(log))
+    check_log(log, question.robot, str(folder))
+    return question, list(asked.get("without", []))
+
+
+def _quiet(said: str = "") -> None:
+    """Say nothing of the work inside a case."""

@@ -1,0 +1,93 @@
+"""Reveal a blind benchmark: check every seal, set the answers against the labels, and count."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from gsl.core.console import Console
+from gsl.core.setting import component, setting
+from gsl.errors import GslError
+from gsl.storage import documents
+from gsl.storage.hashing import file_hash
+from gsl_benchmarks.blind.figures import figures
+from gsl_benchmarks.blind.files import ANSWERS, BASELINES, LABELS, SEAL, SEALS, document, found, seals_of
+from gsl_benchmarks.blind.label import WALK, Label
+from gsl_benchmarks.blind.mark import Mark, marked
+from gsl_benchmarks.blind.results import OURS, markdown, results
+from gsl_benchmarks.blind.seals import check_label, files_below
+
+DATA, TABLE = "results.json", "results.md"
+
+
+@component
+class BlindReveal:
+    """Labels, nonces, data and answers have to be those that were sealed."""
+
+    kind: ClassVar[str] = "blind_reveal"
+
+    data: Annotated[str, setting("folder of the cases", min_length=1)]
+    answers: Annotated[str, setting("folder of the answers", min_length=1)]
+    labels: Annotated[str, setting("folder of the labels", min_length=1)]
+
+    def parents(self) -> Mapping[str, Path]:
+        """Return the seals of data and answers, and the labels."""
+        return {
+            "data": found(self.data, SEALS, "blind_make"),
+            "answers": found(self.answers, SEAL, "blind_answer"),
+            "labels": found(self.labels, LABELS, "blind_make"),
+        }
+
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
+        """Write the results as JSON and as markdown."""
+        files = self.parents()
+        labels = _labels(files["data"], files["labels"])
+        _check_answers(files["data"], files["answers"])
+        place = files["answers"].parent
+        marks = {OURS: _marks(labels, place / ANSWERS)}
+        in_the_air = {name: label for name, label in labels.items() if label.kind != WALK}
+        marks |= {one.name: _marks(in_the_air, one) for one in sorted((place / BASELINES).glob("*"))}
+        documents.write_json(folder / DATA, results(marks))
+        seals = f"data {file_hash(files['data'])[:16]}, answers {document(files['answers'])['total'][:16]}"
+        about = f"{len(labels)} cases; every seal holds ({seals})."
+        (folder / TABLE).write_text(markdown(marks, about), encoding="utf-8")
+        judged = [one for one in figures(marks[OURS]) if one.met is not None]
+        met = sum(bool(one.met) for one in judged)
+        return {
+            "headline": f"{met} of {len(judged)} thresholds are met in {len(labels)} cases",
+            "cases": len(labels),
+            "met": met,
+            "judged": len(judged),
+            "figures": {f"{one.name}, {one.generator}": one.value for one in judged},
+        }
+
+
+def _labels(seals: Path, path: Path) -> dict[str, Label]:
+    """Return the labels by case, having checked their seals and the data's."""
+    entries = document(path)["cases"]
+    cases = seals_of(seals)
+    for name, seal in cases.items():
+        check_label(path, name, seal["label"], entries.get(name, {}))
+    return {name: Label.of(entries[name]["label"]) for name in cases}
+
+
+def _check_answers(seals: Path, path: Path) -> None:
+    """Refuse answers that were changed after they were sealed, or are to other data.
+
+    Raises:
+        GslError: Names the file.
+    """
+    sealed, folder = document(path), path.parent
+    if sealed["data"] != file_hash(seals):
+        raise GslError(f"{path}: these are answers to other data than {seals.parent}")
+    there = files_below(folder / ANSWERS)
+    for place in sorted((folder / BASELINES).glob("*")):
+        there |= {f"{place.name}/{name}": sha for name, sha in files_below(place).items()}
+    for name in sorted({*there, *sealed["answers"]}):
+        if there.get(name) != sealed["answers"].get(name):
+            raise GslError(f"{folder}: the seal of {name} does not hold, the answer was changed after it was given")
+
+
+def _marks(labels: Mapping[str, Label], folder: Path) -> list[Mark]:
+    return [marked(label, document(folder / f"{name}.json")) for name, label in labels.items()]

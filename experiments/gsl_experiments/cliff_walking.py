@@ -1,0 +1,168 @@
+"""The paper's figure 11: Cliff Walking with GAT and SGAT against the real world's noise, exact bounds beside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from gsl.core.console import Console
+from gsl.core.seeds import derived_seed
+from gsl.core.setting import component, setting
+from gsl.core.statistics import Interval, mean_interval
+from gsl.core.table import Table
+from gsl.core.words import several
+from gsl.grounding.states import TableTransformation
+from gsl.models.counts import Counts
+from gsl.report.markdown import table as markdown
+from gsl.storage.documents import write_json
+from gsl.worlds.gymnasium import GymnasiumWorld
+from gsl_experiments.noise_curve import Curve, noise_curve
+from gsl_experiments.sizes import PresetName, check_rising, sizes_of
+from gsl_experiments.table_episodes import played
+
+TABLE, DATA, FIGURE = "table.md", "points.json", "figure_11.png"
+DOWN = 2  # π0's action everywhere: of equally good paths in the simulator it leaves the one along the edge
+METHODS = {"gat": False, "sgat": True}  # whether the next state is drawn
+
+
+class Point(NamedTuple):
+    """One method, once, at one noise.
+
+    Attributes:
+        value: Exact, of the policy it ends with, in the real world.
+        estimate: The same from episodes there.
+        rounds: Of grounding and policy improvement.
+        converged: Whether the last one changed nothing.
+        real_episodes: That the forward model learned from.
+    """
+
+    method: str
+    noise: float
+    trial: int
+    value: float
+    estimate: float
+    rounds: int
+    converged: bool
+    real_episodes: int
+
+
+@component
+class Figure11:
+    """Grounding and exact policy iteration in turn until the policy does not change; real data are kept."""
+
+    kind: ClassVar[str] = "reproduce"
+
+    world: Annotated[GymnasiumWorld, setting("the cliff; its noise is replaced")]
+    noises: Annotated[
+        tuple[Annotated[float, setting("", ge=0, le=1)], ...],
+        setting("chances that the real world replaces an action", min_length=1),
+    ]
+    trials: Annotated[int, setting("trials of each method and noise", ge=1)]
+    episodes: Annotated[int, setting("real episodes of each grounding step", ge=1)] = 200
+    explore: Annotated[float, setting("chance of a random action in them", ge=0, le=1)] = 0.2
+    sim_episodes: Annotated[
+        int, setting("simulated episodes for the inverse model, nine in ten actions random", ge=1)
+    ] = 5000
+    rounds: Annotated[int, setting("most rounds", ge=1)] = 30
+    evaluations: Annotated[int, setting("real episodes that estimate the return", ge=1)] = 10_000
+    seed: Annotated[int, setting("of all randomness", ge=0)] = 1
+    preset_name: PresetName = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a curve that goes back, or counts a noise twice."""
+        check_rising("noises", self.noises)
+
+    def parents(self) -> Mapping[str, Path]:
+        """Everything is made here."""
+        return {}
+
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
+        """Run all trials; write the points, the table and the figure."""
+        simulator = self._real(0.0)
+        start = simulator.solved(np.full(len(simulator.terminal), DOWN))
+        points: list[Point] = []
+        with console.progress(len(self.noises) * self.trials, "grounding at the cliff") as progress:
+            for noise in self.noises:
+                for trial in range(self.trials):
+                    points += [self._trial(simulator, start, noise, method, trial) for method in METHODS]
+                    progress.advance()
+        write_json(folder / DATA, [one._asdict() for one in points])
+        bounds = {noise: self._bounds(start, noise) for noise in self.noises}
+        sizes = f"{sizes_of(self.preset_name)} {several(self.trials, 'trial')}."
+        (folder / TABLE).write_text(f"{_table(points, bounds)}\n{sizes}\n", encoding="utf-8")
+        _draw(folder / FIGURE, points, bounds)
+        return {"points": len(points), "noises": len(self.noises)}
+
+    def _real(self, noise: float) -> Table:
+        return replace(self.world, kwargs={**self.world.kwargs, "noise": noise}).table
+
+    def _bounds(self, start: np.ndarray, noise: float) -> tuple[float, float]:
+        """Return what the simulator's optimum and the real optimum are worth in the real world."""
+        real = self._real(noise)
+        return real.value(start), real.value(real.solved(start))
+
+    def _trial(self, simulator: Table, start: np.ndarray, noise: float, method: str, trial: int) -> Point:
+        real, policy = self._real(noise), start
+        rng = np.random.default_rng(derived_seed(self.seed, self.kind, round(1e6 * noise), trial))
+        inverse = Counts(played(simulator, start, self.sim_episodes, rng, explore=0.9).seen, "inverse_model")
+        seen, rounds, converged = np.zeros(real.chances.shape), 0, False
+        while rounds < self.rounds and not converged:
+            rounds += 1
+            seen += played(real, policy, self.episodes, rng, explore=self.explore).seen
+            grounding = TableTransformation(Counts(seen), inverse, draws=METHODS[method])
+            better = grounding.grounded(simulator).solved(policy)
+            converged = np.array_equal(better, policy)
+            policy = better
+        estimate = float(played(real, policy, self.evaluations, rng).returns.mean())
+        return Point(method, noise, trial + 1, real.value(policy), estimate, rounds, converged, rounds * self.episodes)
+
+
+def _of(points: Sequence[Point], method: str, noise: float) -> list[Point]:
+    return [one for one in points if (one.method, one.noise) == (method, noise)]
+
+
+def _table(points: Sequence[Point], bounds: Mapping[float, tuple[float, float]]) -> str:
+    titles = (
+        *("noise", "edge path, exact", "real optimum, exact", "gat", "sgat", "sgat - gat", "sgat of optimum"),
+        *(f"real episodes of {method}" for method in METHODS),
+    )
+    rows = []
+    for noise, (edge, best) in bounds.items():
+        each = {method: [one.value for one in _of(points, method, noise)] for method in METHODS}
+        apart = mean_interval(np.subtract(each["sgat"], each["gat"]))
+        told = [_told(mean_interval(values)) for values in each.values()]
+        share = f"{100 * np.mean(each['sgat']) / best:.1f} %" if best > 0.0 else "-"
+        spent = (_episodes(_of(points, method, noise)) for method in METHODS)
+        rows.append((f"{noise:g}", f"{edge:.2f}", f"{best:.2f}", *told, _told(apart), share, *spent))
+    effort = []
+    for method in METHODS:
+        own = [one for one in points if one.method == method]
+        open_ends = sum(not one.converged for one in own)
+        rounds = f"{np.mean([one.rounds for one in own]):.1f}"
+        effort.append((method, rounds, f"{open_ends} of {len(own)}", _episodes(own)))
+    off = max(abs(one.estimate - one.value) for one in points)
+    below = f"\nEstimates from real episodes are off the exact values by {off:.2f} at most.\n\n"
+    return markdown(titles, rows) + below + markdown(("grounding", "rounds", "not converged", "real episodes"), effort)
+
+
+def _episodes(points: Sequence[Point]) -> str:
+    spent = [one.real_episodes for one in points]
+    return f"{np.mean(spent):.0f} ({min(spent)} to {max(spent)})"
+
+
+def _told(one: Interval) -> str:
+    return f"{one.mean:.2f} ({one.lower:.2f} to {one.upper:.2f})" if np.isfinite(one.upper) else f"{one.mean:.2f}"
+
+
+def _draw(path: Path, points: Sequence[Point], bounds: Mapping[float, tuple[float, float]]) -> None:
+    noises = list(bounds)
+    curves = {
+        method: Curve(noises, [mean_interval([one.value for one in _of(points, method, noise)]) for noise in noises])
+        for method in METHODS
+    }
+    exact = {"real optimum": [best for _, best in bounds.values()], "edge path": [edge for edge, _ in bounds.values()]}
+    noise_curve(path, curves, exact, title="Cliff Walking: return in the real world")

@@ -1,0 +1,251 @@
+"""The paper's figures 12 and 13, and GARAT's suite: real worlds that are noisy or heavier."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import field, replace
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from gsl.core.interfaces import REAL, SIM, Grounding, Search, World
+from gsl.core.layout import check_alike
+from gsl.core.seeds import seed_of_round
+from gsl.core.setting import component, setting
+from gsl.core.words import several
+from gsl.errors import ConfigError
+from gsl.grounding.ane import ActionNoise
+from gsl.grounding.effects import evidence_of, learned
+from gsl.grounding.none import NoGrounding
+from gsl.optimizers.trpo import Trpo
+from gsl.policies.policy import sized
+from gsl.report.console import Console
+from gsl.rollout.parallel import Workers, arriving
+from gsl.stages.chain_rounds import Chain
+from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
+from gsl.stages.optimize import BEST
+from gsl.storage.policy_choice import EVALUATION
+from gsl.worlds.gymnasium import GymnasiumWorld, try_out
+from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
+from gsl_experiments.noise_bars import Bars, noise_bars
+from gsl_experiments.noise_table import REFERENCE, NoiseTable, Place, Point
+from gsl_experiments.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
+
+TABLE, DATA, FIGURE = "table.md", "points.json", "figure.png"
+
+
+@component
+class NoiseStudy:
+    """Every trial begins with a policy from the plain simulator, and goes on from it with each method.
+
+    The same effort for each; without grounding and with action noise the first search is the same for all real worlds.
+    The reference learns in the real world itself. A further round goes on from the policy that the real world chose.
+    """
+
+    kind: ClassVar[str] = "reproduce"
+    forced: ClassVar[str] = GOES_ON
+
+    iterate: Annotated[Iterate, setting("what a trial is; its real world and grounding are replaced")]
+    worlds: Annotated[
+        Mapping[str, GymnasiumWorld], setting("the real worlds, by name; their noise is replaced", min_length=1)
+    ]
+    noises: Annotated[
+        tuple[Annotated[float, setting("", ge=0)], ...],
+        setting("standard deviations of the real worlds' noise", min_length=1),
+    ]
+    methods: Annotated[Mapping[str, Grounding], setting("the groundings, by name", min_length=1)]
+    further: Annotated[Search | Trpo, setting("how it goes on from π0")]
+    trials: Annotated[int, setting("trials of each method", ge=1)]
+    sims: Annotated[Mapping[str, GymnasiumWorld], setting("simulators of worlds that have one of their own")] = field(
+        default_factory=dict
+    )
+    choice: Annotated[Literal["sim", "real"], setting("where the best of a search's generations is chosen")] = "sim"
+    workers: Workers = -1
+    known: Known = None
+    preset_name: PresetName = ""
+    first: First = 1
+
+    def __post_init__(self) -> None:
+        """Refuse what only several rounds know, and rounds that go on from what nothing real has chosen."""
+        check_rising("noises", self.noises)
+        check_aggregate(self.iterate, self.methods.values(), "iterate.aggregate")
+        if self.iterate.iterations > 1 and self.choice == SIM:
+            given = str(self.iterate.iterations)
+            raise ConfigError("iterate.iterations", "several need choice=real, to go on from", given=given)
+
+    def parents(self) -> Mapping[str, Path]:
+        """Everything is made here, but for what is known."""
+        return known_parents(self.known, DATA)
+
+    def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
+        """Run all trials; write the points, the table and the figure."""
+        for name, world in self.worlds.items():
+            check_alike(self.sims.get(name, self.iterate.sim).layout, world.layout)
+        for name, grounding in self.methods.items():
+            check_trainable(self.iterate, f"methods.{name}", grounding)
+        named = {f"{group}.{name}": one for group in ("worlds", "sims") for name, one in getattr(self, group).items()}
+        try_out({"iterate.sim": self.iterate.sim, **named})
+        home = folder.parent
+        ledger = Ledger(home / DATA, self.parents(), Point, console)
+        keys = self.recipes
+        ledger.announce({key: f"trial {number}" for number, key in keys.items()})
+        ledger.judge({key: {"trial": number} for number, key in keys.items()})
+        known = {number for number, key in keys.items() if ledger.take(key)}
+        jobs = [(number, home) for number in keys if number not in known]
+        with console.progress(len(jobs), "trials") as progress:
+            for index, found in arriving(_trial, self, jobs, self.workers, progress):
+                ledger.add(keys[jobs[index][0]], [one._asdict() for one in found])
+        points = [Point(**row) for row in ledger.figures]
+        self.tell(folder, points, ledger.close(folder / DATA))
+        return {"points": len(points)}
+
+    @property
+    def recipes(self) -> dict[int, str]:
+        """By number: a trial needs all settings but which trials there are."""
+        what = (self.iterate, self.worlds, self.noises, self.methods, self.further, self.sims, self.choice)
+        return {number: recipe(*what, number) for number in numbers(self.first, self.trials)}
+
+    def tell(self, folder: Path, points: Sequence[Point], made: str) -> None:
+        """Write the table and the figure of all points; `made` says who made them."""
+        table = NoiseTable(
+            points,
+            places=[Place(*one) for one in product(self.worlds, self.noises, self._rounds)],
+            shown=self._shown,
+            learned=[name for name, one in self.methods.items() if learned(one)],
+            noisy=[name for name, one in self.methods.items() if isinstance(one, ActionNoise)],
+            trials=self.trials,
+            chosen=self.choice == REAL,
+        )
+        (folder / TABLE).write_text(
+            f"{table.told(*self._below)}\n{sizes_of(self.preset_name)} {made}\n", encoding="utf-8"
+        )
+        self._draw(folder / FIGURE, table)
+
+    def _draw(self, path: Path, table: NoiseTable) -> None:
+        """Draw the returns against the noise, or against the rounds if there are several of these and one noise."""
+        environments = {world.env_id for world in self.worlds.values()}
+        alike = len(environments) == 1
+        of = f"{min(environments)}, " if alike else ""
+        last = self._rounds[-1]
+        if by_round := len(self.noises) == 1 and last > 1:
+            ticks, along = [f"{one}" for one in self._rounds], "rounds"
+        else:
+            ticks = [f"{noise:g}" for noise in self.noises] if any(self.noises) else ["no noise"]
+            along = "sd of action noise in real [half ranges]" if any(self.noises) else ""
+        panels = {}
+        for world in self.worlds:
+            where = [Place(*one) for one in product([world], self.noises, self._rounds if by_round else [last])]
+            panels[f"{of}{world.replace('_', ' ')}"] = Bars(ticks, table.means(where))
+        hatched = "without real data" if self.choice == SIM else "no model of real"
+        title = f"Return in real, mean ± standard error ({trials_of(self.first, self.trials)}); hatched: {hatched}"
+        noise_bars(path, panels, REFERENCE, title=title, along=along, alike=alike)
+
+    @property
+    def _shown(self) -> dict[str, str]:
+        """Names of all methods for people."""
+        told = {
+            method: f"ane {grounding.sd:g}" if isinstance(grounding, ActionNoise) else method
+            for method, grounding in self.methods.items()
+        }
+        return {**told, REFERENCE: REFERENCE}
+
+    @property
+    def _rounds(self) -> range:
+        return range(1, self.iterate.iterations + 1)
+
+    def trial(self, number: int, home: Path) -> list[Point]:
+        """Return all points of a trial, built below `home`."""
+        seed, console = self.iterate.seed + number - 1, Console(json=True)
+        name, points = f"trial_{number:02d}", list[Point]()
+        for world, noise in product(self.worlds, self.noises):
+            real, sim = replace(self.worlds[world], action_noise=noise), self.sims.get(world)
+            chain = self._chain(sim or self.iterate.sim)
+            alone, below = home / (f"{world}_sim" if sim else "sim"), home / f"{world}_{noise:g}"
+            start = chain.pretrained(alone / "pretrained" / name, seed, console)
+            shared = {SIM: alone / "models" / name, REAL: below / "models" / name}
+            at = replace(chain, real=real, optimizer=self.further, shared=shared)
+            for method, grounding in self.methods.items():
+                place = below / method / name
+                first = place if learned(grounding) else alone / method / name
+                of = partial(Point, world, noise, method, number)
+                points += self._carried_out(of, at, grounding, first, place, start, seed)
+            of, place = partial(Point, world, noise, REFERENCE, number), below / "real" / name
+            for one in self._carried_out(of, replace(at, sim=real), NoGrounding(), place, place, start, seed):
+                spent = one.round * self.further.taken if isinstance(self.further, Trpo) else None
+                points.append(one._replace(real_steps=spent))
+        return points
+
+    def _carried_out(
+        self,
+        of: Callable[..., Point],
+        chain: Chain,
+        grounding: Grounding,
+        first: Path,
+        place: Path,
+        start: str,
+        seed: int,
+    ) -> Iterator[Point]:
+        """Yield the rounds of a method, built at `place`, but the first search at `first`, which worlds may share."""
+        home, console, spent, choice, promised = place, Console(json=True), 0, 0, None
+        for number in self._rounds:
+            if number > 1:
+                first = place = home / f"iteration_{number:02d}"
+            at, only = seed_of_round(seed, number), BEST if self.choice == SIM else ""
+            _, found, measured = chain.round(place, grounding, start, at, console, search=first, only=only)
+            spent += _steps(chain.shared.get(REAL, place)) if REAL in evidence_of(grounding) else 0
+            told = measured.metrics
+            if self.choice == SIM:
+                value, promised = told["last"]["value"], found.metrics["best_value_sim"]
+            else:
+                value, choice = told["returned"]["value"], choice + _choice_steps(measured.folder)
+                promised = told["returned_value_sim"] if told["best_generation"] else promised
+            yield of(number, float(value), spent, choice, promised)
+            start, chain = str(measured.folder), replace(chain.after(place), shared={})
+
+    @property
+    def _reference(self) -> str:
+        """How much of the real world the reference learned from, in a round."""
+        if isinstance(self.further, Trpo):
+            return f"{self.further.taken:,} steps"
+        return f"{self.further.generations * self.further.candidates * self.iterate.budget.rollouts:,} episodes"
+
+    @property
+    def _below(self) -> list[str]:
+        """What the table says below."""
+        each = " in each round" if len(self._rounds) > 1 else ""
+        below = [
+            f"Mean ± standard error over {trials_of(self.first, self.trials)}; real steps are the median and range of",
+            f"what learned groundings saw; the reference learned from {self._reference}{each}.",
+        ]
+        if self.choice == SIM:
+            return below
+        policies, budget = self.further.generations + 1, self.iterate.budget
+        chosen = several(budget.episodes, "real episode")
+        return [
+            *below,
+            f"In each round the real world chose the best of {policies} policies, by {chosen} each.",
+            "They are those of the generations and the one it began with.",
+            f"Values are of {budget.confirmation} other episodes.",
+        ]
+
+    def _chain(self, sim: World) -> Chain:
+        """Return the links in a simulator, for whose sizes the policy is made anew."""
+        policy = sized(self.iterate.policy, sim)
+        return replace(self.iterate.chain, sim=sim, policy=policy, workers=1, accept=True)
+
+
+def _steps(place: Path) -> int:
+    return int(json.loads((place / "collect_real" / "metrics.json").read_text(encoding="utf-8"))["steps"])
+
+
+def _choice_steps(evaluation: Path) -> int:
+    told = json.loads((evaluation / EVALUATION).read_text(encoding="utf-8"))
+    return round(sum(one["episodes"] * one["outcome"]["steps"] for one in [*told["policies"], *told["check"]]))
+
+
+def _trial(frozen: bytes, job: tuple[int, Path]) -> list[Point]:
+    study: NoiseStudy = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
+    return study.trial(*job)

@@ -1,0 +1,117 @@
+"""Commands of other packages, found as entry points of the group `gsl.commands` and imported when they are run.
+
+An entry point names a stage, whose yaml file lies in the folder conf/ of its package, a function, or a typer.Typer.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+from typer.main import get_group
+
+from gsl.commandline.stage_command import add_stage
+from gsl.errors import GslError
+
+GROUP = "gsl.commands"
+CONF = "conf"
+
+
+class StandIn(TyperCommand):
+    """What is known of a command before its package is imported: its name and a line for the help."""
+
+    def __init__(self, entry_point: EntryPoint) -> None:
+        super().__init__(entry_point.name, rich_markup_mode=None)
+        self.entry_point = entry_point
+
+    def get_short_help_str(self, limit: int = 45) -> str:
+        """Return the line for the help, which is read when it is asked for."""
+        return summary(self.entry_point)
+
+
+class Commands(TyperGroup):
+    """gsl's own commands, and those of other packages after them; an own one hides another of its name."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        for name, entry_point in sorted(plugins().items()):
+            self.commands.setdefault(name, StandIn(entry_point))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Import the command that is run."""
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, load(command.entry_point) if isinstance(command, StandIn) else command, rest
+
+
+def plugins() -> dict[str, EntryPoint]:
+    """Return the entry points by the name of their command."""
+    return {one.name: one for one in entry_points(group=GROUP)}
+
+
+def load(entry_point: EntryPoint) -> Any:
+    """Import a command.
+
+    Raises:
+        GslError: It cannot be imported, or is no command.
+    """
+    name = entry_point.name
+    app = typer.Typer(rich_markup_mode=None)
+    try:
+        found = entry_point.load()
+        if isinstance(found, typer.Typer):
+            app.add_typer(found, name=name)
+        elif inspect.isclass(found):
+            add_stage(app, name, summary(entry_point))
+        else:
+            app.command(name)(found)
+        return get_group(app).commands[name]
+    except (Exception, SystemExit) as error:
+        package = entry_point.dist.name if entry_point.dist else entry_point.module
+        why = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        problem = f"{entry_point.value} of the package {package} cannot be loaded: {why}"
+        raise GslError(f"{problem}; repair that package or uninstall it") from error
+
+
+def is_group(name: str) -> bool:
+    """Whether a command of another package has commands of its own."""
+    try:
+        return name in plugins() and isinstance(load(plugins()[name]), TyperGroup)
+    except GslError:
+        return False
+
+
+def folders() -> list[Path]:
+    """Return the folders conf/ of the packages that bring commands."""
+    packages = sorted({one.module.partition(".")[0] for one in plugins().values()})
+    return [place for package in packages if (place := _place(package) / CONF).is_dir()]
+
+
+def summary(entry_point: EntryPoint) -> str:
+    """Return the first sentence of what a command says of itself, read without importing it."""
+    package, *inner = entry_point.module.split(".")
+    path = _place(package).joinpath(*inner)
+    file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    try:
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+    except (OSError, SyntaxError, ValueError):
+        return ""
+    named = [one for one in tree.body if getattr(one, "name", None) == entry_point.attr]
+    documented = [one for one in named if isinstance(one, ast.ClassDef | ast.FunctionDef)]
+    return (ast.get_docstring(documented[0] if documented else tree) or "").partition("\n")[0]
+
+
+def _place(package: str) -> Path:
+    """Return the folder of a package, or the path of a module without its suffix; a place that is not there if none."""
+    try:
+        spec = find_spec(package)
+    except (ImportError, ValueError):
+        spec = None
+    if spec is not None and spec.submodule_search_locations:
+        return Path(next(iter(spec.submodule_search_locations)))
+    return Path(spec.origin).with_suffix("") if spec is not None and spec.origin else Path("/nowhere", package)
