@@ -179,7 +179,7 @@ def test_two_entries_add_but_factors_multiply_noises_add_in_square_and_of_some_t
 
 def strengths(plant: Plant) -> dict[str, np.ndarray]:
     """Whatever an effect can change, as arrays."""
-    parts = {**vars(plant.servo), **vars(plant.sensors), "noise": plant.action_noise}
+    parts = {**plant.servo._asdict(), **vars(plant.sensors), "noise": plant.action_noise}
     parts["torque_noise"] = plant.torque_noise
     parts["pushes"] = sum((push.force for push in plant.pushes), np.zeros(3))
     parts["mass"], parts["com"] = plant.robot.links["LHand"].mass, plant.robot.links["LHand"].com

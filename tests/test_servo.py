@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gsl.core.plant import Servo
+from gsl.core.servo import Servo
 from gsl.worlds.drive_train import TOOTH_STIFFNESS
 from gsl.worlds.servo import BRISTLE, servo_torque
 from gsl.worlds.servo_state import first_state, packed
