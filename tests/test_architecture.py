@@ -20,7 +20,7 @@ FLOORS = (  # from the ground up: a room imports from lower floors alone
     ("rollout", "report"),
     ("diagnosis", "real_robot", "benchmarks", "commandline"),
     ("training", "blind", "api"),
-    ("validation", "gym"),
+    ("validation", "gym", "testing"),
     ("stages", "cli"),
     ("studies", "__main__"),
 )

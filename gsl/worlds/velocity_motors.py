@@ -21,7 +21,7 @@ import numpy as np
 from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
 from gsl.core.servo import ROW, Servo
-from gsl.effects.effect import Effect
+from gsl.effects.effect import Effect, name_of
 from gsl.errors import ConfigError
 from gsl.worlds.servo import delayed, shaped
 from gsl.worlds.servo_state import ServoState
@@ -118,8 +118,9 @@ def check_motors(plant: Plant, effects: Iterable[Effect]) -> None:
             if not np.array_equal(before, now)
         }
         if changed - HEARD or after.hook is not None or after.torque_noise.any():
-            name = type(effect).__module__.rpartition(".")[2]
-            raise ConfigError(f"effects.{name}", "does not act on velocity motors; leave it out, or take motors=servo")
+            raise ConfigError(
+                f"effects.{name_of(effect)}", "does not act on velocity motors; leave it out, or take motors=servo"
+            )
         plant = after
 
 
