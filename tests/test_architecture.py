@@ -21,7 +21,7 @@ FLOORS = (  # from the ground up: a room imports from lower floors alone
     ("rollout", "report"),
     ("diagnosis", "real_robot", "commandline"),
     ("training", "api", "cli"),
-    ("validation", "gym", "__main__"),
+    ("validation", "gym", "testing", "__main__"),
     ("stages",),
 )
 BESIDE = ("experiments/gsl_experiments", "benchmarks/gsl_benchmarks")  # above all floors: each imports gsl and itself

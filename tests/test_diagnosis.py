@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pytest
 
 from gsl.core.body import Joint, Link, Robot
 from gsl.core.plant import Plant, nominal
+from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis import nuisance
 from gsl.diagnosis.candidates import library
@@ -21,7 +22,7 @@ from gsl.diagnosis.options import Options
 from gsl.diagnosis.records import records
 from gsl.diagnosis.screen import _between
 from gsl.diagnosis.world_file import diagnosed_effects
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import SCOPE, Scope, applied, built, scope, use_own
 from gsl.report.diagnosis_text import summary_lines
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo_state import COMMANDS
@@ -105,6 +106,42 @@ CAUSES = {
     "deadband": ({"width": 0.015}, "width", 0.15),
     "link_mass": ({"link": "lower", "mass": 0.2}, "mass", 0.1),
 }
+
+
+@component
+class ColdGrease:
+    """Drags the faster a joint turns, and holds it at rest. Signature: both. Confused with either."""
+
+    kind: ClassVar[str] = "servo"
+    rank: ClassVar[int] = 50
+    thickness: Annotated[float, setting("of the grease", ge=0, lower=0.0, upper=1.0, source="a test")]
+    joints: Annotated[Scope, setting(SCOPE)] = "all"
+
+    def apply(self, plant: Plant) -> Plant:
+        more, servo = np.where(scope(plant, self.joints), self.thickness, 0.0), plant.servo
+        return plant.with_servo(viscous=servo.viscous + 0.6 * more, coulomb=servo.coulomb + 0.2 * more)
+
+
+@component
+class Magnet(ColdGrease):
+    """Pulls. Signature: a pull. Confused with gravity."""
+
+    def apply(self, plant: Plant) -> Plant:
+        return replace(plant, hook=lambda motion, time: self.thickness * np.ones(motion.shape[1]))
+
+
+def test_an_effect_of_ones_own_is_a_cause_like_ours_and_a_hook_is_left_out_by_name() -> None:
+    said: list[str] = []
+    use_own({"cold_grease": ColdGrease, "magnet": Magnet})
+    try:
+        cold = log({"cold_grease": {"thickness": 0.5}})
+        result = diagnosed(cold, arm(), nominal(arm()), 0.002, QUICK, said.append)
+    finally:
+        use_own({})
+    assert result.selection.chosen.names == ("cold_grease",), result.verdict
+    assert result.selection.chosen.parameters[0][0] == pytest.approx(0.5, rel=0.1)
+    assert "without magnet, whose torque hook acts in Bullet alone" in said
+    assert "magnet" not in {one.effect for one in result.arena.library}
 
 
 @pytest.mark.parametrize("effect", CAUSES)

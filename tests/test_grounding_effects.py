@@ -63,7 +63,7 @@ def test_a_simulator_with_what_it_lacks_is_the_real_world(effects: Mapping[str, 
 def test_effects_add_up_to_those_of_the_simulator() -> None:
     worn = replace(AIR, effects=DRY)
     mended = switched_on(worn, found(LATE, simulated=DRY))
-    for name, value in vars(replace(AIR, effects={**DRY, **LATE}).plant.servo).items():
+    for name, value in replace(AIR, effects={**DRY, **LATE}).plant.servo._asdict().items():
         np.testing.assert_array_equal(getattr(mended.plant.servo, name), value)  # type: ignore[attr-defined]
     assert together([DRY, LATE, DRY])["coulomb_friction"] == [*DRY["coulomb_friction"]] * 2
 

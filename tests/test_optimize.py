@@ -87,17 +87,6 @@ def test_a_log_returns_its_values_to_the_bit(tmp_path: Path) -> None:
     assert GenerationLog(tmp_path).read(1) is None
 
 
-def test_a_search_told_the_same_values_asks_for_the_same_candidates() -> None:
-    runs = [CmaEs(candidates=8, generations=9).start(np.ones(3), np.ones(3), 5) for _ in range(2)]
-    np.random.seed(1)
-    for _ in range(4):
-        asked = [np.array(run.ask()) for run in runs]
-        np.testing.assert_array_equal(*asked)
-        np.random.random()
-        for run, candidates in zip(runs, asked, strict=True):
-            run.tell([-float(np.sum((c - 2.0) ** 2)) for c in candidates])
-
-
 def test_cma_es_maximises() -> None:
     run = CmaEs(candidates=12, generations=60, sigma=0.5).start(np.zeros(4), np.array([1.0, 1.0, 10.0, 0.1]), 0)
     goal = np.array([1.0, -2.0, 20.0, 0.3])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from commands import SMALL, done, gsl, refused
 from gsl.core.checkpoint import read_checkpoint
 from gsl.grounding.preparation import KIND, MODEL
 from gsl.robots.nao import nao
+from gsl.testing import check_grounding, check_search, check_task
 
 GROUNDING = '''
 """Actions move as much less far in the simulator as the real joints move less fast."""
@@ -154,6 +156,13 @@ def iterated(home: Path) -> Path:
         done("iterate", *OWN, *SMALL, "grounding=shrink", "optimizer=random_search", "accept=true",
              "name=own", folder=home)  # fmt: skip
     return home / "runs/own"
+
+
+def test_both_keep_the_contracts(home: Path) -> None:
+    check_grounding(importlib.import_module("own_grounding").Shrink())
+    check_search(importlib.import_module("own_optimiser").RandomSearch())
+    check_grounding(importlib.import_module("own_plain").TooFar())
+    check_task(importlib.import_module("own_task").Feet(duration=0.5))
 
 
 def test_an_iteration_trains_checks_and_searches_with_both(iterated: Path) -> None:

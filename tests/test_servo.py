@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gsl.core.plant import Servo
+from gsl.core.servo import ROW, Servo, numbers
 from gsl.worlds.drive_train import TOOTH_STIFFNESS
 from gsl.worlds.servo import BRISTLE, servo_torque
 from gsl.worlds.servo_state import first_state, packed
@@ -35,6 +35,19 @@ def targets_seen(delay: float, commands: np.ndarray) -> np.ndarray:
             servo_torque(parameters, state, motion, k * STEP, STEP, PERIOD, result)
             seen.append(result[0])
     return np.array(seen)
+
+
+def test_every_number_stands_in_its_row() -> None:
+    values = {name: np.full(2, 2.0 + k) for k, name in enumerate(Servo._fields)}
+    rows = packed(Servo.of(**values), 12.0).rows
+    for name, value in values.items():
+        np.testing.assert_array_equal(rows[getattr(ROW, name)], value)
+
+
+def test_a_number_that_is_not_set_does_nothing() -> None:
+    assert numbers().keys() == set(Servo._fields)
+    for name, array in Servo.of(kp=np.ones(3))._asdict().items():
+        np.testing.assert_array_equal(array, np.full(3, 1.0 if name == "kp" else numbers()[name].inert))
 
 
 def test_a_delay_of_whole_control_periods_is_an_exact_shift() -> None:

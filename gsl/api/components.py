@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from gsl.api.overrides import overrides
 from gsl.commandline.composer import compose, opened
 from gsl.commandline.config import instantiate_settings, resolved
+from gsl.commandline.own_effects import load_own_effects
 from gsl.core.interfaces import Grounding, Policy, Task, World
 from gsl.core.validation import config_error
 from gsl.errors import ConfigError
@@ -62,7 +63,10 @@ def make_grounding(name: str, *, config_dir: Path | str | None = None, **setting
 
 
 def _make(group: str, name: str, config_dir: Path | str | None, settings: Mapping[str, Any], kind: Any) -> Any:
-    with opened(None if config_dir is None else Path(config_dir)):
+    folder = None if config_dir is None else Path(config_dir)
+    with opened(folder):
+        if folder is not None:  # effects of a world that is there already stay
+            load_own_effects(folder)
         config = resolved(compose(ROLES[group], [f"{group}={name}", *overrides(settings, f"{group}.")]))
     made = instantiate_settings(config[group])
     if not isinstance(made, kind):

@@ -13,6 +13,7 @@ from gsl.api.results import Result, Verdict
 from gsl.commandline.composer import commands, compose, opened
 from gsl.commandline.config import CommandSettings, execute, resolved
 from gsl.commandline.overrides import file_of
+from gsl.commandline.own_effects import load_own_effects
 from gsl.core.console import Silent
 from gsl.core.described import described
 from gsl.core.interfaces import World
@@ -47,7 +48,10 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
     for key in plain:
         if (whole := key.partition(".")[0]) in objects:
             raise ConfigError(key, f"is below {whole}, which goes as it is; set it there")
-    with opened(None if config_dir is None else Path(config_dir)):
+    folder = None if config_dir is None else Path(config_dir)
+    with opened(folder):
+        if folder is not None:  # effects of a world that is there already stay
+            load_own_effects(folder)
         config = resolved(compose(command, list(overrides(plain))))
     for key, value in objects.items():
         if key not in config:
@@ -55,8 +59,8 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
         config[key] = described(value)
     named = ", ".join(f"{key}={value!r}" for key, value in settings.items())
     document = execute(command, f"gsl.run({command!r}, {named})", config, Silent() if quiet else Console())
-    folder = Path(document["folder"])
-    made = Artifact(folder, manifest.read(folder), unchanged=document["unchanged"])
+    place = Path(document["folder"])
+    made = Artifact(place, manifest.read(place), unchanged=document["unchanged"])
     return Verdict(made) if made.manifest.kind == "diagnose" else Result(made)
 
 

@@ -27,7 +27,7 @@ from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of
 from gsl.commandline.plugins import folders
 from gsl.core.setting import Setting
 from gsl.core.validation import did_you_mean
-from gsl.effects import __path__ as effects_path
+from gsl.effects.effect import names
 from gsl.errors import ConfigError, InputError
 
 REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
@@ -139,17 +139,6 @@ def groups() -> list[str]:
     return [group for group in _loader().list_groups("") if group != "hydra"]
 
 
-def effects() -> list[str]:
-    """Return the names of the library's effects: each is a module with a class of the same name in camel case."""
-    files = sorted(path for folder in effects_path for path in Path(folder).glob("[a-z]*.py"))
-    return [path.stem for path in files if f"@component\nclass {camel_case(path.stem)}" in path.read_text("utf-8")]
-
-
-def camel_case(name: str) -> str:
-    """Return the name of the class in the module called `name`."""
-    return "".join(part.capitalize() for part in name.split("_"))
-
-
 def _check_grammar(overrides: Sequence[str]) -> None:
     parser = OverridesParser.create(config_loader=_loader())
     for override in overrides:
@@ -164,11 +153,11 @@ def _check_effects(composition: Composition) -> None:
     for override in composition.overrides:
         path = effect_path(key_of(override))
         name = path.rpartition(".")[2]
-        if not path or override.startswith("~") or name in effects():
+        if not path or override.startswith("~") or name in names():
             continue
         node = OmegaConf.select(composition.config, path)
         if not (isinstance(node, DictConfig) and "_target_" in node):
-            raise ConfigError(path, f"no such effect{did_you_mean(name, effects())}")
+            raise ConfigError(path, f"no such effect{did_you_mean(name, names())}")
 
 
 def _check_referred(command: str, composition: Composition) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,10 +12,8 @@ from omegaconf import OmegaConf
 
 from gsl.commandline.composer import (
     Composition,
-    camel_case,
     compose,
     configuration_folder,
-    effects,
     groups,
     opened,
     options,
@@ -24,7 +21,9 @@ from gsl.commandline.composer import (
 from gsl.commandline.config import CommandSettings, resolved
 from gsl.commandline.known_settings import declared, plain
 from gsl.commandline.overrides import OPTIONAL_GROUPS
+from gsl.commandline.own_effects import load_own_effects
 from gsl.core.setting import REQUIRED, Setting, settings_of
+from gsl.effects.effect import effect_class, names
 from gsl.errors import ConfigError, GslError
 
 WIDEST = 34
@@ -59,6 +58,7 @@ class Explanation:
 def explained(command: str, typed: Sequence[str] = (), *, config_dir: Path | None = None) -> Explanation:
     """Return what the yaml files and classes of a command say about themselves, with what is typed if it is right."""
     with opened(config_dir):
+        load_own_effects(config_dir)
         try:
             composition = compose(command, typed)
         except GslError:
@@ -163,8 +163,8 @@ def _is_component(value: Any) -> bool:
 
 
 def _group_lines(explanation: Explanation) -> Iterator[tuple[str, ...]]:
-    for key, names in explanation.options.items():
-        yield key, " ".join(f"{name}*" if name == explanation.chosen.get(key) else name for name in names), ""
+    for key, words in explanation.options.items():
+        yield key, " ".join(f"{word}*" if word == explanation.chosen.get(key) else word for word in words), ""
 
 
 def _setting_line(setting: Setting) -> tuple[str, ...]:
@@ -173,9 +173,8 @@ def _setting_line(setting: Setting) -> tuple[str, ...]:
 
 
 def _effect_lines() -> Iterator[tuple[str, ...]]:
-    for name in effects():
-        target = getattr(importlib.import_module(f"gsl.effects.{name}"), camel_case(name))
-        for setting in settings_of(target).values():
+    for name in names():
+        for setting in settings_of(effect_class(name)).values():
             if setting.name != "joints":
                 yield f"{name}.{setting.name}", setting.unit, setting.meaning
 

@@ -12,6 +12,7 @@ from omegaconf import OmegaConf
 from gsl.commandline.composer import compose, opened
 from gsl.commandline.config import execute, prepared, resolved
 from gsl.commandline.multirun import run_jobs
+from gsl.commandline.own_effects import load_own_effects
 from gsl.report.console import Console
 
 
@@ -41,6 +42,7 @@ def run(
     flags = [*(["--multirun"] if multirun else []), *([f"--config-dir={config_dir}"] if config_dir else [])]
     line = shlex.join(["gsl", *command.split(), *flags, *overrides])
     with opened(config_dir):
+        load_own_effects(config_dir)
         composition = compose(command, overrides, multirun=multirun)
         if cfg:
             console.result(resolved(composition), text=OmegaConf.to_yaml(OmegaConf.create(resolved(composition))))

@@ -50,13 +50,23 @@ def rebuilt(told: Any, *, trust: bool = False, where: str = "") -> Any:
         settings = {key: rebuilt(value, trust=trust, where=f"{where}.{key}".lstrip(".")) for key, value in told.items()}
         if "_target_" not in settings:
             return settings
-        return make(_class_of(settings.pop("_target_"), trust, where), settings, where=where)
+        return make(class_of(settings.pop("_target_"), trust=trust, where=where), settings, where=where)
     if isinstance(told, list | tuple):
         return [rebuilt(value, trust=trust, where=f"{where}.{index}") for index, value in enumerate(told)]
     return told
 
 
-def _class_of(name: Any, trust: bool, where: str) -> Any:
+def class_of(name: Any, *, trust: bool = False, where: str = "") -> Any:
+    """Return the class that data names.
+
+    Args:
+        name: Of the class, with its module.
+        trust: Whether it may be imported if it is not gsl's.
+        where: Dotted path of the data, for errors.
+
+    Raises:
+        ConfigError: It is not there, or may not be imported.
+    """
     place, _, attribute = str(name).rpartition(".")
     setting = f"{where}._target_".lstrip(".")
     if not trust and place.partition(".")[0] != _OURS:

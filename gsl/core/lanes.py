@@ -21,7 +21,7 @@ from numba.np.arrayobj import make_array, populate_array
 
 from gsl.core.compiled import compiled
 
-LANES = 8
+LANES = 8  # a replay window by window takes 5 to 6.7 times as long; 6 x 6 products by a plain trailing axis 4.5 times
 _PLAIN = (types.Float, types.Integer)
 
 

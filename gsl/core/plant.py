@@ -3,88 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.servo import Servo
 from gsl.core.servo_law import ServoLaw
 
 GRAVITY = 9.81  # [m/s²]
 Hook = Callable[[np.ndarray, float], np.ndarray]
-
-
-@dataclass(frozen=True)
-class Servo:
-    """One joint servo per motor; every field has shape (n_motors,).
-
-        u = kp (1 - fade t) dead(target + offset - q) - kd dq/dt, within the torque limit and the speed line
-        torque = u (1 - duty_loss |u| / limit) - viscous dq/dt - dry friction
-
-    Attributes:
-        kp, kd: Gains [N·m/rad], [N·m·s/rad].
-        limit: Torque limit [N·m].
-        no_load_speed: Speed at which driving torque vanishes [rad/s].
-        coulomb: Dry friction at the output [N·m].
-        viscous: Friction proportional to speed [N·m·s/rad].
-        stribeck, stribeck_velocity: Dry friction added at low speed [N·m], and how low [rad/s].
-        load_friction: Dry friction added per torque in the gear [-].
-        armature: Rotor inertia seen at the output [kg·m²].
-        delay: How much later the target arrives [s].
-        smoothing: Time constant of the filter on the target [s].
-        quantum: Step of the target [rad].
-        deadband: Half width of the errors that the servo ignores [rad].
-        play: Full width of the backlash between rotor and output [rad].
-        compliance: Of the spring between rotor and output [rad/(N·m)].
-        supply_resistance: Resistance of the common supply as the motor's limits see it [Ω].
-        torque_constant: At the output [N·m/A].
-        duty_loss: Share of the driving torque lost at the torque limit [-].
-        fade: Loss of kp with time [1/s].
-        offset: Of the joint's zero: it goes to target + offset [rad].
-        sensor_delay: Age of what the encoder tells servo and log [s].
-        lower_stop, upper_stop: Where the joint hits something hard [rad].
-        motor_encoder: 1.0 where the encoder sits on the motor's side of play and compliance, else 0.0.
-    """
-
-    kp: np.ndarray
-    kd: np.ndarray
-    limit: np.ndarray
-    no_load_speed: np.ndarray
-    coulomb: np.ndarray
-    viscous: np.ndarray
-    stribeck: np.ndarray
-    stribeck_velocity: np.ndarray
-    load_friction: np.ndarray
-    armature: np.ndarray
-    delay: np.ndarray
-    smoothing: np.ndarray
-    quantum: np.ndarray
-    deadband: np.ndarray
-    play: np.ndarray
-    compliance: np.ndarray
-    supply_resistance: np.ndarray
-    torque_constant: np.ndarray
-    duty_loss: np.ndarray
-    fade: np.ndarray
-    offset: np.ndarray
-    sensor_delay: np.ndarray
-    lower_stop: np.ndarray
-    upper_stop: np.ndarray
-    motor_encoder: np.ndarray
-
-    @classmethod
-    def of(cls, **given: np.ndarray) -> Servo:
-        """Return servos with the given fields, the others such that they do nothing."""
-        zero = np.zeros(len(next(iter(given.values()))))
-        inert = {
-            "limit": zero + np.inf,
-            "no_load_speed": zero + np.inf,
-            "stribeck_velocity": zero + 1.0,
-            "torque_constant": zero + 1.0,
-            "lower_stop": zero - np.inf,
-            "upper_stop": zero + np.inf,
-        }
-        return cls(**{field.name: given.get(field.name, inert.get(field.name, zero)) for field in fields(cls)})
 
 
 @dataclass(frozen=True)
@@ -180,9 +108,9 @@ class Plant:
             return (word, *(motor for motor, driver in self.robot.coupled.items() if driver == word))
         raise KeyError(word)
 
-    def with_servo(self, **fields: np.ndarray) -> Plant:
-        """Return the plant with other servo fields."""
-        return replace(self, servo=replace(self.servo, **fields))
+    def with_servo(self, **numbers: np.ndarray) -> Plant:
+        """Return the plant with other numbers of the servos."""
+        return replace(self, servo=self.servo._replace(**numbers))
 
 
 def nominal(robot: Robot) -> Plant:

@@ -9,12 +9,12 @@ import numpy as np
 
 from gsl.core.plant import Plant
 from gsl.diagnosis.attribute import Arena, scopes_of
-from gsl.diagnosis.candidates import library
+from gsl.diagnosis.candidates import Candidate, library
 from gsl.diagnosis.experiment import Experiment
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.staircase import staircase
 from gsl.diagnosis.transient import transient
-from gsl.effects.effect import effect_class, names
+from gsl.effects.effect import applied, built, effect_class, names, own
 
 LATENCY, PUSH, STEPS = "command_latency", "external_push", "quantisation"
 SCOUTS = 8  # windows of a walk that a screening looks at: a replay in Bullet takes milliseconds
@@ -58,6 +58,18 @@ def arena_of(
     candidates = library(
         plant.robot, (*options.without, *hidden), looks.known, looks.starts, dense=shaking, floating=found.walking
     )
+    if not found.walking:
+        candidates = tuple(one for one in candidates if not _has_hook(one, plant, tick))
     scopes = scopes_of({} if found.walking else found.robot.groups, found.channels, apart=not found.walking)
     scouts = SCOUTS if found.walking else None
     return Arena(found.bench(simulator, "train"), found.bench(simulator, "held_out"), candidates, scopes, tick, scouts)
+
+
+def _has_hook(candidate: Candidate, plant: Plant, tick: Callable[[str], None]) -> bool:
+    """Whether an effect of a user's own hooks its torque: the chain model, which replays logs in air, calls none."""
+    if candidate.effect not in own():
+        return False
+    hooked = applied(plant, built({candidate.effect: candidate.entry(candidate.documented[1])})).hook is not None
+    if hooked:
+        tick(f"without {candidate.effect}, whose torque hook acts in Bullet alone")
+    return hooked

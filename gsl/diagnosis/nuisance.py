@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gsl.core.plant import Plant, Servo
+from gsl.core.plant import Plant
+from gsl.core.servo import Servo
 
 NAMES = ("kp", "kd", "coulomb", "zero", "offset", "inertia", "viscous")
 # Logarithms of factors, [N·m], [rad] in the log, [rad] in the servo, `inertia_unit`s, [N·m·s/rad]: of one make of servo

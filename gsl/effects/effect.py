@@ -1,7 +1,8 @@
 """What an effect is, and how a world's `effects:` mapping becomes a tuple of them.
 
 An effect is a component with a `kind`, a `rank` among its kind, parameters and `apply(plant) -> plant`. Its name is its
-module: `backlash` is the class `Backlash` of gsl/effects/backlash.py. A user's own effect is named by `_target_`.
+module: `backlash` is the class `Backlash` of gsl/effects/backlash.py. A user's own effect stands beside the library's
+by the name of its yaml file (`use_own`), or is named by `_target_`.
 """
 
 from __future__ import annotations
@@ -10,16 +11,17 @@ import difflib
 import importlib
 import pkgutil
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Literal, Protocol, get_origin, get_type_hints, runtime_checkable
 
 import numpy as np
 
 from gsl.core.body import Link, Robot
 from gsl.core.plant import Plant
-from gsl.core.setting import Setting, settings_of
+from gsl.core.setting import REQUIRED, Setting, settings_of
 from gsl.core.validation import make
 from gsl.errors import ConfigError
 
@@ -28,6 +30,7 @@ KINDS = ("command", "servo", "body", "contact", "environment", "sensor")
 TWINS = {"sensor_bias": "zero_offset"}  # alike by nature in the air (the design's section 4)
 
 Scope = str | tuple[str, ...]
+PLACES = ("joints", "link")  # settings that say where an effect acts
 SCOPE = "where it acts: all, a group such as legs or arms, a joint, or a list of these"
 
 
@@ -42,19 +45,70 @@ class Effect(Protocol):
         """Return the plant with this effect in it."""
 
 
-@cache
+_OWN: dict[str, type] = {}  # effects of a user's own in this process, by name
+
+
+def use_own(classes: Mapping[str, type]) -> None:
+    """Have effects of a user's own stand beside the library's from now on, or before one of the same name.
+
+    Args:
+        classes: By name; those of before are forgotten.
+
+    Raises:
+        ConfigError: One of them is no effect, or could not be searched.
+    """
+    for name, kind in classes.items():
+        check_own(name, kind)
+    _OWN.clear()
+    _OWN.update(classes)
+
+
+def own() -> Mapping[str, type]:
+    """Return the effects of a user's own, by name."""
+    return dict(_OWN)
+
+
+def check_own(name: str, kind: Any) -> None:
+    """Refuse a class that is no effect, or that nothing could draw or search.
+
+    Raises:
+        ConfigError: It is one.
+    """
+    where = f"effects.{name}"
+    if not (hasattr(kind, "__pydantic_fields__") and _is_effect(kind)):
+        raise ConfigError(where, "is no effect; it needs @component, `kind`, `rank` and `apply`", given=kind.__name__)
+    if kind.kind not in KINDS:
+        raise ConfigError(f"{where}.kind", f"must be one of {', '.join(KINDS)}", given=str(kind.kind))
+    hints = get_type_hints(kind)
+    for key, value in settings_of(kind).items():
+        chosen = key in PLACES or get_origin(hints[key]) is Literal or value.default is not REQUIRED
+        if not chosen and (value.lower is None or value.upper is None):
+            raise ConfigError(f"{where}.{key}", "needs a documented range: setting(..., lower=, upper=), or a default")
+
+
+def _is_effect(kind: type) -> bool:
+    return all(hasattr(kind, name) for name in ("kind", "rank", "apply"))
+
+
 def names() -> tuple[str, ...]:
-    """Return the names of the library's effects."""
+    """Return the names of all effects, the library's and a user's own."""
+    return tuple(sorted({*_library(), *_OWN}))
+
+
+@cache
+def _library() -> tuple[str, ...]:
     package = importlib.import_module("gsl.effects")
     return tuple(sorted(module.name for module in pkgutil.iter_modules(package.__path__) if module.name != "effect"))
 
 
 def effect_class(name: str) -> type:
-    """Return the class of an effect of the library.
+    """Return the class of an effect of the library, or of a user's own.
 
     Raises:
         ConfigError: if there is none of that name.
     """
+    if name in _OWN:
+        return _OWN[name]
     if name not in names():
         near = difflib.get_close_matches(name, names(), 1)
         hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names())}"
@@ -107,11 +161,27 @@ def built(effects: Mapping[str, Any]) -> tuple[Effect, ...]:
 
 def _effect(name: str, entry: Any) -> Effect:
     if isinstance(entry, Mapping):
-        made: Effect = make(effect_class(name), entry, where=f"effects.{name}")
+        kind = _class_in_use(name, entry["_target_"]) if "_target_" in entry else effect_class(name)
+        settings = {key: value for key, value in entry.items() if key != "_target_"}
+        made: Effect = make(kind, settings, where=f"effects.{name}")
         return made
     if not isinstance(entry, Effect):
         raise ConfigError(f"effects.{name}", "must map the effect's parameters to values", given=str(entry))
     return entry
+
+
+def _class_in_use(name: str, target: str) -> type:
+    """Return a class that this process uses already: a file may name it, but loads nothing.
+
+    Raises:
+        ConfigError: There is none, or it is no effect.
+    """
+    place, _, word = target.rpartition(".")
+    kind = getattr(sys.modules.get(place), word, None)
+    if not (isinstance(kind, type) and _is_effect(kind)):
+        advice = f"keep it as effect/{name}.yaml in the folder of --config-dir"
+        raise ConfigError(f"effects.{name}._target_", f"is no effect that is loaded; {advice}", given=target)
+    return kind
 
 
 def together(parts: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
@@ -129,8 +199,14 @@ def applied(plant: Plant, effects: Iterable[Effect]) -> Plant:
         try:
             plant = effect.apply(plant)
         except ConfigError as error:
-            raise error.under(f"effects.{type(effect).__module__.rpartition('.')[2]}") from error
+            raise error.under(f"effects.{name_of(effect)}") from error
     return plant
+
+
+def name_of(effect: Effect) -> str:
+    """Return the name of an effect."""
+    mine = [name for name, kind in _OWN.items() if kind is type(effect)]
+    return mine[0] if mine else type(effect).__module__.rpartition(".")[2]
 
 
 def scope(plant: Plant, joints: Scope) -> np.ndarray:

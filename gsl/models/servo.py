@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from gsl.core.plant import Plant, Servo
+from gsl.core.plant import Plant
+from gsl.core.servo import Servo
 from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, NOBODY, ServoLaw
 from gsl.errors import ConfigError
 
@@ -94,11 +95,11 @@ class ServoModel:
         wanted = {**{f"numbers.{name}": (len(joints),) for name in NUMBERS}, "lag": (len(joints), LAGS)}
         wanted |= {"group": (len(joints),), "noise": (len(joints), 2)}
         wanted |= {f"network.{k}": v for k, v in shapes(len(groups)).items()}
-        wanted |= {f"base.{field.name}": (len(joints),) for field in fields(Servo)}
+        wanted |= {f"base.{name}": (len(joints),) for name in Servo._fields}
         for name, shape in wanted.items():
             if arrays[name].shape != shape:
                 raise ValueError(f"{name} has the shape {arrays[name].shape}, not {shape}")
-        base = {field.name: arrays[f"base.{field.name}"] for field in fields(Servo)}
+        base = {name: arrays[f"base.{name}"] for name in Servo._fields}
         return cls(
             about["robot"], joints, groups, numbers, arrays["group"], arrays["lag"], network, arrays["noise"], base
         )
@@ -158,7 +159,7 @@ def neutral(plant: Plant, rng: np.random.Generator) -> ServoModel:
 
 def base_servo(plant: Plant) -> dict[str, np.ndarray]:
     """Return the servo below a learned one by field, shape (n,) each; what has no limit is `UNLIMITED`."""
-    return {field.name: np.clip(getattr(plant.servo, field.name), -UNLIMITED, UNLIMITED) for field in fields(Servo)}
+    return {name: np.clip(array, -UNLIMITED, UNLIMITED) for name, array in plant.servo._asdict().items()}
 
 
 def with_group(model: ServoModel, other: ServoModel, name: str) -> ServoModel:

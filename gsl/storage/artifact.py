@@ -21,7 +21,7 @@ from gsl.errors import ArtifactError
 from gsl.storage import documents, manifest
 from gsl.storage.identity import Identity, changes, identify
 from gsl.storage.manifest import Manifest, Parent
-from gsl.storage.read_files import read_files
+from gsl.storage.read_files import own_effects, read_files
 from gsl.storage.versions import commit, versions
 from gsl.storage.whole import explained, flush_tree
 from gsl.storage.workplace import KEY, install, locked, logged, stoppable, workplace
@@ -162,4 +162,4 @@ def _parents(stage: Stage, identity: Identity, folder: Path) -> tuple[Parent, ..
 
 def _sources(stage: Stage) -> dict[str, Path]:
     """Return all that a stage reads, by role: what its components read by themselves, such as a robot, included."""
-    return {**read_files(stage), **stage.parents()}
+    return {**read_files(stage), **own_effects(), **stage.parents()}

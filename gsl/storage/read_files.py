@@ -12,11 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from gsl.core.own_code import is_own
+from gsl.effects.effect import own
 
 
 def read_files(thing: Any) -> dict[str, Path]:
     """Return the `read_files` of a component and of all components in it, by dotted name of the setting."""
     return dict(_found(thing, ""))
+
+
+def own_effects() -> dict[str, Path]:
+    """Return the sources of effects of a user's own: the library, and with it any artifact, depends on them."""
+    return {f"effect.{name}{k or ''}": path for name, kind in own().items() for k, path in enumerate(_sources(kind))}
 
 
 def _found(thing: Any, where: str) -> Iterator[tuple[str, Path]]:

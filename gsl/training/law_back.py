@@ -6,21 +6,13 @@ import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.lanes import where
+from gsl.core.servo import ROW
 from gsl.core.servo_law import FIRST, HIDDEN, INPUTS, LAG, LAGS, LAST, NOBODY, SECOND, SIGN, SPEED_UNIT
 from gsl.training.gradient import BY_DELAY, Gradient
 from gsl.training.replay_path import POSITION, Moment
 from gsl.training.servo_back import Adjoint, Work, slope_by_delay
 from gsl.worlds.servo import BRISTLE, wanted_torque
-from gsl.worlds.servo_state import (
-    DELAY,
-    GROUP,
-    LAG_SHARE,
-    LAW_BENT,
-    STIFFNESS,
-    TORQUE,
-    ServoParameters,
-    ServoState,
-)
+from gsl.worlds.servo_state import GROUP, LAG_SHARE, LAW_BENT, STIFFNESS, TORQUE, ServoParameters, ServoState
 
 
 @compiled
@@ -49,7 +41,7 @@ def law_back(
         drive, output, g = rows[TORQUE, i] * by_u, rows[TORQUE, i] * adjoint.output[i], int(rows[GROUP, i])
         _network_back(servos.weights, g, drive, output, state.layers, inputs, work.hidden, to)
         for k in range(LAGS):
-            start = (now.elapsed - rows[DELAY, i] - LAG * k) / now.period
+            start = (now.elapsed - rows[ROW.delay, i] - LAG * k) / now.period
             later = slope_by_delay(state.commands, i, start, length) / now.period
             share = rows[STIFFNESS, i] * (inputs[k] + drive * rows[LAG_SHARE + k, i])
             to.lag[i, k] += drive * state.layers[0, k]

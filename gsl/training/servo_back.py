@@ -12,6 +12,7 @@ import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.lanes import where
+from gsl.core.servo import ROW
 from gsl.training.gradient import (
     BY_ARMATURE,
     BY_COULOMB,
@@ -27,24 +28,14 @@ from gsl.worlds.drive_train import ROTOR_SHARE
 from gsl.worlds.servo import delayed, drawn_current, kept_gain, output_torque, supply_share
 from gsl.worlds.servo_state import (
     BENT,
-    COULOMB,
-    DEADBAND,
-    DELAY,
     FRICTION,
-    KD,
-    LIMIT,
-    LOAD,
     MEMORY,
-    MOTOR_ENCODER,
     OUTPUT_ARMATURE,
     ROTOR,
     ROTOR_ANGLE,
     ROTOR_SPEED,
-    SENSOR_DELAY,
     SMOOTHED,
-    SMOOTHING,
     SPEED,
-    STRIBECK,
     THROUGH,
     ServoState,
 )
@@ -123,7 +114,7 @@ def output_back(rows: np.ndarray, now: Moment, adjoint: Adjoint, work: Work, num
             adjoint.moved[k, i] += _sum(jacobian, k, outcome)
         for k in range(FIRST_ROW, BY_ROW_LIMIT):
             held[REMEMBERED_ROWS[k - FIRST_ROW], i] = _sum(jacobian, k, outcome)
-        numbers[BY_LIMIT, i] += rows[LIMIT, i] * _sum(jacobian, BY_ROW_LIMIT, outcome)
+        numbers[BY_LIMIT, i] += rows[ROW.limit, i] * _sum(jacobian, BY_ROW_LIMIT, outcome)
         numbers[BY_COULOMB, i] += _sum(jacobian, BY_ROW_COULOMB, outcome)
         numbers[BY_VISCOUS, i] -= adjoint.output[i] * motion[1, i]
         carried = 1.0 - ROTOR_SHARE if rows[ROTOR, i] > 0.0 else 1.0
@@ -145,8 +136,8 @@ def _differentiate(
     memory: np.ndarray, jacobian: np.ndarray,
 ) -> None:  # fmt: skip
     """Fill in the derivatives of torque and remembered rows, zero where nothing depends on what would be probed."""
-    load, rotor = rows[LOAD, i] > 0.0, rows[ROTOR, i] > 0.0
-    dry = rows[COULOMB, i] > 0.0 or rows[STRIBECK, i] > 0.0 or load
+    load, rotor = rows[ROW.load_friction, i] > 0.0, rows[ROTOR, i] > 0.0
+    dry = rows[ROW.coulomb, i] > 0.0 or rows[ROW.stribeck, i] > 0.0 or load
     matters = (True, True, True, dry, rotor, rotor, load, load, load, True, dry, load or rotor)
     base = _outcome(rows, i, motion, before, seen, supply, step, memory, -1)
     for k in range(PROBED):
@@ -174,18 +165,18 @@ def _outcome(
         wanted += PROBES[2]
     elif probed == 0 or probed == 1:
         motion[probed, i] += PROBES[probed]
-    limit, coulomb, carried, rotor = rows[LIMIT, i], rows[COULOMB, i], rows[OUTPUT_ARMATURE, i], rows[ROTOR, i]
+    limit, coulomb, carried, rotor = rows[ROW.limit, i], rows[ROW.coulomb, i], rows[OUTPUT_ARMATURE, i], rows[ROTOR, i]
     if probed == BY_ROW_LIMIT:
-        rows[LIMIT, i] += PROBES[probed]
+        rows[ROW.limit, i] += PROBES[probed]
     elif probed == BY_ROW_COULOMB:
-        rows[COULOMB, i] += PROBES[probed]
+        rows[ROW.coulomb, i] += PROBES[probed]
     elif probed == BY_ROW_ARMATURE:
         apart = ROTOR_SHARE if rotor > 0.0 else 0.0
         rows[OUTPUT_ARMATURE, i] += (1.0 - apart) * PROBES[probed]
         rows[ROTOR, i] += apart * PROBES[probed]
     torque = output_torque(rows, memory, i, motion, wanted, seen[OUTPUT, i], supply, step)
     motion[0, i], motion[1, i] = q, v
-    rows[LIMIT, i], rows[COULOMB, i], rows[OUTPUT_ARMATURE, i], rows[ROTOR, i] = limit, coulomb, carried, rotor
+    rows[ROW.limit, i], rows[ROW.coulomb, i], rows[OUTPUT_ARMATURE, i], rows[ROTOR, i] = limit, coulomb, carried, rotor
     return (
         torque, memory[BENT, i], memory[ROTOR_ANGLE, i], memory[ROTOR_SPEED, i], memory[SPEED, i],
         memory[THROUGH, i], memory[FRICTION, i],
@@ -206,13 +197,13 @@ def feedback_back(rows: np.ndarray, state: ServoState, now: Moment, adjoint: Adj
     seen, held, sensed, length = now.seen, adjoint.held, adjoint.sensed, now.step / now.period
     for i in range(seen.shape[1]):
         gain, error, by_u = kept_gain(rows, state, i, now.elapsed), seen[ERROR, i], adjoint.wanted[i]
-        by_error = where(abs(error) > rows[DEADBAND, i], gain * by_u, 0.0)
-        by_v = -rows[KD, i] * by_u
-        kept = error - min(rows[DEADBAND, i], max(-rows[DEADBAND, i], error))
+        by_error = where(abs(error) > rows[ROW.deadband, i], gain * by_u, 0.0)
+        by_v = -rows[ROW.kd, i] * by_u
+        kept = error - min(rows[ROW.deadband, i], max(-rows[ROW.deadband, i], error))
         numbers[BY_KP, i] += by_u * gain * kept
         numbers[BY_KD, i] += by_v * seen[RATE, i]
         numbers[BY_DEADBAND, i] -= where(error > 0.0, by_error, -by_error)
-        start = (now.elapsed - rows[DELAY, i]) / now.period
+        start = (now.elapsed - rows[ROW.delay, i]) / now.period
         by_target = _filter_back(rows, held, i, by_error, now.step)
         numbers[BY_DELAY, i] += by_target * slope_by_delay(state.commands, i, start, length) / now.period
         adjoint.error[i] = by_error
@@ -222,8 +213,8 @@ def feedback_back(rows: np.ndarray, state: ServoState, now: Moment, adjoint: Adj
 @compiled
 def _filter_back(rows: np.ndarray, held: np.ndarray, i: int, by_target: float, step: float) -> float:
     """Return the adjoint of motor i's target before its filter; rounding counts as what it is on average: nothing."""
-    if rows[SMOOTHING, i] > 0.0:
-        new = 1.0 - np.exp(-step / rows[SMOOTHING, i])
+    if rows[ROW.smoothing, i] > 0.0:
+        new = 1.0 - np.exp(-step / rows[ROW.smoothing, i])
         by_target += held[SMOOTHED, i]
         held[SMOOTHED, i] = (1.0 - new) * by_target
         by_target *= new
@@ -240,7 +231,7 @@ def slope_by_delay(commands: np.ndarray, i: int, start: float, length: float) ->
 @compiled
 def encoder_back(rows: np.ndarray, i: int, index: int, share: float, row: int, step: float, sensed: np.ndarray) -> None:
     """Give the adjoint of what an encoder tells at a physics step to the steps at which it was measured."""
-    age = rows[SENSOR_DELAY, i] / step
+    age = rows[ROW.sensor_delay, i] / step
     first = index - int(age)
     older = age - int(age)
     if first >= 0:
@@ -254,7 +245,7 @@ def take_sensed(rows: np.ndarray, number: int, adjoint: Adjoint) -> None:
     """Pass the adjoint of what was measured at a physics step to the outputs' motion, or to the rotors'."""
     moved, held, sensed = adjoint.moved, adjoint.held, adjoint.sensed[number]
     for i in range(moved.shape[1]):
-        if rows[MOTOR_ENCODER, i] * rows[ROTOR, i] > 0.0:
+        if rows[ROW.motor_encoder, i] * rows[ROTOR, i] > 0.0:
             held[ROTOR_ANGLE, i] += sensed[0, i]
             held[ROTOR_SPEED, i] += sensed[1, i]
         else:

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from gsl.core.interfaces import World
-from gsl.core.plant import Servo
+from gsl.core.servo import Servo
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import FARTHEST, ModelConfig

@@ -18,7 +18,7 @@ from gsl.core.body import lumped
 from gsl.core.layout import Layout
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import applied, built, own, use_own
 from gsl.errors import ConfigError, GslError
 from gsl.models.servo import having_servo
 from gsl.models.servo_file import read_servo, servo_file
@@ -31,6 +31,7 @@ from gsl.worlds.start import Start, resting
 from gsl.worlds.torque_noise import TorqueNoise
 from gsl.worlds.velocity_motors import Motors, check_motors
 
+OWN = "effects of a user's own"  # among what is pickled
 FALLEN_TILT = 0.5  # cosine of the tilt beyond which the robot has fallen
 
 
@@ -80,7 +81,14 @@ class BulletWorld:
     def __getstate__(self) -> dict[str, Any]:
         """Leave a plant with a torque hook out: a worker builds its own, as a hook need not be a module's function."""
         hooked = self.plant.hook is not None
-        return {name: value for name, value in vars(self).items() if not (hooked and name == "plant")}
+        state = {name: value for name, value in vars(self).items() if not (hooked and name == "plant")}
+        return {**state, OWN: own()} if own() else state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Have effects of a user's own in a worker process too."""
+        if classes := state.pop(OWN, None):
+            use_own(classes)
+        vars(self).update(state)
 
     @property
     def layout(self) -> Layout:

@@ -22,50 +22,29 @@ import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.lanes import where
+from gsl.core.servo import ROW
 from gsl.core.servo_law import LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, act, network
 from gsl.worlds.drive_train import limited, through_gear
 from gsl.worlds.encoder import REMEMBERED, seen
 from gsl.worlds.servo_state import (
     BENT,
     COMMANDS,
-    COMPLIANCE,
-    COULOMB,
-    DEADBAND,
-    DELAY,
     DRIVE,
-    DUTY_LOSS,
-    FADE,
     FRICTION,
     GROUP,
-    KD,
-    KP,
     LAG_SHARE,
     LAW_BENT,
-    LIMIT,
-    LOAD,
-    LOWER,
-    MOTOR_ENCODER,
-    NO_LOAD,
-    OFFSET,
     OUTPUT_ARMATURE,
     PER_AMPERE,
-    PLAY,
-    QUANTUM,
     ROTOR,
     ROTOR_ANGLE,
     ROTOR_SPEED,
     SAG,
-    SENSOR_DELAY,
     SMOOTHED,
-    SMOOTHING,
     SPEED,
     STIFFNESS,
-    STRIBECK,
-    STRIBECK_VELOCITY,
     THROUGH,
     TORQUE,
-    UPPER,
-    VISCOUS,
     ServoParameters,
     ServoState,
 )
@@ -126,22 +105,22 @@ def sensed_error(
 ) -> tuple[float, float, float]:
     """Return motor i's control error [rad], and position [rad] and velocity [rad/s] as its servo sees them."""
     count = state.steps[0]
-    target = delayed(state.commands, i, (elapsed - parameters[DELAY, i]) / period, step / period)
+    target = delayed(state.commands, i, (elapsed - parameters[ROW.delay, i]) / period, step / period)
     target = shaped(parameters, state.memory, i, target, step)
     q, v = _measured(parameters, state.memory, i, motion)
-    if parameters[SENSOR_DELAY, i] > 0.0:
-        delay, now = parameters[SENSOR_DELAY, i], (q, v)
+    if parameters[ROW.sensor_delay, i] > 0.0:
+        delay, now = parameters[ROW.sensor_delay, i], (q, v)
         q, v = seen(delay, state.history, count, q, 0, i, step), seen(delay, state.history, count, v, 1, i, step)
         for row in range(2):
             state.history[count % REMEMBERED, row, i] = now[row]
-    return target + parameters[OFFSET, i] - q, q, v
+    return target + parameters[ROW.offset, i] - q, q, v
 
 
 @compiled
 def kept_gain(parameters: np.ndarray, state: ServoState, i: int, elapsed: float) -> float:
     """Return motor i's proportional gain after what time has taken of it [N·m/rad]."""
-    fade = max(0.0, 1.0 - parameters[FADE, i] * max(0.0, state.clock[0] + elapsed))
-    return fade * parameters[KP, i]
+    fade = max(0.0, 1.0 - parameters[ROW.fade, i] * max(0.0, state.clock[0] + elapsed))
+    return fade * parameters[ROW.kp, i]
 
 
 @compiled
@@ -151,13 +130,13 @@ def wanted_torque(
 ) -> tuple[float, float]:  # fmt: skip
     """Return the torque that motor i's servo wants and what a learned law adds at the output [N·m]."""
     parameters = servos.rows
-    error -= min(parameters[DEADBAND, i], max(-parameters[DEADBAND, i], error))
-    u, output = kept_gain(parameters, state, i, elapsed) * error - parameters[KD, i] * v, 0.0 * v
+    error -= min(parameters[ROW.deadband, i], max(-parameters[ROW.deadband, i], error))
+    u, output = kept_gain(parameters, state, i, elapsed) * error - parameters[ROW.kd, i] * v, 0.0 * v
     if parameters[GROUP, i] != NOBODY:
-        since = elapsed - parameters[DELAY, i]
+        since = elapsed - parameters[ROW.delay, i]
         for k in range(LAGS):
             lagged = delayed(state.commands, i, (since - LAG * k) / period, step / period)
-            state.layers[0, k] = parameters[STIFFNESS, i] * (lagged + parameters[OFFSET, i] - q)
+            state.layers[0, k] = parameters[STIFFNESS, i] * (lagged + parameters[ROW.offset, i] - q)
         drive, output = _learned(parameters, servos.weights, state.memory, i, motion[1, i], step, state.layers)
         u += drive
     return u, output
@@ -186,16 +165,16 @@ def encoder_motion(
     parameters = servos.rows
     for i in range(motion.shape[1]):
         told[0, i], told[1, i] = _measured(parameters, state.memory, i, motion)
-        if parameters[SENSOR_DELAY, i] > 0.0:
+        if parameters[ROW.sensor_delay, i] > 0.0:
             for row in range(2):
-                now, delay = told[row, i], parameters[SENSOR_DELAY, i]
+                now, delay = told[row, i], parameters[ROW.sensor_delay, i]
                 told[row, i] = seen(delay, state.history, state.steps[0], now, row, i, step)
 
 
 @compiled
 def _measured(parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndarray) -> tuple[float, float]:
     """Return position [rad] and velocity [rad/s] at the encoder now."""
-    if parameters[MOTOR_ENCODER, i] * parameters[ROTOR, i] > 0.0:
+    if parameters[ROW.motor_encoder, i] * parameters[ROTOR, i] > 0.0:
         return memory[ROTOR_ANGLE, i], memory[ROTOR_SPEED, i]
     return motion[0, i], motion[1, i]
 
@@ -220,10 +199,10 @@ def delayed(commands: np.ndarray, i: int, start: float, length: float) -> float:
 @compiled
 def shaped(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, step: float) -> float:
     """Filter and round a target [rad]."""
-    if parameters[SMOOTHING, i] > 0.0:
-        memory[SMOOTHED, i] += (1.0 - np.exp(-step / parameters[SMOOTHING, i])) * (target - memory[SMOOTHED, i])
+    if parameters[ROW.smoothing, i] > 0.0:
+        memory[SMOOTHED, i] += (1.0 - np.exp(-step / parameters[ROW.smoothing, i])) * (target - memory[SMOOTHED, i])
         target = memory[SMOOTHED, i]
-    quantum = parameters[QUANTUM, i]
+    quantum = parameters[ROW.quantum, i]
     return quantum * np.rint(target / quantum) if quantum > 0.0 else target
 
 
@@ -245,35 +224,37 @@ def output_torque(
         step: Physics period [s].
     """
     q, v = motion[0, i], motion[1, i]
-    bound, no_load = supply * parameters[LIMIT, i], supply * parameters[NO_LOAD, i]
-    if parameters[DUTY_LOSS, i] > 0.0:
-        limit = parameters[LIMIT, i]
+    bound, no_load = supply * parameters[ROW.limit, i], supply * parameters[ROW.no_load_speed, i]
+    if parameters[ROW.duty_loss, i] > 0.0:
+        limit = parameters[ROW.limit, i]
         u = min(limit, max(-limit, u))
-        u *= 1.0 - parameters[DUTY_LOSS, i] * abs(u) / limit
+        u *= 1.0 - parameters[ROW.duty_loss, i] * abs(u) / limit
     drive = limited(u, v, bound, no_load)
     through = drive
     if parameters[ROTOR, i] > 0.0:
         through = through_gear(
             memory[ROTOR_ANGLE : ROTOR_SPEED + 1], i, motion, u, bound, no_load, parameters[ROTOR, i],
-            parameters[PLAY, i], parameters[COMPLIANCE, i], step,
+            parameters[ROW.play, i], parameters[ROW.compliance, i], step,
         )  # fmt: skip
-    friction = parameters[VISCOUS, i] * v + _dry(parameters, memory, i, v, through, step) - output
+    friction = parameters[ROW.viscous, i] * v + _dry(parameters, memory, i, v, through, step) - output
     memory[DRIVE, i], memory[THROUGH, i], memory[FRICTION, i], memory[SPEED, i] = drive, through, friction, v
-    return through - friction + _stop(q - parameters[UPPER, i], v) - _stop(parameters[LOWER, i] - q, -v)
+    return (
+        through - friction + _stop(q - parameters[ROW.upper_stop, i], v) - _stop(parameters[ROW.lower_stop, i] - q, -v)
+    )
 
 
 @compiled
 def _dry(parameters: np.ndarray, memory: np.ndarray, i: int, v: float, through: float, step: float) -> float:
-    if parameters[COULOMB, i] == 0.0 and parameters[STRIBECK, i] == 0.0 and parameters[LOAD, i] == 0.0:
+    size, stribeck, load = parameters[ROW.coulomb, i], parameters[ROW.stribeck, i], parameters[ROW.load_friction, i]
+    if size == 0.0 and stribeck == 0.0 and load == 0.0:
         return 0.0
-    size = parameters[COULOMB, i]
-    if parameters[STRIBECK, i] > 0.0:
-        ratio = v / parameters[STRIBECK_VELOCITY, i]
-        size += parameters[STRIBECK, i] * np.exp(-(ratio * ratio))
-    if parameters[LOAD, i] > 0.0:
+    if stribeck > 0.0:
+        ratio = v / parameters[ROW.stribeck_velocity, i]
+        size += stribeck * np.exp(-(ratio * ratio))
+    if load > 0.0:
         inertial = parameters[OUTPUT_ARMATURE, i] * (v - memory[SPEED, i]) / step
         external = inertial - memory[THROUGH, i] + memory[FRICTION, i]
-        size += parameters[LOAD, i] * abs(through - external)
+        size += load * abs(through - external)
     bent, free = min(BRISTLE, max(-BRISTLE, memory[BENT, i] + v * step)), size == 0.0
     memory[BENT, i] = where(free, memory[BENT, i], bent)
     return where(free, 0.0, size * bent / BRISTLE)

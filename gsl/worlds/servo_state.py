@@ -7,27 +7,25 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.compiled import compiled
-from gsl.core.plant import Servo
+from gsl.core.servo import ROW, Servo
 from gsl.core.servo_law import HIDDEN, LAYERS, ServoLaw, no_law, weights
 from gsl.worlds.drive_train import ROTOR_SHARE, STIFFEST
 from gsl.worlds.encoder import REMEMBERED, fill_history
 
 COMMANDS = 16  # control periods of targets that are remembered: the longest delay
 
-(
-    KP, KD, LIMIT, NO_LOAD, COULOMB, VISCOUS, STRIBECK, STRIBECK_VELOCITY, LOAD, OUTPUT_ARMATURE, DELAY, SMOOTHING,
-    QUANTUM, DEADBAND, PLAY, COMPLIANCE, SAG, DUTY_LOSS, FADE, OFFSET, SENSOR_DELAY, LOWER, UPPER, MOTOR_ENCODER,
-    PER_AMPERE, ROTOR, GROUP, STIFFNESS, TORQUE, LAG_SHARE,
-) = range(30)  # rows of the parameters  # fmt: skip
-BENT, ROTOR_ANGLE, ROTOR_SPEED, SMOOTHED, SPEED, DRIVE, THROUGH, FRICTION, LAW_BENT = range(9)  # rows of the state
-MEMORY = 9  # how many these are
+(OUTPUT_ARMATURE, ROTOR, SAG, PER_AMPERE, GROUP, STIFFNESS, TORQUE, LAG_SHARE) = range(len(ROW), len(ROW) + 8)
+"""Rows of the parameters that follow from the servo's numbers, whose own rows are `ROW`, and from a learned law."""
+MEMORY = 9  # rows of the state
+BENT, ROTOR_ANGLE, ROTOR_SPEED, SMOOTHED, SPEED, DRIVE, THROUGH, FRICTION, LAW_BENT = range(MEMORY)
 
 
 class ServoParameters(NamedTuple):
     """What never changes; in few arrays, for every one that a compiled function passes on takes time.
 
     Attributes:
-        rows: Of numbers, those of a learned law last: see `ServoLaw`; shape (LAG_SHARE + LAGS, n_motors).
+        rows: The numbers of `Servo`, then what follows from them, then a learned law's: see `ServoLaw`; shape
+            (LAG_SHARE + LAGS, n_motors).
         weights: Of its networks, from `servo_law.weights`.
     """
 
@@ -68,14 +66,11 @@ def packed(servo: Servo, supply_voltage: float, law: ServoLaw | None = None) -> 
     law = no_law(len(servo.kp)) if law is None else law
     two_masses = (servo.play > 0.0) | (servo.compliance >= STIFFEST)
     rotor = np.where(two_masses, ROTOR_SHARE * servo.armature, 0.0)
-    rows = (
-        servo.kp, servo.kd, servo.limit, servo.no_load_speed, servo.coulomb, servo.viscous, servo.stribeck,
-        servo.stribeck_velocity, servo.load_friction, servo.armature - rotor, servo.delay, servo.smoothing,
-        servo.quantum, servo.deadband, servo.play, servo.compliance, servo.supply_resistance / supply_voltage,
-        servo.duty_loss, servo.fade, servo.offset, servo.sensor_delay, servo.lower_stop, servo.upper_stop,
-        servo.motor_encoder, 1.0 / servo.torque_constant, rotor, law.group, law.stiffness, law.torque, *law.lag.T,
+    derived = (
+        servo.armature - rotor, rotor, servo.supply_resistance / supply_voltage, 1.0 / servo.torque_constant,
+        law.group, law.stiffness, law.torque, *law.lag.T,
     )  # fmt: skip
-    return ServoParameters(np.array(rows), weights(law))
+    return ServoParameters(np.array([*servo, *derived]), weights(law))
 
 
 def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: float = 0.0) -> ServoState:

@@ -13,17 +13,18 @@ There is no gain, no friction and no rotor.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
-from gsl.effects.effect import Effect
+from gsl.core.servo import ROW, Servo
+from gsl.effects.effect import Effect, name_of
 from gsl.errors import ConfigError
 from gsl.worlds.servo import delayed, shaped
-from gsl.worlds.servo_state import DEADBAND, DELAY, LIMIT, OFFSET, ServoState
+from gsl.worlds.servo_state import ServoState
 
 Motors = Literal["servo", "velocity"]
 HEARD = {"limit", "delay", "smoothing", "quantum", "deadband", "offset"}  # fields of a servo that act here
@@ -68,7 +69,7 @@ class VelocityMotors:
         ask_speed(self.parameters, state, motion[0], self.fastest, substeps * step, speed)
         bullet.setJointMotorControlArray(
             body, joints, bullet.VELOCITY_CONTROL, targetVelocities=speed.tolist(),
-            velocityGains=[1.0] * len(joints), forces=self.parameters[LIMIT].tolist(), physicsClientId=client,
+            velocityGains=[1.0] * len(joints), forces=self.parameters[ROW.limit].tolist(), physicsClientId=client,
         )  # fmt: skip
         for k in range(substeps):
             if outside is not None:
@@ -92,10 +93,10 @@ def ask_speed(
         speed: Result, shape (n_motors,).
     """
     for i in range(len(position)):
-        target = delayed(state.commands, i, -parameters[DELAY, i] / period, 1.0)
+        target = delayed(state.commands, i, -parameters[ROW.delay, i] / period, 1.0)
         target = shaped(parameters, state.memory, i, target, period)
-        error = target + parameters[OFFSET, i] - position[i]
-        error -= min(parameters[DEADBAND, i], max(-parameters[DEADBAND, i], error))
+        error = target + parameters[ROW.offset, i] - position[i]
+        error -= min(parameters[ROW.deadband, i], max(-parameters[ROW.deadband, i], error))
         speed[i] = min(fastest[i], max(-fastest[i], error / period))
 
 
@@ -112,13 +113,14 @@ def check_motors(plant: Plant, effects: Iterable[Effect]) -> None:
     for effect in effects:
         after = effect.apply(plant)
         changed = {
-            field.name
-            for field in fields(plant.servo)
-            if not np.array_equal(getattr(plant.servo, field.name), getattr(after.servo, field.name))
+            name
+            for name, before, now in zip(Servo._fields, plant.servo, after.servo, strict=True)
+            if not np.array_equal(before, now)
         }
         if changed - HEARD or after.hook is not None or after.torque_noise.any():
-            name = type(effect).__module__.rpartition(".")[2]
-            raise ConfigError(f"effects.{name}", "does not act on velocity motors; leave it out, or take motors=servo")
+            raise ConfigError(
+                f"effects.{name_of(effect)}", "does not act on velocity motors; leave it out, or take motors=servo"
+            )
         plant = after
 
 
