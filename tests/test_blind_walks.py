@@ -19,7 +19,7 @@ from gsl.blind.on_foot import Track, Yardstick
 from gsl.blind.seals import files_below
 from gsl.blind.walks import Individual, Walks
 from gsl.core.plant import nominal
-from gsl.diagnosis.logs import on_ground
+from gsl.diagnosis.log.files import on_ground
 from gsl.effects.effect import names
 from gsl.robots.nao import nao
 from gsl.storage.trajectories import read

@@ -11,12 +11,12 @@ from test_next_experiment import played, swings
 
 from gsl.core.dynamics import gravity_torque
 from gsl.core.plant import nominal
-from gsl.diagnosis import nuisance
-from gsl.diagnosis.diagnose import Findings
-from gsl.diagnosis.document import document
-from gsl.diagnosis.droop import droops
-from gsl.diagnosis.next_experiment import next_experiment
-from gsl.diagnosis.pose_ladder import ladder
+from gsl.diagnosis.design.motions import ladder
+from gsl.diagnosis.design.next_experiment import next_experiment
+from gsl.diagnosis.simulate import calibration
+from gsl.diagnosis.verdict.document import document
+from gsl.diagnosis.verdict.findings import Findings
+from gsl.diagnosis.verdict.zero_or_load import find_droops
 from gsl.policies.limits import breach, limits
 from gsl.worlds.held import Held
 
@@ -39,7 +39,7 @@ def test_gravitys_torque_is_what_makes_a_servo_droop() -> None:
 
 
 def test_a_zero_in_a_log_of_one_pose_may_be_a_load(bent: Findings) -> None:
-    (found,) = droops(bent)
+    (found,) = find_droops(bent)
     assert found.joint == "shoulder" and found.told
     assert abs(found.zero) == pytest.approx(0.014, abs=0.006)
     assert 0.0 < found.wrong <= 1.0
@@ -51,7 +51,7 @@ def test_the_ladder_that_tells_them_apart_keeps_the_limits(bent: Findings) -> No
     wanted = next_experiment(bent, [])
     assert wanted is not None and wanted.separates == (("zero_offset", "gravity_droop"),)
     assert [name for name, _ in wanted.episodes] == ["pose_ladder_a", "pose_ladder_b", "pose_ladder_a"]
-    (unsure,) = droops(bent)
+    (unsure,) = find_droops(bent)
     for _, targets in ladder([(unsure.mover, unsure.ends)], arm(), PERIOD).variants:
         assert breach(limits(arm()), targets, PERIOD) is None
         assert targets[:, 0].min() == pytest.approx(unsure.ends[0]) and targets[:, 0].max() == pytest.approx(
@@ -61,31 +61,31 @@ def test_the_ladder_that_tells_them_apart_keeps_the_limits(bent: Findings) -> No
 
 
 def test_after_the_ladder_nothing_is_left_to_tell(bent: Findings) -> None:
-    (unsure,) = droops(bent)
+    (unsure,) = find_droops(bent)
     climbed = played(OFF, dict(ladder([(unsure.mover, unsure.ends)], arm(), PERIOD).variants), without=LEFT_OUT)
-    assert droops(climbed) == ()
+    assert find_droops(climbed) == ()
 
 
 def test_a_log_with_the_base_turned_round_tells(bent: Findings) -> None:
     """Half of the windows are said to hang the other way round; what gravity did there is then part of the answer."""
-    pieces, turned = bent.experiment.pieces, {"gravity_tilt": {"pitch": 3.14}}
-    known = replace(pieces, conditions=tuple(({}, turned)[k % 2] for k in range(len(bent.experiment.records))))
-    assert droops(replace(bent, experiment=replace(bent.experiment, pieces=known))) == ()
+    pieces, turned = bent.log.pieces, {"gravity_tilt": {"pitch": 3.14}}
+    known = replace(pieces, conditions=tuple(({}, turned)[k % 2] for k in range(len(bent.log.records))))
+    assert find_droops(replace(bent, log=replace(bent.log, pieces=known))) == ()
 
 
 def test_a_zero_that_is_named_is_one_as_well() -> None:
     """Where the library explains it, an offset in the servo or in the log is still no load for sure."""
     named = played(OFF, swings(0.08, 0.9, 1.2), without=LEFT_OUT[2:])
-    off = replace(named.answer.fit, nuisances=nuisance.none(2))
+    off = replace(named.answer.fit, shifts=calibration.no_shifts(2))
     cause = next(one for one in named.selection.tried if one.names in (("zero_offset",), ("sensor_bias",)))
     chosen = replace(cause, fit=off)
     verdict = replace(named.verdict, word="inseparable")
     found = replace(named, selection=replace(named.selection, chosen=chosen), verdict=verdict)
-    assert [one.joint for one in droops(found)] == ["shoulder"]
+    assert [one.joint for one in find_droops(found)] == ["shoulder"]
 
 
 def test_a_log_of_many_poses_shows_a_zero_as_what_it_is() -> None:
     wide = played(OFF, swings(0.9, 0.0, 0.3), without=LEFT_OUT)
-    zero = wide.answer.fit.nuisances[[nuisance.ZERO, nuisance.OFFSET], 0].sum()
+    zero = wide.answer.fit.shifts[[calibration.ZERO, calibration.OFFSET], 0].sum()
     assert abs(zero) == pytest.approx(0.014, abs=0.006)
-    assert droops(wide) == ()
+    assert find_droops(wide) == ()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -12,14 +13,15 @@ from test_diagnosis import PERIOD, arm, found, log
 
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.attribute import Hypothesis
-from gsl.diagnosis.candidates import library
-from gsl.diagnosis.document import document
-from gsl.diagnosis.experiment import experiment
-from gsl.diagnosis.fit import Fit
-from gsl.diagnosis.nuisance import none
-from gsl.diagnosis.refuted import refuted
-from gsl.diagnosis.select import Thresholds, _pruned, _stands
+from gsl.diagnosis.hypothesis.candidates import library
+from gsl.diagnosis.hypothesis.fit import Fit
+from gsl.diagnosis.hypothesis.problem import Hypothesis
+from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.search.plausibility import refute
+from gsl.diagnosis.search.stepwise import Search, stands
+from gsl.diagnosis.settings import SearchSettings
+from gsl.diagnosis.simulate.calibration import no_shifts
+from gsl.diagnosis.verdict.document import document
 
 
 def with_channels(batch: Batch, channels: Mapping[str, Any]) -> Batch:
@@ -35,7 +37,7 @@ def with_channels(batch: Batch, channels: Mapping[str, Any]) -> Batch:
 def claim(effect: str, values: list[float], free: tuple[str, ...]) -> Hypothesis:
     """A hypothesis with fitted values, its fit left out."""
     candidate = next(one for one in library(arm()) if one.effect == effect and one.free == free)
-    fit = Fit(np.array(values), none(2), 0.0, 0.0, np.eye(len(values)))
+    fit = Fit(np.array(values), no_shifts(2), 0.0, 0.0, np.eye(len(values)))
     return Hypothesis((candidate,), (np.array(values),), fit, np.zeros(1), np.ones(1), np.ones(2))
 
 
@@ -46,9 +48,9 @@ def steady(voltage: float) -> Any:
 def test_a_voltage_that_does_not_sag_refutes_a_sagging_supply() -> None:
     said = claim("supply_sag", [1.0], ("resistance",))
     for voltage, is_wrong in ((steady(21.6), True), (lambda t, q: 21.6 - 8.0 * np.abs(t - q).sum(axis=1), False)):
-        exp = experiment(with_channels(log({}), {"voltage": voltage}), arm())
-        assert ("supply_sag" in refuted(said, exp, nominal(arm()))) == is_wrong
-    assert not refuted(said, experiment(log({}), arm()), nominal(arm()))
+        exp = cut_log(with_channels(log({}), {"voltage": voltage}), arm())
+        assert ("supply_sag" in refute(said, exp, nominal(arm()))) == is_wrong
+    assert not refute(said, cut_log(log({}), arm()), nominal(arm()))
 
 
 def test_a_motor_that_stays_cold_refutes_a_gain_that_fades_with_warmth() -> None:
@@ -56,8 +58,8 @@ def test_a_motor_that_stays_cold_refutes_a_gain_that_fades_with_warmth() -> None
     warm = lambda t, q: 30.0 + PERIOD * np.arange(len(q))  # noqa: E731
     for temperature, is_wrong in ((steady(30.0), True), (warm, False)):
         channels = {"temperature.shoulder": temperature, "temperature.elbow": temperature}
-        exp = experiment(with_channels(log({}), channels), arm())
-        assert ("gain_fade" in refuted(said, exp, nominal(arm()))) == is_wrong
+        exp = cut_log(with_channels(log({}), channels), arm())
+        assert ("gain_fade" in refute(said, exp, nominal(arm()))) == is_wrong
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.5])
@@ -70,8 +72,8 @@ def test_a_logged_torque_refutes_a_gain_that_it_does_not_have(factor: float) -> 
         return np.asarray(np.clip(wanted, -servo.limit[k], servo.limit[k]))
 
     torque = {f"torque.{name}": lambda t, q, k=k: told(t, q, k) for k, name in enumerate(("shoulder", "elbow"))}
-    exp = experiment(with_channels(log({"servo_gain": {"kp": factor}}), torque), arm())
-    assert ("servo_gain" in refuted(claim("servo_gain", [0.5], ("kp",)), exp, nominal(arm()))) == (factor == 1.0)
+    exp = cut_log(with_channels(log({"servo_gain": {"kp": factor}}), torque), arm())
+    assert ("servo_gain" in refute(claim("servo_gain", [0.5], ("kp",)), exp, nominal(arm()))) == (factor == 1.0)
 
 
 @pytest.mark.parametrize(("alone", "is_enough"), [(0.2, True), (0.5, False)])
@@ -84,8 +86,8 @@ def test_a_smaller_set_beyond_its_documented_range_is_no_simpler_explanation(alo
     both = replace(both, parameters=(np.array([0.2, 0.1]), np.array([0.2])))
     assert few.claims_its_names == is_enough
     assert both.claims_its_names
-    assert _stands(both, few, 20.0, 25.0) != is_enough
-    assert not _stands(both, few, 20.0, 75.0)  # a gain of 80 of which a flaw of the simulator has as much
+    assert stands(both, few, 20.0, 25.0) != is_enough
+    assert not stands(both, few, 20.0, 75.0)  # a gain of 80 of which a flaw of the simulator has as much
 
 
 def test_a_value_beyond_the_documented_range_is_no_cause() -> None:
@@ -107,6 +109,6 @@ def test_what_is_dropped_leaves_the_others_within_their_ranges(monkeypatch: pyte
         load, candidates=stiction.candidates + load.candidates, parameters=stiction.parameters + load.parameters
     )
     nothing = replace(both, candidates=(), parameters=(), costs=np.full(8, 500.0))
-    fewer = iter([load, beyond])
-    monkeypatch.setattr("gsl.diagnosis.select._without", lambda *_: next(fewer))
-    assert _pruned(cast(Any, None), both, nothing, Thresholds(), []) is load
+    search = Search(cast(Any, SimpleNamespace(settings=SearchSettings())), nothing)
+    monkeypatch.setattr(search, "drop", lambda chosen, k: (load, beyond)[k])
+    assert search.prune(both) is load

@@ -6,13 +6,13 @@ import pytest
 from gsl.core.body import lumped
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.diagnosis.arena import arena_of
-from gsl.diagnosis.candidates import library
-from gsl.diagnosis.experiment import experiment
-from gsl.diagnosis.nuisance import COULOMB, KD, none
+from gsl.diagnosis.hypothesis.candidates import library
+from gsl.diagnosis.hypothesis.common_mode import hand_over, shares
+from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.options import Options
-from gsl.diagnosis.select import Thresholds, _split
-from gsl.diagnosis.shared import handed_over, shares
+from gsl.diagnosis.search.reference import Nominal
+from gsl.diagnosis.search.stepwise import Search
+from gsl.diagnosis.simulate.calibration import COULOMB, KD, no_shifts
 from gsl.effects.effect import applied, built
 from gsl.robots.nao import nao
 from gsl.worlds.held import Held
@@ -28,19 +28,19 @@ def candidate(effect: str, *free: str):
 
 def test_a_factor_that_all_joints_share_goes_to_the_gain_and_the_rest_stays() -> None:
     common = shares([candidate("servo_gain", "kp", "kd")], MASKS)
-    nuisances = none(15)
-    nuisances[KD] = np.log(1.25) + np.linspace(-0.1, 0.1, 15)
+    shifts = no_shifts(15)
+    shifts[KD] = np.log(1.25) + np.linspace(-0.1, 0.1, 15)
     bounds = np.array([[0.1, 0.1], [2.0, 2.0]])
-    theta, left = handed_over(np.array([0.5, 0.4]), nuisances, bounds, common)
+    theta, left = hand_over(np.array([0.5, 0.4]), shifts, bounds, common)
     np.testing.assert_allclose(theta, [0.5, 0.5])
     np.testing.assert_allclose(left[KD], np.linspace(-0.1, 0.1, 15), atol=1e-12)
 
 
 def test_no_more_is_handed_over_than_the_bounds_take() -> None:
     common = shares([candidate("coulomb_friction", "torque").on("arms")], MASKS)
-    nuisances = none(15)
-    nuisances[COULOMB] = 0.1
-    theta, left = handed_over(np.array([0.2]), nuisances, np.array([[0.0], [0.25]]), common)
+    shifts = no_shifts(15)
+    shifts[COULOMB] = 0.1
+    theta, left = hand_over(np.array([0.2]), shifts, np.array([[0.0], [0.25]]), common)
     np.testing.assert_allclose(theta, [0.25])
     np.testing.assert_allclose(left[COULOMB], np.where(MASKS["arms"], 0.05, 0.1))
 
@@ -59,9 +59,9 @@ def test_friction_that_differs_between_legs_and_arms_is_told_apart() -> None:
         for path, told in zip(paths, logged, strict=True)
     )
     batch = Batch(episodes, NAO.controlled, PERIOD, {"episodes": [{"policy": str(k)} for k in range(4)]})
-    arena = arena_of(experiment(batch, NAO), plant, 0.002, Options(threads=1), lambda phase: None)
+    problem = Nominal(plant, 0.002).problem(cut_log(batch, NAO), Options(threads=1), lambda phase: None)
     friction = candidate("coulomb_friction", "torque")
-    everywhere = arena.fitted((friction,), np.array([0.15]), none(15), every=1)
-    apart = _split(arena, everywhere, arena.calibration(), Thresholds(), [])
+    everywhere = problem.fit((friction,), np.array([0.15]), no_shifts(15), every=1)
+    apart = Search(problem, problem.fit_calibration()).split(everywhere)
     found = {one.scope: float(value[0]) for one, value in zip(apart.candidates, apart.parameters, strict=True)}
     assert found == pytest.approx({"legs": 0.2, "arms": 0.1}, rel=0.1)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from test_refuted import claim
 
-from gsl.diagnosis.attribute import Hypothesis
-from gsl.diagnosis.select import Selection, passed_over
-from gsl.diagnosis.verdict import UNRIVALLED, judged
+from gsl.diagnosis.hypothesis.problem import Hypothesis
+from gsl.diagnosis.search.stepwise import Selection
+from gsl.diagnosis.settings import VerdictSettings
+from gsl.diagnosis.verdict.verdict import Judge
 
 PER_SAMPLE = np.full(8, 100.0)
 EMPTY = claim("coulomb_friction", [0.1], ("torque",))
@@ -34,7 +35,7 @@ def selection(chosen: Hypothesis, *others: Hypothesis) -> Selection:
 
 def test_two_causes_of_one_effect_are_each_judged_against_the_other_alone() -> None:
     shoulder, elbow = friction("shoulder", 300.0), friction("elbow", 900.0)
-    verdict = judged(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, friction("all", 200.0)), 1.0)
+    verdict = Judge(1.0).judge(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, friction("all", 200.0)))
     first, second = verdict.causes
     assert first.value == pytest.approx(800 / 1004)  # elbow alone leaves 900 of 1100, of which 96 are noise
     assert second.value == pytest.approx(200 / 1004)
@@ -43,14 +44,14 @@ def test_two_causes_of_one_effect_are_each_judged_against_the_other_alone() -> N
 
 def test_a_cause_in_whose_place_no_other_was_tried_is_not_certain() -> None:
     shoulder, elbow = friction("shoulder", 300.0), friction("elbow", 900.0)
-    alone = judged(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow), 1.0)
+    alone = Judge(1.0).judge(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow))
     assert [one.rival for one in alone.causes] == [None, None]
-    assert max(one.probability for one in alone.causes) <= UNRIVALLED
+    assert max(one.probability for one in alone.causes) <= VerdictSettings.unrivalled
     load = replace(claim("load_friction", [0.2], ("coefficient",)), costs=np.full(8, 900.0), counts=PER_SAMPLE)
     rivals = with_both(shoulder, load, 200.0), with_both(elbow, load, 200.0)
-    tried = judged(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, *rivals), 1.0)
+    tried = Judge(1.0).judge(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, *rivals))
     assert [one.rival for one in tried.causes] == ["load_friction", "load_friction"]
-    assert min(one.probability for one in tried.causes) > UNRIVALLED
+    assert min(one.probability for one in tried.causes) > VerdictSettings.unrivalled
 
 
 @pytest.mark.parametrize(
@@ -66,5 +67,5 @@ def test_what_costs_less_and_is_not_chosen_has_a_reason(costs: np.ndarray, torqu
     chosen = friction("shoulder", 100.0)
     more = with_both(chosen, friction("elbow", 900.0), 0.0)
     more = replace(more, costs=costs, parameters=(*chosen.parameters, np.array([torque])))
-    assert passed_over(more, chosen) == why
-    assert passed_over(friction("shoulder", 90.0), chosen) is None  # the same, fitted otherwise
+    assert selection(chosen).objection(more) == why
+    assert selection(chosen).objection(friction("shoulder", 90.0)) is None  # the same, fitted otherwise

@@ -20,7 +20,7 @@ from gsl.blind.strength import Player, Yardstick, turned_up
 from gsl.core.body import lumped
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.diagnosis.records import slope
+from gsl.diagnosis.log.records import slope
 from gsl.effects.effect import TWINS
 from gsl.errors import GslError
 

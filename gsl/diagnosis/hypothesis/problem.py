@@ -1,0 +1,297 @@
+"""A hypothesis is a set of effects, fitted on training windows; a problem is where hypotheses on one log compete.
+
+Every set of effects competes against smaller ones on windows that no fit has seen, the calibration refitted for each
+and its cost counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from gsl.diagnosis.hypothesis.candidates import Candidate, Looks, effects_of, library
+from gsl.diagnosis.hypothesis.common_mode import shares
+from gsl.diagnosis.hypothesis.fit import Build, Descent, Fit
+from gsl.diagnosis.log.log import Log, spread
+from gsl.diagnosis.log.residual import loss
+from gsl.diagnosis.options import Options
+from gsl.diagnosis.settings import SearchSettings
+from gsl.diagnosis.simulate.calibration import no_shifts
+from gsl.diagnosis.simulate.in_the_air import Effects
+from gsl.diagnosis.simulate.simulator import Bench, Simulator
+from gsl.effects.effect import effect_class, names
+
+LATENCY, PUSH = "command_latency", "external_push"
+IN_CONTACT = "contact"  # kind of effects that a robot in the air cannot show
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of effects with everything fitted, and what it costs where it was not fitted.
+
+    Attributes:
+        candidates: Its effects; empty for calibration alone.
+        parameters: Of each effect.
+        fit: On the training windows.
+        costs: Robust cost of the held-out residuals of each sample of `Pieces.samples`, shape (n_samples,).
+        counts: Residuals in each of these, shape (n_samples,).
+        levels: Held-out cost of one residual of each joint, see `Comparison.levels`, shape (n_joints,).
+    """
+
+    candidates: tuple[Candidate, ...]
+    parameters: tuple[np.ndarray, ...]
+    fit: Fit
+    costs: np.ndarray
+    counts: np.ndarray
+    levels: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number of effects."""
+        return len(self.candidates)
+
+    @property
+    def effects(self) -> Effects:
+        """As a world's `effects:` mapping."""
+        return effects_of(self.candidates, self.parameters)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of its effects, in order of selection."""
+        return tuple(candidate.effect for candidate in self.candidates)
+
+    @property
+    def places(self) -> frozenset[tuple[str, str]]:
+        """Its effects and where each acts."""
+        return frozenset((candidate.effect, candidate.scope) for candidate in self.candidates)
+
+    @property
+    def pairs(self) -> tuple[tuple[Candidate, np.ndarray], ...]:
+        """Its effects, each with its parameters."""
+        return tuple(zip(self.candidates, self.parameters, strict=True))
+
+    @property
+    def start(self) -> np.ndarray:
+        """All parameters in one row, as a fit takes them."""
+        return np.concatenate([np.zeros(0), *self.parameters])
+
+    @property
+    def claims_its_names(self) -> bool:
+        """Whether all parameters are inside their documented ranges, as far as a fit can tell."""
+        return all(candidate.claims_its_name(values) for candidate, values in self.pairs)
+
+    @property
+    def residual_cost(self) -> float:
+        """Held-out cost without that of the calibration."""
+        return float(self.costs.sum())
+
+    @property
+    def cost(self) -> float:
+        """Held-out cost, that of the calibration included."""
+        return self.residual_cost + self.fit.prior_cost
+
+    @property
+    def level(self) -> float:
+        """Held-out cost of one residual: about 1 where only noise is left."""
+        return float(self.costs.sum() / self.counts.sum())
+
+    def lacks(self, chosen: Hypothesis, k: int) -> bool:
+        """Whether it has not another one's k-th effect; the same elsewhere it may have if that one has it."""
+        effect = chosen.candidates[k].effect
+        beside = [(other.effect, other.fixed) for index, other in enumerate(chosen.candidates) if index != k]
+        return all(own.effect != effect or (own.effect, own.fixed) in beside for own in self.candidates)
+
+
+def by_cost(hypothesis: Hypothesis) -> float:
+    """Return the key by which hypotheses are sorted, best first."""
+    return hypothesis.cost
+
+
+@dataclass(frozen=True)
+class Gain:
+    """How much less one hypothesis costs than another, over held-out samples.
+
+    Attributes:
+        value: In units of cost.
+        low: Lower 95 % bound by bootstrap over samples.
+        high: Upper bound.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+def gain(better: Hypothesis, worse: Hypothesis, *, samples: int = 1000, seed: int = 0) -> Gain:
+    """Compare two hypotheses sample by sample; the difference of their prior costs is in every sample."""
+    difference = worse.costs - better.costs
+    extra = worse.fit.prior_cost - better.fit.prior_cost
+    totals = difference[_resample(len(difference), samples, seed)].sum(axis=1) + extra
+    low, high = np.quantile(totals, [0.025, 0.975])
+    return Gain(float(difference.sum() + extra), float(low), float(high))
+
+
+def share_of_excess(
+    better: Hypothesis, worse: Hypothesis, none: Hypothesis, least: float, *, samples: int = 1000, seed: int = 0
+) -> tuple[float, float, float]:
+    """Return a gain as a share of the excess, in [-1, 1], and its 95 % interval by bootstrap over samples.
+
+    Args:
+        better: What gains.
+        worse: Over which it gains.
+        none: What costs the excess: the hypothesis without an effect.
+        least: Cost of one residual where only noise is left.
+        samples: Of the bootstrap.
+        seed: Of the bootstrap.
+    """
+    index = np.vstack([np.arange(len(none.costs)), _resample(len(none.costs), samples, seed)])
+    gains = (worse.costs - better.costs)[index].sum(axis=1) + worse.fit.prior_cost - better.fit.prior_cost
+    excess = (none.costs - least * none.counts)[index].sum(axis=1) + none.fit.prior_cost
+    value, *rest = np.clip(gains / np.maximum(excess, 1e-9), -1.0, 1.0)
+    low, high = np.quantile(rest, [0.025, 0.975])
+    return float(value), float(low), float(high)
+
+
+def _resample(count: int, samples: int, seed: int) -> np.ndarray:
+    """Return samples with replacement, as indices of shape (samples, count)."""
+    return np.random.default_rng(seed).integers(0, count, (samples, count))
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Where hypotheses on one log compete.
+
+    Attributes:
+        train: Windows of the training records.
+        held_out: Windows of the others.
+        library: The candidates.
+        scopes: Names of scopes and their joints, each of shape (n_joints,).
+        tick: Called with a phase when it begins, and with an empty word whenever some work is done.
+        glances: Training windows that a screening looks at, spread over all of them; None for half of them.
+        settings: Of the search and its fits.
+    """
+
+    train: Bench
+    held_out: Bench
+    library: tuple[Candidate, ...]
+    scopes: Mapping[str, np.ndarray]
+    tick: Callable[[str], None]
+    glances: int | None = None
+    settings: SearchSettings = field(default_factory=SearchSettings)
+
+    @classmethod
+    def of(
+        cls,
+        log: Log,
+        simulator: Simulator,
+        options: Options,
+        tick: Callable[[str], None],
+        looks: Looks | None = None,
+    ) -> Problem:
+        """Return where hypotheses on a log compete, a push among them only if a look found one."""
+        hidden = [] if log.walking else [name for name in names() if _kind(name) == IN_CONTACT]
+        hidden += [] if options.clocks else [LATENCY]
+        hidden += [] if looks and PUSH in looks.fixed else [PUSH]
+        candidates = library(
+            simulator.plant.robot,
+            (*options.without, *hidden),
+            looks,
+            dense=bool(log.comparison.shaking.any()),
+            floating=log.walking,
+            settings=options.search.grids,
+        )
+        return cls(
+            Bench(simulator, log.train_pieces, log.comparison),
+            Bench(simulator, log.held_out_pieces, log.comparison),
+            candidates,
+            _scopes(log),
+            tick,
+            options.search.walk_windows if log.walking else None,
+            options.search,
+        )
+
+    @property
+    def simulator(self) -> Simulator:
+        """What replays."""
+        return self.train.simulator
+
+    @property
+    def glance(self) -> Bench:
+        """The windows of a screening: every second one is enough to see which candidates are worth a fit."""
+        count = len(self.train.pieces)
+        most = self.glances or (count // 2 if count > self.settings.few else count)
+        return replace(self.train, pieces=self.train.pieces.take(spread(np.arange(count), most)))
+
+    def only(self, effects: Sequence[str]) -> Problem:
+        """Return the problem with a part of the library."""
+        return replace(self, library=tuple(part for part in self.library if part.effect in effects))
+
+    def without(self, effects: Sequence[str] | Mapping[str, Any]) -> Problem:
+        """Return the problem without a part of the library."""
+        return replace(self, library=tuple(part for part in self.library if part.effect not in effects))
+
+    def fit_calibration(self) -> Hypothesis:
+        """Return the hypothesis without an effect."""
+        return self.fit((), np.zeros(0), no_shifts(self.train.joints), every=1, rounds=2 * self.settings.fit.rounds)
+
+    def fit(
+        self,
+        candidates: tuple[Candidate, ...],
+        start: np.ndarray,
+        at: np.ndarray,
+        *,
+        every: int | None = None,
+        rounds: int | None = None,
+    ) -> Hypothesis:
+        """Fit a set of effects and score it.
+
+        Args:
+            candidates: The effects.
+            start: Their parameters in one row.
+            at: Shifts to begin with, shape (7, n_joints).
+            every: Steps for which sensitivities to the shifts are kept.
+            rounds: Steps at most.
+        """
+        sizes = np.cumsum([len(candidate.free) for candidate in candidates])[:-1]
+
+        def split(values: np.ndarray) -> tuple[np.ndarray, ...]:
+            return tuple(np.split(values, sizes)) if candidates else ()
+
+        def build(values: np.ndarray) -> Effects:
+            return effects_of(candidates, split(values))
+
+        how, simulator = self.settings.fit, self.simulator
+        bounds = np.hstack([np.zeros((2, 0)), *(candidate.bounds for candidate in candidates)])
+        ratios = np.concatenate([np.zeros(0, dtype=bool), *(candidate.ratios for candidate in candidates)])
+        unit = simulator.plant.robot.torque_unit
+        common = shares(candidates, self.scopes, unit) if simulator.calibrates else ()
+        descent = Descent(self.train, build, bounds, ratios, common, every or how.every, rounds or how.rounds, how)
+        fit = descent.fit(start, at)
+        return self._score(candidates, split(fit.parameters), fit, build)
+
+    def _score(
+        self, candidates: tuple[Candidate, ...], parameters: tuple[np.ndarray, ...], fit: Fit, build: Build
+    ) -> Hypothesis:
+        z = self.held_out.residual(build(fit.parameters), fit.shifts)
+        used, sample = self.held_out.comparison.used(z.shape[1]), self.held_out.pieces.samples
+        lost, samples = loss(z), np.unique(sample)
+        cost = lost.sum(axis=1)
+        costs = np.array([cost[sample == name].sum() for name in samples])
+        counts = np.array([used.sum() * (sample == name).sum() for name in samples])
+        self.tick("")
+        return Hypothesis(candidates, parameters, fit, costs, counts, self.held_out.comparison.levels(lost))
+
+
+def _kind(effect: str) -> str:
+    return str(getattr(effect_class(effect), "kind", ""))
+
+
+def _scopes(log: Log) -> dict[str, np.ndarray]:
+    """Return all joints and, in the air, the robot's groups and each joint as scopes: shapes (n_channels,)."""
+    parts = {} if log.walking else {**log.robot.groups, **{joint: (joint,) for joint in log.channels}}
+    members = {"all": log.channels, **parts}
+    masks = {name: np.array([joint in some for joint in log.channels]) for name, some in members.items()}
+    return {name: mask for name, mask in masks.items() if mask.any()}
