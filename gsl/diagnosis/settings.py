@@ -1,7 +1,7 @@
 """The numbers that decide something in a diagnosis, frozen, each with its reason or source.
 
 Costs are robust costs of residuals in noise floors: one that holds nothing but noise costs 0.96 (`noise_cost`).
-"Measured" means: on simulated logs whose cause is known. "Estimate" means: nobody has measured it yet.
+"Measured" means: on logs whose cause is known. "Estimate" means: nobody has measured it yet, here is where to begin.
 """
 
 from __future__ import annotations
@@ -44,8 +44,20 @@ class LogSettings:
 class GridSettings:
     """Where a screening tries an effect, as shares of the way from doing nothing to the end of its documented range."""
 
-    one_sided: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)  # small strengths differ most
-    dense: tuple[float, ...] = (0.02, 0.05, 0.1, 0.15, 0.22, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0)  # where joints shake
+    one_sided: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)  # closer together near nothing
+    dense: tuple[float, ...] = (
+        0.02,
+        0.05,
+        0.1,
+        0.15,
+        0.22,
+        0.3,
+        0.4,
+        0.5,
+        0.65,
+        0.8,
+        1.0,
+    )  # where joints shake: minima are narrow
     two_sided: tuple[float, ...] = (0.05, 0.15, 0.35, 0.65, 1.0)  # on either side
     paired: tuple[float, ...] = (0.2, 0.6)  # where two strengths are searched together
     shapes: tuple[float, ...] = (0.0, 0.3, 1.0)  # of the range of a velocity or another parameter that is no strength
@@ -72,12 +84,14 @@ class FitSettings:
 class SearchSettings:
     """Which hypotheses are tried, and what one has to gain to stand."""
 
-    noise_cost: float = 0.96  # of a residual that is nothing but noise: 0.947 for normal noise, measured a little more
-    gain: float = 20.0  # least gain of an effect: log-odds of 10 against some hundred candidates and scopes
+    noise_cost: float = 0.96  # of a residual that is nothing but noise: 0.947 if exactly normal. Estimate
+    gain: float = 20.0  # least gain of an effect: log-odds of 10, against some hundred candidates and scopes. Estimate
     chance: float = 1.3  # how far above the best gain of chance, of a few simulated nulls, an effect has to be
-    walk_share: float = 0.1  # share of the cost that chance gains on the ground, where no log is simulated. Measured
-    shaking_share: float = 0.1  # the same of joints that shake: their phase is chance. Measured
-    least_share: float = 0.2  # of what is left, that a further effect has to explain
+    walk_share: float = (
+        0.1  # share of the cost that chance gains on the ground, where no log is simulated. Measured on walks
+    )
+    shaking_share: float = 0.1  # the same of joints that shake: their phase is chance. Estimate
+    least_share: float = 0.2  # of what is left, that a further effect has to explain. Estimate
     minor: float = 0.005  # of what is explained already: less is no cause but a flaw of the model
     flaw: float = 0.005  # of the calibration's cost, that a simulator's own flaws (its time step) let any effect gain
     room: float = 1.0  # cost of a residual that leaves room for a second effect
@@ -126,9 +140,9 @@ class VerdictSettings:
     start: float = 0.02  # spread of the joints before that [rad]
     separated: float = 0.75  # probability below which two causes are not told apart: odds of 3
     blunt: float = 12.0  # least spread of a difference of costs, where no self-test has measured it
-    coarse: float = 0.12  # share of a difference of costs that an imperfect model makes. Measured on foreign engines
-    walk_doubt: float = 0.05  # share of the cost by which two causes differ by chance on the ground. Measured
-    shaking_doubt: float = 0.08  # the same of joints that shake. Measured
+    coarse: float = 0.12  # share of a difference of costs that an imperfect model makes. Estimate
+    walk_doubt: float = 0.05  # share of the cost by which two causes differ by chance on the ground. Estimate
+    shaking_doubt: float = 0.08  # the same of joints that shake. Estimate
     foreign: float = 1.12  # remaining cost, and
     explained: float = 0.85  # share explained, beyond which nothing of the library is the cause
     local: float = 1.5  # remaining cost of one joint that is as strange
@@ -190,6 +204,6 @@ class DesignSettings:
     positions: int = 21  # of a joint between which the farthest two are chosen
     own: float = 1.2  # times as much another joint has to do to be moved in a joint's place
     rungs: int = 5  # of each joint on a ladder of poses
-    hold: float = 0.8  # of a rung [s]: servos settle in 0.2 s
+    hold: float = 0.8  # of a rung [s]
     way: float = 0.8  # least time from one rung to the next [s]
     plays: int = 3  # of a rung: two variants and a repeat

@@ -19,7 +19,7 @@ from gsl.diagnosis.simulate.calibration import PROBES, SPREADS, ZERO, clip_shift
 from gsl.diagnosis.simulate.in_the_air import Effects
 from gsl.diagnosis.simulate.simulator import Bench
 
-REWEIGHTINGS = 2  # of a linear fit: a third one changes costs by less than 1e-3
+REWEIGHTINGS = 2  # of a linear fit whose residuals count less the larger they are
 
 Build = Callable[[np.ndarray], Effects]
 

@@ -1,4 +1,4 @@
-"""A record is a logged trajectory as a replay wants it, motor targets in, measured joints out; pieces are its windows."""
+"""A record is a logged trajectory as a replay wants it: targets in, measured joints out; pieces are its windows."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ import numpy as np
 from gsl.diagnosis.log.records import Pieces, Record
 from gsl.diagnosis.settings import FloorSettings
 
-SCALE = 5.0  # floors beyond which a residual counts less and less (Cauchy): a quarter of them is 95 % efficient
+SCALE = 5.0  # floors beyond which a residual counts less and less (Cauchy); 2.4 are 95 % efficient for normal noise
 BLOCK = 5  # ticks of the low pass that joints that shake are seen through: 0.1 s at 50 Hz
 BANDS = 5  # of the spectrum of a joint that shakes
 POWER_SD = 0.6  # of the logarithm of its power in one window, measured on replays of shaking by its true cause

@@ -22,8 +22,8 @@ from gsl.models.network import Network, Samples
 
 SAMPLES = 1000  # of the bootstrap
 WORDS = {"high_load": "asked for much torque", "reversal": "turning round"}  # for regimes
-LAGS = (0, 1, 2, 3, 5, 8, 12)  # ticks back at which the learned residual sees command less position: up to 0.24 s
-CONFIG = ModelConfig(hidden=(64, 64), epochs=40, patience=6, ridge=1.0)  # GAT's forward model, half as long
+LAGS = (0, 1, 2, 3, 5, 8, 12)  # ticks back at which the learned residual sees command less position
+CONFIG = ModelConfig(hidden=(64, 64), epochs=40, patience=6, ridge=1.0)
 VALIDATION = 4  # every fourth training window
 CLIP = 50.0  # of its targets, in units of the floor
 FEW = 50  # residuals of a regime, of which fewer say nothing

@@ -46,7 +46,7 @@ class Verdict:
         inseparable: Groups of effects that the log cannot tell apart.
         explained: Share of the excess that the chosen hypothesis explains.
         remaining: Its cost of a residual over that of noise.
-        known: Probability that nothing else is at work.
+        complete: Probability that nothing else is at work.
         whole: Share of the excess from which on causes are all there is.
     """
 
@@ -55,7 +55,7 @@ class Verdict:
     inseparable: tuple[tuple[str, ...], ...]
     explained: float
     remaining: float
-    known: float
+    complete: float
     whole: float = VerdictSettings.whole
 
     @property
@@ -103,12 +103,12 @@ class Judge:
         if not chosen.candidates:
             return Verdict("unknown" if strange > 1.0 else "no_gap", (), (), 0.0, remaining, 1.0, how.whole)
         causes = tuple(self._cause(selection, k) for k in range(chosen.size))
-        known = self._known(explained, float(strange))
+        complete = self._completeness(explained, float(strange))
         groups = self._inseparable(chosen, causes)
-        sure = known * (how.lone if self.lone else 1.0)
+        sure = complete * (how.lone if self.lone else 1.0)
         scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
-        word = "unknown" if known < 0.5 else "inseparable" if groups else "causes"
-        return Verdict(word, scaled, groups, explained, remaining, known, how.whole)
+        word = "unknown" if complete < 0.5 else "inseparable" if groups else "causes"
+        return Verdict(word, scaled, groups, explained, remaining, complete, how.whole)
 
     def _inseparable(self, chosen: Hypothesis, causes: tuple[Cause, ...]) -> tuple[tuple[str, ...], ...]:
         alike = () if self.walking else ALIKE
@@ -119,7 +119,7 @@ class Judge:
                 groups.append((name, str(cause.rival)))
         return tuple(dict.fromkeys(tuple(sorted(set(group))) for group in groups))
 
-    def _known(self, explained: float, strange: float) -> float:
+    def _completeness(self, explained: float, strange: float) -> float:
         """Return the probability that the library holds what is at work: much is left only where that is missing."""
         missing, enough = strange - 1.0, self.settings.explained
         unexplained = (enough - explained) / (1.0 - enough)
