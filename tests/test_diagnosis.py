@@ -222,6 +222,23 @@ def test_the_noise_floor_comes_from_repeats_and_else_from_roughness() -> None:
     assert noise_floor(to_records(log({}, noise=0.0), arm()), 0.01).sd == pytest.approx(0.01 / np.sqrt(12.0))
 
 
+@pytest.mark.parametrize("own_names", [True, False])
+def test_the_order_of_files_changes_nothing(own_names: bool) -> None:
+    """Files may be called anything as well, unless a label says what a motion is."""
+    batch, cuts = log({}), []
+    for order in (np.arange(9), np.random.default_rng(0).permutation(9)):
+        labels = [{**batch.metadata["episodes"][k], "file": f"{place}"} for place, k in enumerate(order)]
+        labels = labels if own_names else [{"policy": label["file"], "file": label["file"]} for label in labels]
+        episodes = tuple(batch.episodes[k] for k in order)
+        cuts.append(cut_log(replace(batch, episodes=episodes, metadata={"episodes": labels}), arm()))
+        assert [order[place] for place in cuts[-1].order] == [cuts[0].order[k] for k in range(9)]
+    first, second = cuts
+    for part in ("real", "record", "tick"):
+        np.testing.assert_array_equal(getattr(first.pieces, part), getattr(second.pieces, part))
+    np.testing.assert_array_equal(first.held_out, second.held_out)
+    np.testing.assert_array_equal(first.comparison.floor, second.comparison.floor)
+
+
 def test_repeats_stay_on_one_side_of_the_split() -> None:
     exp = cut_log(log({}), arm())
     held = {exp.records[k].name for k in exp.pieces.record[exp.held_out]}

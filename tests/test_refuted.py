@@ -17,7 +17,7 @@ from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.hypothesis.fit import Fit
 from gsl.diagnosis.hypothesis.problem import Hypothesis
 from gsl.diagnosis.log.log import cut_log
-from gsl.diagnosis.search.plausibility import refute
+from gsl.diagnosis.search.plausibility import find_idle, refute
 from gsl.diagnosis.search.stepwise import Search, stands
 from gsl.diagnosis.settings import SearchSettings
 from gsl.diagnosis.simulate.calibration import no_shifts
@@ -95,6 +95,24 @@ def test_a_value_beyond_the_documented_range_is_no_cause() -> None:
     assert "command_latency" in result.refuted
     assert "command_latency" not in result.selection.chosen.names
     assert any("command_latency would explain much" in caveat for caveat in document(result)["caveats"])
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "free", "sd", "idle"),
+    [
+        ("torque_limit", [1.12], ("factor",), 0.1, True),
+        ("torque_limit", [1.12], ("factor",), 0.02, False),
+        ("servo_gain", [0.9, 0.5], ("kp", "kd"), 0.1, False),  # one of two strengths is enough
+        ("stribeck_friction", [0.05, 0.1], ("torque", "velocity"), 0.1, True),  # a velocity is no strength
+    ],
+)
+def test_a_cause_whose_interval_holds_what_does_nothing_is_none(
+    effect: str, values: list[float], free: tuple[str, ...], sd: float, idle: bool
+) -> None:
+    cause = claim(effect, values, free)
+    cause = replace(cause, fit=replace(cause.fit, covariance=np.diag(np.full(len(values), sd**2))))
+    assert (effect in find_idle(cause, 1.0)) == idle
+    assert all(reason.endswith("which does nothing") for reason in find_idle(cause, 1.0).values())
 
 
 def test_what_is_dropped_leaves_the_others_within_their_ranges(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from gsl.diagnosis.log.files import on_ground
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.looks import look
-from gsl.diagnosis.search.plausibility import refute
+from gsl.diagnosis.search.plausibility import find_idle, refute
 from gsl.diagnosis.search.reference import Nominal, calibrate_on, clock_shift
 from gsl.diagnosis.search.stepwise import Search, Selection, Thresholds
 from gsl.diagnosis.settings import VerdictSettings
@@ -116,6 +116,9 @@ def _search(
         search = Search(problem, none, thresholds, options.most, width)
         selection = search.select()
         reasons = refute(selection.chosen, log, problem.simulator.plant, options.plausibility)
+        if not (log.walking or log.shaking_share):  # where derivatives mean little, so do intervals
+            remaining = selection.chosen.level / (how.noise_cost * (1.0 + log.noise.slack))
+            reasons |= find_idle(selection.chosen, options.verdict.widening(remaining))
         if not reasons:
             return search.look_again(selection), refuted
         refuted |= reasons
@@ -126,7 +129,7 @@ def _survivors(selection: Selection, how: VerdictSettings) -> list[Hypothesis]:
     """Return the chosen hypothesis and the best ones of as many effects with other names."""
     chosen, survivors = selection.chosen, [selection.chosen]
     behind = max(how.behind, how.behind_share * (selection.none.cost - chosen.cost))
-    for rival in selection.tried if chosen.candidates else ():
+    for rival in selection.rivals if chosen.candidates else ():
         other = set(rival.names) not in [set(kept.names) for kept in survivors]
         near = rival.cost - chosen.cost < behind
         if rival.size == chosen.size and other and near and len(survivors) < how.survivors:

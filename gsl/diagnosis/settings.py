@@ -6,6 +6,7 @@ Costs are robust costs of residuals in noise floors: one that holds nothing but 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 
@@ -166,6 +167,14 @@ class VerdictSettings:
     stuck: float = 0.1  # and share of it, below which a joint that moves less does not move
     rough: float = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
     left: float = 0.1  # share of the held-out excess that is left, from which on something else is at work
+
+    def widening(self, remaining: float) -> float:
+        """Return how much wider an interval is than noise alone makes it: what is left unexplained widens it.
+
+        Args:
+            remaining: Cost of a residual over that of noise.
+        """
+        return self.wider * math.sqrt(max(1.0, remaining))
 
 
 @dataclass(frozen=True)

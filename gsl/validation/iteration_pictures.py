@@ -118,5 +118,5 @@ def _centre(world: World | EnsembleWorld | RandomisedWorld) -> BulletWorld | Non
 def _largest_held_out(log: Batch, world: BulletWorld) -> Trajectory:
     """Return the largest motion of a log that a diagnosis or a learned servo was not fitted to."""
     split = cut_log(log, lumped(world.plant.robot))
-    episodes = [log.episodes[k] for k in np.unique(split.pieces.record[split.held_out])]
+    episodes = [log.episodes[split.order[k]] for k in np.unique(split.pieces.record[split.held_out])]
     return max(episodes, key=lambda episode: np.ptp(episode.position, axis=0).max())

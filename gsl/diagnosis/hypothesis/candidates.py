@@ -49,6 +49,7 @@ class Candidate:
         documented: Lower and upper ends of their documented ranges, shape (2, p).
         bounds: Within which they are fitted, shape (2, p).
         grid: Values for a screening, shape (g, p); none if the log answers in proportion.
+        strong: Which of the free parameters are strengths, of which a value does nothing, shape (p,).
         seen: Value of its only parameter that a look at the log proposes; what lies beside it is no better.
     """
 
@@ -59,6 +60,7 @@ class Candidate:
     documented: np.ndarray
     bounds: np.ndarray
     grid: np.ndarray
+    strong: np.ndarray
     seen: float | None = None
 
     @property
@@ -213,7 +215,8 @@ def _candidate(
     shares = (grids.paired, grids.paired) if len(strengths) > 1 else (one_sided, grids.two_sided)
     axes = [_axis(span, shares if key in strengths else None, grids) for key, span in free.items()]
     grid = np.empty((0, len(free))) if proportional else np.array(list(itertools.product(*axes)))
-    return Candidate(name, fixed, tuple(free), neutral, documented, bounds, grid)
+    strong = np.array([key in strengths for key in free], dtype=bool)
+    return Candidate(name, fixed, tuple(free), neutral, documented, bounds, grid, strong)
 
 
 def _wide(lower: Any, upper: Any) -> Any:

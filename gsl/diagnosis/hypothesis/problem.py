@@ -25,6 +25,7 @@ from gsl.diagnosis.simulate.simulator import Bench, Simulator
 from gsl.effects.effect import effect_class, names
 
 LATENCY, PUSH = "command_latency", "external_push"
+Z95 = 1.96  # standard deviations of a 95 % interval
 IN_CONTACT = "contact"  # kind of effects that a robot in the air cannot show
 
 
@@ -77,6 +78,19 @@ class Hypothesis:
     def start(self) -> np.ndarray:
         """All parameters in one row, as a fit takes them."""
         return np.concatenate([np.zeros(0), *self.parameters])
+
+    def intervals(self, widening: float) -> tuple[np.ndarray, ...]:
+        """Return the 95 % interval of the parameters of each effect, within their bounds, shapes (2, p).
+
+        Args:
+            widening: How much wider than noise alone makes it.
+        """
+        sd = np.sqrt(np.maximum(0.0, np.diag(self.fit.covariance))) * widening
+        parts = np.split(sd, np.cumsum([len(values) for values in self.parameters])[:-1]) if self.size else []
+        return tuple(
+            np.clip([values - Z95 * part, values + Z95 * part], candidate.bounds[0], candidate.bounds[1])
+            for (candidate, values), part in zip(self.pairs, parts, strict=True)
+        )
 
     @property
     def claims_its_names(self) -> bool:

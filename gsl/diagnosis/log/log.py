@@ -31,6 +31,7 @@ class Log:
         held_out: Windows for checking, shape (n_held_out,).
         period: Control period [s].
         by_record: Whether whole records are held out; else parts of one, which is weaker.
+        order: Place in the batch of each record.
         settings: How it was cut.
     """
 
@@ -43,6 +44,7 @@ class Log:
     held_out: np.ndarray
     period: float
     by_record: bool
+    order: tuple[int, ...] = ()
     settings: LogSettings = field(default_factory=LogSettings)
 
     @property
@@ -101,7 +103,7 @@ def cut_log(
     held_out: Mapping[str, Any] | None = None,
     settings: LogSettings | None = None,
 ) -> Log:
-    """Cut a batch into windows and part it.
+    """Cut a batch into windows and part it; the order of its trajectories changes nothing.
 
     Args:
         batch: Of this robot, with records long enough for a window.
@@ -114,7 +116,7 @@ def cut_log(
         InputError: No record, or every one, has these labels; or effects are known of records on the ground.
     """
     how, period = settings or LogSettings(), batch.control_period
-    records = to_records(batch, robot, walking=walking)
+    records, order = _sort(to_records(batch, robot, walking=walking))
     if walking and any(record.conditions for record in records):
         raise InputError("conditions of a trajectory are for logs in the air; leave them out of its label")
     asked = _label_indices(records, held_out or {})
@@ -131,16 +133,31 @@ def cut_log(
         comparison = compare(pieces, noise, len(robot.controlled), how.floor)
     held, by_record = _hold_out(records, pieces, asked)
     train, check = np.flatnonzero(~held), np.flatnonzero(held)
-    return Log(robot, records, pieces, noise, comparison, train, check, period, by_record, how)
+    return Log(robot, records, pieces, noise, comparison, train, check, period, by_record, order, how)
+
+
+def _sort(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[int, ...]]:
+    """Return records in an order of their own, by name and content, and their places before.
+
+    A name that is only that of the file counts for nothing: files may be called anything.
+    """
+
+    def key(k: int) -> tuple[str, bytes, bytes]:
+        record = records[k]
+        name = "" if record.about.get("file") == record.name else record.name
+        return name, record.targets.tobytes(), record.position.tobytes()
+
+    order = tuple(sorted(range(len(records)), key=key))
+    return tuple(records[k] for k in order), order
 
 
 def _hold_out(records: Sequence[Record], pieces: Pieces, asked: Sequence[int]) -> tuple[np.ndarray, bool]:
-    """Hold out what is asked for, else every second motion in the order of the names; repeats stay together."""
+    """Hold out what is asked for, else every second motion in the records' order; repeats stay together."""
     if asked:
         return np.isin(pieces.record, asked), True
     motions: dict[bytes, list[int]] = {}
-    for index in sorted(range(len(records)), key=lambda k: (records[k].name, k)):
-        motions.setdefault(np.round(records[index].targets, 6).tobytes(), []).append(index)
+    for index, record in enumerate(records):
+        motions.setdefault(np.round(record.targets, 6).tobytes(), []).append(index)
     if len(motions) > 1:
         held = [index for k, group in enumerate(motions.values()) if k % 2 for index in group]
         return np.isin(pieces.record, held), True

@@ -1,4 +1,4 @@
-"""Plausibility: claims that a hypothesis cannot uphold, by its documented ranges or against a channel of the log.
+"""Plausibility: claims that a hypothesis cannot uphold, by its documented ranges, intervals or a channel of the log.
 
 A voltage, a temperature or a torque that was logged takes no part in any fit: it can only refute a name.
 """
@@ -49,6 +49,23 @@ def refute(
             reasons[candidate.effect] = f"it would take {parameters}, outside the documented range"
         elif rule and (reason := rule(evidence)):
             reasons[candidate.effect] = reason
+    return reasons
+
+
+def find_idle(hypothesis: Hypothesis, widening: float) -> dict[str, str]:
+    """Return the effects whose intervals hold what does nothing, in all their strengths, with the reason.
+
+    Args:
+        hypothesis: With its fit.
+        widening: How much wider an interval is than noise alone makes it.
+    """
+    reasons = {}
+    for candidate, (low, high) in zip(hypothesis.candidates, hypothesis.intervals(widening), strict=True):
+        strong, neutral = candidate.strong, candidate.neutral
+        if strong.any() and ((low <= neutral) & (neutral <= high))[strong].all():
+            k = int(np.argmax(strong))
+            holds = f"{candidate.free[k]} {low[k]:.3g} to {high[k]:.3g}, holds {neutral[k]:g}"
+            reasons[candidate.effect] = f"its 95 % interval, {holds}, which does nothing"
     return reasons
 
 

@@ -39,6 +39,7 @@ class Selection:
         tried: All hypotheses, best first, `none` among them.
         screening: The first one; a diagnosis asks once more what is invisible, on top of the chosen hypothesis.
         least: What an effect has to gain in cost here, to be more than chance.
+        rejected: Single effects that cost less than the first that stands, and do not stand themselves.
     """
 
     none: Hypothesis
@@ -46,6 +47,12 @@ class Selection:
     tried: tuple[Hypothesis, ...]
     screening: Screening
     least: float = 0.0
+    rejected: tuple[Hypothesis, ...] = ()
+
+    @property
+    def rivals(self) -> tuple[Hypothesis, ...]:
+        """All that may stand in the chosen one's place, best first."""
+        return tuple(fit for fit in self.tried if not any(fit is other for other in self.rejected))
 
     @property
     def gain(self) -> Gain:
@@ -56,6 +63,8 @@ class Selection:
         """Return what speaks against a hypothesis that costs less than the chosen one, None if it costs no less."""
         if hypothesis.cost >= self.chosen.cost or hypothesis.places == self.chosen.places:
             return None
+        if any(hypothesis is other for other in self.rejected):
+            return "not surely better than a calibration"
         if gain(hypothesis, self.chosen).low <= 0.0:
             return "not surely better"
         if not hypothesis.claims_its_names:
@@ -98,17 +107,39 @@ class Search:
 
     def select(self) -> Selection:
         """Return the hypothesis that stands in the end, and all that were tried."""
+        chosen, least = self.none, max(self.thresholds.gain, self.thresholds.share * self.none.cost)
+        if self.nothing_left():
+            return Selection(chosen, chosen, (chosen,), screen(self.problem, chosen), least)
         singles, screening = extend(self.problem, self.none, self._how.leads)
-        self.tried, chosen = [self.none, *singles], self.none
-        least = max(self.thresholds.gain, self.thresholds.share * self.none.cost)
-        if singles and stands(singles[0], self.none, least, self._how.flaw * self.none.cost):
-            chosen = self._grow(singles)
+        rejected, standing = self.part_singles(singles, least)
+        self.tried = [self.none, *singles]
+        if standing:
+            chosen = self._grow(standing)
             chosen = self.split(self._polish(self.prune(chosen)))
             if self.thresholds.share:
                 chosen = self._challenge(chosen)
             else:
                 self._rival(chosen)
-        return Selection(self.none, chosen, tuple(sorted(self.tried, key=by_cost)), screening, least)
+        return Selection(self.none, chosen, tuple(sorted(self.tried, key=by_cost)), screening, least, tuple(rejected))
+
+    def nothing_left(self) -> bool:
+        """Whether calibration alone leaves no more than noise, in every joint, and hides nothing."""
+        none, how = self.none, self._how
+        quiet = none.level <= how.noise_cost and float(none.levels.max()) <= how.room
+        return quiet and not (self._lacking(none, how.room) or self._zeros_aside(none))
+
+    def part_singles(self, singles: list[Hypothesis], least: float) -> tuple[list[Hypothesis], list[Hypothesis]]:
+        """Return the single effects before the first that stands, and those from it on, none if none stands.
+
+        Each is asked in turn: a spurious effect that is a little cheaper, but not significantly, hides no other one.
+
+        Args:
+            singles: Best first.
+            least: What one has to gain over calibration alone.
+        """
+        flaw = self._how.flaw * self.none.cost
+        first = next((k for k, single in enumerate(singles) if stands(single, self.none, least, flaw)), len(singles))
+        return (singles[:first], singles[first:]) if first < len(singles) else ([], [])
 
     def look_again(self, selection: Selection) -> Selection:
         """Return a selection that knows what is invisible on top of the chosen hypothesis.

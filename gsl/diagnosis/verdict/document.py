@@ -24,7 +24,6 @@ from gsl.effects.effect import confused_with, effect_class
 
 RANKED = 12  # hypotheses that are listed
 REPLAYS, TICKS = 6, 400  # pictures of replays, and their ticks at most
-Z95 = 1.96  # standard deviations of a 95 % interval
 WORDS = {
     "no_gap": "The simulator and the robot agree as far as noise and a per-joint calibration can tell.",
     "unknown": "There is a gap that no effect of the library explains.",
@@ -120,15 +119,14 @@ def _of(scope: str) -> str:
 def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
     chosen = findings.selection.chosen
     candidate, values = chosen.pairs[cause.index]
-    first = sum(len(other.free) for other in chosen.candidates[: cause.index])
-    sd = np.sqrt(np.maximum(0.0, np.diag(chosen.fit.covariance)))[first : first + len(values)]
+    interval = chosen.intervals(findings.widening)[cause.index]
     sure = cause.probability >= findings.options.verdict.sure
     return {
         "effect": candidate.effect,
         "joints": _joints(findings.log.robot, candidate),
         "scope": candidate.scope,
         "fixed": {key: value for key, value in candidate.fixed.items() if key != "joints"},
-        "parameters": _parameters(candidate, values, sd * findings.widening),
+        "parameters": _parameters(candidate, values, interval),
         "probability": cause.probability,
         "gain": {"value": cause.value, "low": cause.low, "high": cause.high},
         "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
@@ -144,17 +142,17 @@ def _joints(robot: Robot, candidate: Candidate) -> list[str]:
     return [name for name in members if name in robot.controlled]
 
 
-def _parameters(candidate: Candidate, values: np.ndarray, sd: np.ndarray) -> dict[str, Any]:
+def _parameters(candidate: Candidate, values: np.ndarray, interval: np.ndarray) -> dict[str, Any]:
     settings = settings_of(effect_class(candidate.effect))
-    columns = (candidate.free, values, sd, candidate.neutral, *candidate.bounds)
+    columns = (candidate.free, values, candidate.neutral, *interval)
     return {
         name: {
             "value": float(value),
-            "low": float(max(low, value - Z95 * spread)),
-            "high": float(min(high, value + Z95 * spread)),
+            "low": float(low),
+            "high": float(high),
             "unit": settings[name].unit or ("×" if neutral == 1.0 else ""),
         }
-        for name, value, spread, neutral, low, high in zip(*columns, strict=True)
+        for name, value, neutral, low, high in zip(*columns, strict=True)
     }
 
 

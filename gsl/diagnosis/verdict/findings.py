@@ -78,8 +78,8 @@ class Findings:
 
     @property
     def widening(self) -> float:
-        """How much wider an interval is than noise alone makes it: what is left unexplained widens it."""
-        return float(self.options.verdict.wider * np.sqrt(max(1.0, self.verdict.remaining)))
+        """How much wider an interval is than noise alone makes it."""
+        return self.options.verdict.widening(self.verdict.remaining)
 
     @property
     def effects(self) -> dict[str, Any]:

@@ -98,6 +98,7 @@ def _limit(findings: Findings, candidate: Candidate) -> Limit | None:
 def _fit_beside(findings: Findings, candidate: Candidate, value: float, at: Hypothesis) -> Hypothesis:
     """Return the answer with an effect held at a value, all else fitted from another hypothesis."""
     nothing, entry = np.empty((2, 0)), candidate.entry(np.array([value]))
-    held = replace(candidate, fixed=entry, free=(), neutral=nothing[0], documented=nothing, bounds=nothing)
+    none = {"free": (), "neutral": nothing[0], "strong": np.zeros(0, dtype=bool)}
+    held = replace(candidate, fixed=entry, documented=nothing, bounds=nothing, **none)
     rounds = findings.options.verdict.limit_rounds
     return findings.problem.fit((*findings.answer.candidates, held), at.start, at.fit.shifts, every=1, rounds=rounds)

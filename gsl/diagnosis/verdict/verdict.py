@@ -127,7 +127,7 @@ class Judge:
 
     def _cause(self, selection: Selection, k: int) -> Cause:
         chosen, none = selection.chosen, selection.none
-        rivals = [fit for fit in selection.tried if fit.size <= chosen.size and fit.lacks(chosen, k)]
+        rivals = [fit for fit in selection.rivals if fit.size <= chosen.size and fit.lacks(chosen, k)]
         fewer = min((fit for fit in rivals if fit.size < chosen.size), key=by_cost, default=none)
         noise = min(self.expected, self.noise_cost)
         value, low, high = (max(0.0, x) for x in share_of_excess(chosen, fewer, none, noise))
