@@ -15,7 +15,7 @@ from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.simulate.calibration import INERTIA, clip_shifts
 from gsl.diagnosis.verdict.caveats import out_of_family
 from gsl.diagnosis.verdict.limits import Limit, limits
-from gsl.diagnosis.verdict.shrinkage import unexplained
+from gsl.diagnosis.verdict.shrinkage import find_unexplained
 from gsl.report.diagnosis_limits import limits_sentence
 
 NEAR: dict[str, Any] = {"by_joint": [{"after": 1.0}], "by_regime": []}  # as `shrinkage` tells it
@@ -93,7 +93,7 @@ def test_a_part_of_the_log_that_is_as_far_off_as_before_is_not_explained() -> No
     regimes = [{"regime": "all", "before": 4.0, "after": 4.0}, {"regime": "high_load", "before": 11.0, "after": 12.0}]
     joints = [{"joint": "Jaw", "before": 2.5, "after": 2.4}, {"joint": "Elbow", "before": 5.0, "after": 3.0},
               {"joint": "Wrist", "before": 1.5, "after": 1.6}]  # fmt: skip
-    assert unexplained({"by_regime": regimes, "by_joint": joints}) == [
+    assert find_unexplained({"by_regime": regimes, "by_joint": joints}) == [
         {"part": "asked for much torque", "before": 11.0, "after": 12.0},
         {"part": "Jaw", "before": 2.5, "after": 2.4},
     ]

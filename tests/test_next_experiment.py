@@ -16,7 +16,7 @@ from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.design.motions import Choice, motions, to_the_ends
 from gsl.diagnosis.design.next_experiment import next_experiment
-from gsl.diagnosis.design.questions import NOTHING, hidden, rivals
+from gsl.diagnosis.design.questions import NOTHING, find_hidden, find_rivals
 from gsl.diagnosis.design.rehearsal import Explanation, Rehearsal
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.simulate import calibration
@@ -114,7 +114,7 @@ def test_playing_the_next_experiment_answers_the_question(truth: str) -> None:
 
 def test_nothing_speaks_against_the_truth_and_little_against_what_calibration_takes_up() -> None:
     found = played({"command_latency": {"delay": 0.012}}, swings(0.25, 0.0, 0.25), without=but(*LAGS))
-    rehearsal, question = Rehearsal.of(found, choices()), rivals(found)[0]
+    rehearsal, question = Rehearsal.of(found, choices()), find_rivals(found)[0]
     itself = (question.truth,)
     assert (rehearsal.log_odds(question.truth, itself) == 0.0).all()
     rows = len(calibration.SPREADS)
@@ -130,12 +130,12 @@ def test_one_load_does_not_show_friction_that_depends_on_it() -> None:
     pair = ("load_friction", "coulomb_friction")
     alone = played({}, swings(0.01, 0.3, 0.5), without=some)
     assert alone.verdict.word == "no_gap"
-    assert pair in [one.names for one in hidden(alone)] and ("torque_limit", NOTHING) in [
-        one.names for one in hidden(alone)
+    assert pair in [one.names for one in find_hidden(alone)] and ("torque_limit", NOTHING) in [
+        one.names for one in find_hidden(alone)
     ]
     wanted = next_experiment(alone, choices())
     assert wanted is not None and pair in wanted.separates
-    assert pair not in [one.names for one in hidden(played({}, whole(), without=some))]
+    assert pair not in [one.names for one in find_hidden(played({}, whole(), without=some))]
 
 
 def test_a_log_that_shows_all_that_a_motion_can_leaves_nothing_to_play() -> None:
@@ -145,7 +145,7 @@ def test_a_log_that_shows_all_that_a_motion_can_leaves_nothing_to_play() -> None
 
 def test_a_stop_that_nothing_hints_at_is_no_question() -> None:
     found = played({}, swings(0.01, 0.3, 0.5), without=but("torque_limit", "joint_limit"))
-    assert [one.names[0] for one in hidden(found)] == ["torque_limit"]
+    assert [one.names[0] for one in find_hidden(found)] == ["torque_limit"]
 
 
 def test_what_is_alike_in_the_air_by_nature_wants_feet_on_the_ground() -> None:

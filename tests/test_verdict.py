@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from test_diagnosis import arm, log
-from test_refuted import claim
+from test_plausibility import claim
 
 from gsl.core.plant import nominal
 from gsl.diagnosis.hypothesis.problem import Hypothesis

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from test_limits import found
-from test_refuted import claim
+from test_plausibility import claim
 
 from gsl.diagnosis.hypothesis.problem import Hypothesis
 from gsl.diagnosis.simulate import calibration

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gsl.diagnosis.design.motions import Choice, ladder, motions
-from gsl.diagnosis.design.questions import NOTHING, Question, alike, hidden, rivals
+from gsl.diagnosis.design.questions import NOTHING, Question, find_hidden, find_rivals, find_twins
 from gsl.diagnosis.design.rehearsal import Rehearsal
 from gsl.diagnosis.settings import DesignSettings
 from gsl.diagnosis.verdict.findings import Findings
@@ -67,10 +67,10 @@ def next_experiment(findings: Findings, choices: Sequence[Choice]) -> NextExperi
     Causes that cannot be told apart come first, then zeros that may be loads, then effects that the log cannot show.
     """
     unsure = tuple(droop for droop in find_droops(findings) if droop.told)
-    open_pairs, twins = rivals(findings), alike(findings)
+    open_pairs, twins = find_rivals(findings), find_twins(findings)
     if unsure and not open_pairs and not twins:
         return _ladder(unsure, findings)
-    questions = open_pairs or ([] if twins else hidden(findings))
+    questions = open_pairs or ([] if twins else find_hidden(findings))
     how = findings.options.design
     best = _best(questions, Rehearsal.of(findings, choices), choices, how) if questions else None
     return best or (_on_ground(twins) if twins else None)

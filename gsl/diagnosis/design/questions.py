@@ -37,12 +37,12 @@ class Question:
     loose: float = 1.0
 
 
-def alike(findings: Findings) -> list[tuple[str, ...]]:
+def find_twins(findings: Findings) -> list[tuple[str, ...]]:
     """Return the causes that nothing in the air can tell apart."""
     return [group for group in findings.verdict.inseparable if set(group) in ALIKE]
 
 
-def rivals(findings: Findings) -> list[Question]:
+def find_rivals(findings: Findings) -> list[Question]:
     """Return the causes that the log cannot tell apart but another one might; of an unknown cause the nearest two."""
     selection, joints = findings.selection, len(findings.log.joints)
     if findings.verdict.word == "unknown":
@@ -73,7 +73,7 @@ def _explanation(hypothesis: Hypothesis, joints: int) -> Explanation:
     return Explanation(hypothesis.effects, hypothesis.fit.shifts[:, :joints])
 
 
-def hidden(findings: Findings) -> list[Question]:
+def find_hidden(findings: Findings) -> list[Question]:
     """Return the effects that the log does not show at half their documented strength, each against its absence.
 
     A stop is no such question: to drive a robot to the ends of all its joints takes a suspicion.

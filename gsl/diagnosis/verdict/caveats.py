@@ -35,7 +35,7 @@ def caveats(
         findings: The diagnosis.
         unsure: Joints whose zero may be a droop.
         shrunk: From `shrinkage`.
-        far: Parts of the log that are not explained, from `unexplained`.
+        far: Parts of the log that are not explained, from `find_unexplained`.
     """
     about_fit = (_droops(unsure), _remaining(findings, shrunk, far))
     parts = (*about_fit, _log(findings), _joints(findings), _causes(findings))

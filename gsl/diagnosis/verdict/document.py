@@ -17,7 +17,7 @@ from gsl.diagnosis.simulate.calibration import inertia_unit, no_shifts
 from gsl.diagnosis.verdict.caveats import caveats
 from gsl.diagnosis.verdict.findings import Findings
 from gsl.diagnosis.verdict.localise import cells, find_regimes, horizon, sides
-from gsl.diagnosis.verdict.shrinkage import shrinkage, unexplained
+from gsl.diagnosis.verdict.shrinkage import find_unexplained, shrinkage
 from gsl.diagnosis.verdict.verdict import Cause, Verdict
 from gsl.diagnosis.verdict.zero_or_load import find_droops
 from gsl.effects.effect import confused_with, effect_class
@@ -41,7 +41,7 @@ def document(findings: Findings, **about: Any) -> dict[str, Any]:
     suspects = [_cause(findings, cause) for cause in verdict.causes]
     causes = suspects if verdict.names_causes else []
     shrunk = shrinkage(findings, before, after)
-    far = unexplained(shrunk, findings.options.verdict) if causes else []
+    far = find_unexplained(shrunk, findings.options.verdict) if causes else []
     places = [asdict(cell) for cell in cells(log, z, find_regimes(log, findings.corrected))]
     how_sure = doubt(causes, findings.options.verdict)
     return {

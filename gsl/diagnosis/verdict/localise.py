@@ -166,7 +166,7 @@ def sides(log: Log, z: np.ndarray, settings: LocaliseSettings | None = None) -> 
     """
     how, names, result = settings or LocaliseSettings(), log.joints, []
     reach = np.ptp(log.pieces.windows.commands[..., : len(names)], axis=1)
-    for left, right in mirrored(log.robot):
+    for left, right in mirror_pairs(log.robot):
         own = [names.index(name) for name in (left, right)]
         alike = np.abs(np.diff(reach[:, own], axis=1)[:, 0]) < how.alike * reach[:, own].max(axis=1)
         if alike.sum() < how.least:
@@ -182,7 +182,7 @@ def sides(log: Log, z: np.ndarray, settings: LocaliseSettings | None = None) -> 
     return result
 
 
-def mirrored(robot: Robot) -> list[tuple[str, str]]:
+def mirror_pairs(robot: Robot) -> list[tuple[str, str]]:
     """Return pairs of logged joints whose names differ by L and R at the beginning."""
     names = robot.controlled
     return [(name, "R" + name[1:]) for name in names if name.startswith("L") and "R" + name[1:] in names]

@@ -59,7 +59,7 @@ def shrinkage(findings: Findings, before: np.ndarray, after: np.ndarray) -> dict
     }
 
 
-def unexplained(shrunk: Mapping[str, Any], settings: VerdictSettings | None = None) -> list[dict[str, Any]]:
+def find_unexplained(shrunk: Mapping[str, Any], settings: VerdictSettings | None = None) -> list[dict[str, Any]]:
     """Return the joints and regimes that are far off, and no nearer than before or very far: part, before and after.
 
     Args:
