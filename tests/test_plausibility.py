@@ -15,7 +15,7 @@ from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.hypothesis.fit import Fit
-from gsl.diagnosis.hypothesis.problem import Hypothesis
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.search.plausibility import find_idle, refute
 from gsl.diagnosis.search.stepwise import Search, stands

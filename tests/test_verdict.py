@@ -12,7 +12,7 @@ from test_diagnosis import arm, log
 from test_plausibility import claim
 
 from gsl.core.plant import nominal
-from gsl.diagnosis.hypothesis.problem import Hypothesis
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.reference import Nominal

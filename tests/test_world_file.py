@@ -10,7 +10,7 @@ import pytest
 from test_limits import found
 from test_plausibility import claim
 
-from gsl.diagnosis.hypothesis.problem import Hypothesis
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.simulate import calibration
 from gsl.effects.effect import applied, built
 

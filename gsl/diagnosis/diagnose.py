@@ -9,7 +9,8 @@ import numpy as np
 from gsl.core.body import Robot, lumped
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.hypothesis.problem import LATENCY, Hypothesis, Problem
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
+from gsl.diagnosis.hypothesis.problem import LATENCY, Problem
 from gsl.diagnosis.log.files import on_ground
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.options import Options

@@ -17,7 +17,7 @@ from gsl.core.trajectory import Batch
 from gsl.core.transitions import usable
 from gsl.diagnosis.diagnose import diagnose, prepare
 from gsl.diagnosis.hypothesis.candidates import library
-from gsl.diagnosis.hypothesis.problem import Hypothesis
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.log.files import check_log, clock_caveat, log_parents, on_ground, read_logs, share_clock
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Record

@@ -9,7 +9,7 @@ import numpy as np
 
 from gsl.diagnosis.design.rehearsal import Explanation, Rehearsal
 from gsl.diagnosis.hypothesis.candidates import Candidate
-from gsl.diagnosis.hypothesis.problem import Hypothesis
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.search.screening import add_effect
 from gsl.diagnosis.simulate.calibration import COULOMB
 from gsl.diagnosis.verdict.findings import Findings

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.diagnosis.hypothesis.problem import Hypothesis
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Record
 from gsl.diagnosis.settings import PlausibilitySettings

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.diagnosis.hypothesis.problem import LATENCY, Problem, by_cost
+from gsl.diagnosis.hypothesis.hypothesis import by_cost
+from gsl.diagnosis.hypothesis.problem import LATENCY, Problem
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.stepwise import Search, Thresholds

@@ -9,7 +9,8 @@ import numpy as np
 
 from gsl.diagnosis.hypothesis.candidates import Candidate
 from gsl.diagnosis.hypothesis.fit import fit_proportional, fit_shifts, sensitivities
-from gsl.diagnosis.hypothesis.problem import Hypothesis, Problem, by_cost
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost
+from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.settings import SearchSettings
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.in_the_air import Effects

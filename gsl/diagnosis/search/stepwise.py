@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gsl.diagnosis.hypothesis.common_mode import shares
-from gsl.diagnosis.hypothesis.problem import Gain, Hypothesis, Problem, by_cost, gain
+from gsl.diagnosis.hypothesis.hypothesis import Gain, Hypothesis, by_cost, gain
+from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.search.screening import Screening, extend, screen
 from gsl.diagnosis.settings import SearchSettings
 from gsl.diagnosis.simulate.calibration import OFFSET, SPREADS, ZERO

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gsl.diagnosis.hypothesis.candidates import Candidate
-from gsl.diagnosis.hypothesis.problem import Hypothesis, share_of_excess
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, share_of_excess
 from gsl.diagnosis.log.records import FEW
 from gsl.diagnosis.simulate.calibration import (
     COULOMB,

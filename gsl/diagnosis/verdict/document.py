@@ -11,7 +11,7 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.setting import settings_of
 from gsl.diagnosis.hypothesis.candidates import Candidate
-from gsl.diagnosis.hypothesis.problem import Hypothesis, share_of_excess
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, share_of_excess
 from gsl.diagnosis.settings import VerdictSettings
 from gsl.diagnosis.simulate.calibration import inertia_unit, no_shifts
 from gsl.diagnosis.verdict.caveats import caveats

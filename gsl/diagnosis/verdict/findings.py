@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.diagnosis.hypothesis.problem import Hypothesis, Problem
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
+from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.reference import Baseline

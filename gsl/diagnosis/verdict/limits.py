@@ -11,7 +11,7 @@ import numpy as np
 from gsl.core.setting import settings_of
 from gsl.diagnosis.hypothesis.candidates import Candidate
 from gsl.diagnosis.hypothesis.common_mode import ROWS
-from gsl.diagnosis.hypothesis.problem import Hypothesis, gain
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, gain
 from gsl.diagnosis.verdict.findings import Findings
 from gsl.effects.effect import effect_class
 

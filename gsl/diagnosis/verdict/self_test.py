@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.diagnosis.hypothesis.problem import Hypothesis, Problem, by_cost
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost
+from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Pieces, Record, cut_pieces, slope
 from gsl.diagnosis.options import Options

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gsl.diagnosis.hypothesis.problem import Hypothesis, by_cost, gain, share_of_excess
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost, gain, share_of_excess
 from gsl.diagnosis.search.stepwise import Selection
 from gsl.diagnosis.settings import SearchSettings, VerdictSettings
 from gsl.effects.effect import TWINS
