@@ -9,7 +9,7 @@ import numpy as np
 from gsl.core.body import Robot, lumped
 from gsl.core.plant import Plant, nominal
 from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, ServoLaw
-from gsl.diagnosis.records import Pieces, Record, pieces, slope
+from gsl.diagnosis.log.records import Pieces, Record, cut_pieces, slope
 from gsl.effects.effect import applied, built
 from gsl.robots.nao import nao
 from gsl.worlds.held import Held
@@ -64,7 +64,7 @@ def log(plant: Plant, *, ticks: int = 80, swing: float = 0.15, warm_up: int = 5,
     told = Held.of(plant, STEP, PERIOD).play([targets], [targets[0]], settle=30)[0][:, :m]
     assert n >= m
     record = Record("sines", targets, told, slope(told, PERIOD))
-    return pieces([record], robot, PERIOD, warm_up=warm_up, scored=scored)
+    return cut_pieces([record], robot, PERIOD, warm_up=warm_up, scored=scored)
 
 
 def lawful(plant: Plant, added: ServoLaw | None) -> Plant:

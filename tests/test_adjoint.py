@@ -11,7 +11,7 @@ from gsl.core.dynamics import mass_matrix
 from gsl.core.lanes import LANES
 from gsl.core.plant import Plant, nominal
 from gsl.core.servo_law import ServoLaw
-from gsl.diagnosis.records import Pieces
+from gsl.diagnosis.log.records import Pieces
 from gsl.training.adjoint import cost_and_gradient
 from gsl.training.frozen import Frozen, freeze, heavier
 from gsl.training.gradient import NUMBERS, Gradient

@@ -9,9 +9,9 @@ import numpy as np
 from test_limits import found
 from test_verdict import EMPTY, friction, selection, with_both
 
-from gsl.diagnosis.caveats import caveats
-from gsl.diagnosis.diagnose import Findings
-from gsl.diagnosis.verdict import Verdict
+from gsl.diagnosis.verdict.caveats import caveats
+from gsl.diagnosis.verdict.findings import Findings
+from gsl.diagnosis.verdict.verdict import Verdict
 
 LEFT: dict[str, Any] = {"fraction": 0.63}
 NAMED = Verdict("causes", (), (), 0.97, 1.0, 1.0)

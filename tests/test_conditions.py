@@ -16,14 +16,14 @@ from gsl.core.history import History
 from gsl.core.labels import alike
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.diagnosis.diagnose import diagnosed
-from gsl.diagnosis.document import document
-from gsl.diagnosis.experiment import experiment
-from gsl.diagnosis.logs import other_clocks, read_logs, synchronised
-from gsl.diagnosis.nuisance import none
-from gsl.diagnosis.records import records
-from gsl.diagnosis.replay import InTheAir
-from gsl.diagnosis.whole import mean_errors
+from gsl.diagnosis.diagnose import diagnose
+from gsl.diagnosis.log.files import clock_caveat, read_logs, share_clock
+from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.log.records import to_records
+from gsl.diagnosis.simulate.calibration import no_shifts
+from gsl.diagnosis.simulate.in_the_air import InTheAir
+from gsl.diagnosis.simulate.simulator import mean_errors, simulator_of
+from gsl.diagnosis.verdict.document import document
 from gsl.effects.effect import names
 from gsl.errors import ConfigError, InputError
 from gsl.grounding.gat import LoadedTransformation
@@ -58,28 +58,26 @@ def both(**cause: Any) -> Batch:
 
 
 def test_what_is_known_of_a_trajectory_is_no_gap() -> None:
-    exp = experiment(both(), arm())
-    known = exp.simulator(nominal(arm()), 0.002, 1, 1.0)
-    left = exp.comparison.residual(known.told({}, none(2), exp.pieces), exp.pieces)
+    exp = cut_log(both(), arm())
+    known = simulator_of(exp, nominal(arm()), 0.002)
+    left = exp.comparison.residual(known.simulate({}, no_shifts(2), exp.pieces), exp.pieces)
     forgotten = replace(exp.pieces, conditions=())
-    gap = exp.comparison.residual(known.told({}, none(2), forgotten), forgotten)
+    gap = exp.comparison.residual(known.simulate({}, no_shifts(2), forgotten), forgotten)
     assert np.sqrt(np.mean(left**2)) == pytest.approx(1.0, abs=0.1)
     assert np.sqrt(np.mean(gap**2)) > 5.0
 
 
 def test_a_cause_is_found_beside_what_is_known() -> None:
     options = replace(QUICK, held_out={"gain": 0.5}, most=2)
-    found = diagnosed(both(command_latency={"delay": 0.016}), arm(), nominal(arm()), 0.002, options, lambda _: None)
+    found = diagnose(both(command_latency={"delay": 0.016}), nominal(arm()), 0.002, options, lambda _: None)
     assert found.selection.chosen.names == ("command_latency",)
-    held = {
-        found.experiment.records[k].about["gain"] for k in found.experiment.pieces.record[found.experiment.held_out]
-    }
+    held = {found.log.records[k].about["gain"] for k in found.log.pieces.record[found.log.held_out]}
     assert held == {0.5}
     assert document(found)["shrinkage"]["fraction"] > 0.95
 
 
 def test_repeats_under_other_conditions_are_no_noise() -> None:
-    exp = experiment(both(), arm())
+    exp = cut_log(both(), arm())
     assert exp.noise.source == "repeats"
     assert exp.noise.sd.max() < 0.003
 
@@ -103,7 +101,7 @@ def test_labels_are_numbers_however_they_are_written(one: Any, other: Any, same:
 
 def test_a_label_that_is_text_can_be_held_out_by_its_number() -> None:
     log_of_two = joined(labelled(log({}), repeat="1"), labelled(log({}), repeat="2"))
-    exp = experiment(log_of_two, arm(), held_out={"repeat": 1})
+    exp = cut_log(log_of_two, arm(), held_out={"repeat": 1})
     assert {exp.records[k].about["repeat"] for k in exp.pieces.record[exp.held_out]} == {"1"}
 
 
@@ -117,7 +115,7 @@ def test_a_label_that_is_text_can_be_held_out_by_its_number() -> None:
 )
 def test_labels_that_hold_out_nothing_or_all_are_refused(asked: dict[str, Any], line: str) -> None:
     with pytest.raises(InputError) as caught:
-        experiment(both(), arm(), held_out=asked)
+        cut_log(both(), arm(), held_out=asked)
     assert str(caught.value).startswith(line)
 
 
@@ -126,10 +124,10 @@ def test_windows_without_torque_are_left_out() -> None:
     works = np.ones(len(whole.episodes[0]) + 1, dtype=bool)
     works[75:] = False
     cut = replace(whole.episodes[0], sensors={"enabled": works})
-    some = experiment(replace(whole, episodes=(cut, *whole.episodes[1:])), arm()).pieces
-    every = experiment(whole, arm()).pieces
-    ends = (some.tick[some.record == 0] + some.real.shape[1]) * PERIOD
-    assert len(some) < len(every) and ends.max() <= 75 * PERIOD
+    some, every = (cut_log(batch, arm()) for batch in (replace(whole, episodes=(cut, *whole.episodes[1:])), whole))
+    first = some.pieces.record == some.order.index(0)
+    ends = (some.pieces.tick[first] + some.pieces.real.shape[1]) * PERIOD
+    assert len(some.pieces) < len(every.pieces) and ends.max() <= 75 * PERIOD
 
 
 def test_a_joint_without_torque_leaves_a_window_out_whichever_joint_it_is() -> None:
@@ -137,10 +135,11 @@ def test_a_joint_without_torque_leaves_a_window_out_whichever_joint_it_is() -> N
     rows = len(whole.episodes[0]) + 1
     off = np.arange(rows) < 75
     one = replace(whole.episodes[0], sensors={"enabled.a": off, "enabled.b": np.ones(rows, dtype=bool)})
-    exp = experiment(replace(whole, episodes=(one, *whole.episodes[1:])), arm())
-    np.testing.assert_array_equal(exp.records[0].driven, off)
-    assert (exp.pieces.tick[exp.pieces.record == 0] + exp.pieces.real.shape[1]).max() <= 75
-    assert exp.records[1].driven.all()
+    exp = cut_log(replace(whole, episodes=(one, *whole.episodes[1:])), arm())
+    first, second = exp.order.index(0), exp.order.index(1)
+    np.testing.assert_array_equal(exp.records[first].driven, off)
+    assert (exp.pieces.tick[exp.pieces.record == first] + exp.pieces.real.shape[1]).max() <= 75
+    assert exp.records[second].driven.all()
 
 
 def test_a_whole_replay_is_of_what_is_driven() -> None:
@@ -148,9 +147,9 @@ def test_a_whole_replay_is_of_what_is_driven() -> None:
     rows = np.arange(len(whole.episodes[0]) + 1)
     flags = {"late": rows >= 20, "between": (rows >= 20) & (rows < 90), "first": rows < 90, "never": rows < 0}
     episodes = tuple(replace(whole.episodes[0], sensors={"enabled": works}) for works in flags.values())
-    every = experiment(whole, arm())
-    found = records(replace(whole, episodes=episodes, metadata={}), arm())
-    errors = mean_errors(every.simulator(nominal(arm()), 0.002, 1, 1.0), {}, none(2), found, arm())
+    every = cut_log(whole, arm())
+    found = to_records(replace(whole, episodes=episodes, metadata={}), arm())
+    errors = mean_errors(simulator_of(every, nominal(arm()), 0.002), {}, no_shifts(2), found, arm())
     assert np.isfinite(errors[:3]).all() and errors[:3].max() < 0.01
     assert np.isnan(errors[3]).all()
 
@@ -165,10 +164,10 @@ def test_a_log_says_whether_its_clocks_are_apart_and_the_command_line_wins(tmp_p
         metadata = {**about, **clocks, **made.metadata}
         write(tmp_path / f"logs/{name}.parquet", replace(made, metadata=metadata))
     fine, apart = read_logs(str(tmp_path / "logs/a.parquet")), read_logs(str(tmp_path / "logs"))
-    assert synchronised(fine, None) and not synchronised(fine, "unsynchronised") and other_clocks(fine, None) is None
-    assert not synchronised(apart, None) and other_clocks(apart, None) is None
-    assert synchronised(apart, "synchronised") and not synchronised(apart, "unsynchronised")
-    assert other_clocks(apart, "unsynchronised") is None
+    assert share_clock(fine, None) and not share_clock(fine, "unsynchronised") and clock_caveat(fine, None) is None
+    assert not share_clock(apart, None) and clock_caveat(apart, None) is None
+    assert share_clock(apart, "synchronised") and not share_clock(apart, "unsynchronised")
+    assert clock_caveat(apart, "unsynchronised") is None
     told = "The log says that its clocks are unsynchronised; clocks=synchronised was asked for and counts."
     line = (
         "real=logs/b.parquet",
@@ -260,7 +259,7 @@ def world() -> BulletWorld:
 
 
 def bare() -> Simulated:
-    return Simulated(world(), InTheAir(nominal(arm()), 0.002, PERIOD), arm(), {}, none(2))
+    return Simulated(world(), InTheAir(nominal(arm()), 0.002, PERIOD), arm(), {}, no_shifts(2))
 
 
 def untouched() -> LoadedTransformation:
@@ -276,8 +275,8 @@ def shortened(one: Trajectory, ticks: int) -> Trajectory:
 
 
 def test_a_grounding_that_does_nothing_replays_as_the_chain_does() -> None:
-    found = records(both(**CAUSE), arm())
-    simulated = replace(bare(), effects={"coulomb_friction": {"torque": 0.05}}, nuisances=none(2) + 0.01)
+    found = to_records(both(**CAUSE), arm())
+    simulated = replace(bare(), effects={"coulomb_friction": {"torque": 0.05}}, nuisances=no_shifts(2) + 0.01)
     for one in (found[0], found[-1]):
         other = mean_errors(simulated.simulator, simulated.effects, simulated.nuisances, [one], arm())
         assert simulated.replayed(one, untouched(), 1) == pytest.approx(other.mean(), rel=1e-3)
@@ -285,21 +284,21 @@ def test_a_grounding_that_does_nothing_replays_as_the_chain_does() -> None:
 
 @pytest.mark.parametrize(("cause", "residual", "left"), [(LATE, False, 0.85), (STICKY, True, 0.85)])
 def test_a_learned_grounding_brings_replays_nearer(cause: dict[str, Any], residual: bool, left: float) -> None:
-    found = records(log(cause, jitter=0.0), arm())
+    found = to_records(log(cause, jitter=0.0), arm())
     errors = learning(residual=residual).errors(bare(), found[:6], found[6:], 1)
-    assert np.mean(errors) < left * mean_errors(bare().simulator, {}, none(2), found[6:], arm()).mean()
+    assert np.mean(errors) < left * mean_errors(bare().simulator, {}, no_shifts(2), found[6:], arm()).mean()
 
 
 @pytest.mark.parametrize("delay", [0.02, 0.03, 0.04])
 def test_on_top_of_a_diagnosed_delay_a_grounding_looks_over_it(delay: float) -> None:
     known = {"command_latency": {"delay": delay}}
-    found, late = records(log({**known, **STICKY}, jitter=0.0), arm()), replace(bare(), effects=known)
-    before = mean_errors(late.simulator, known, none(2), found[6:], arm()).mean()
+    found, late = to_records(log({**known, **STICKY}, jitter=0.0), arm()), replace(bare(), effects=known)
+    before = mean_errors(late.simulator, known, no_shifts(2), found[6:], arm()).mean()
     assert np.mean(learning().errors(late, found[:6], found[6:], 1)) < 0.85 * before
 
 
 def test_a_correction_of_a_simulator_that_knows_gains_is_better_at_another_gain_than_a_model_of_logs() -> None:
-    found = records(both(viscous_friction={"coefficient": 0.4}), arm())
+    found = to_records(both(viscous_friction={"coefficient": 0.4}), arm())
     errors = {how: learning(residual=how).errors(bare(), found[:9], found[9:], 1) for how in (True, False)}
     assert np.mean(errors[True]) < 0.7 * np.mean(errors[False])
 
@@ -308,7 +307,7 @@ def test_too_few_trajectories_teach_no_grounding() -> None:
     made = log({})
     short = tuple(shortened(one, 10) for one in made.episodes)
     for episodes in (made.episodes[:2], (*made.episodes[:2], *short)):
-        found = records(replace(made, episodes=episodes, metadata={}), arm())
+        found = to_records(replace(made, episodes=episodes, metadata={}), arm())
         with pytest.raises(
             ConfigError, match="fewer than 3 trajectories of 29 control periods to learn from; gat=null"
         ):
@@ -318,13 +317,13 @@ def test_too_few_trajectories_teach_no_grounding() -> None:
 def test_short_trajectories_are_played_whole() -> None:
     made = log({})
     episodes = (*made.episodes[:2], *(shortened(one, 60) for one in made.episodes[2:4]))
-    found = records(replace(made, episodes=episodes, metadata={}), arm())
+    found = to_records(replace(made, episodes=episodes, metadata={}), arm())
     assert [len(one) for one in bare().played(found, {}, 0.0, 1)] == [100, 100, 60, 60]
     assert np.isfinite(learning().errors(bare(), found, found, 1)).all()
 
 
 def test_replays_beside_others_have_no_noise_and_say_when_they_diverge() -> None:
-    found = records(log({}), arm())[:3]
+    found = to_records(log({}), arm())[:3]
     noisy = replace(bare(), effects={"encoder_noise": {"sd": 0.01}, "action_noise": {"sd": 0.05}})
     assert noisy.replayed(found[0], untouched(), 1) == pytest.approx(
         bare().replayed(found[0], untouched(), 1), rel=1e-6

@@ -12,16 +12,16 @@ from gsl.core.body import Joint, Link, Robot
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.diagnosis import nuisance
-from gsl.diagnosis.candidates import library
-from gsl.diagnosis.diagnose import Findings, diagnosed
-from gsl.diagnosis.document import document
-from gsl.diagnosis.experiment import experiment
-from gsl.diagnosis.noise_floor import noise_floor
+from gsl.diagnosis.diagnose import diagnose
+from gsl.diagnosis.hypothesis.candidates import library
+from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.log.records import to_records
+from gsl.diagnosis.log.residual import noise_floor
 from gsl.diagnosis.options import Options
-from gsl.diagnosis.records import records
-from gsl.diagnosis.screen import _between
-from gsl.diagnosis.world_file import diagnosed_effects
+from gsl.diagnosis.search.screening import _between
+from gsl.diagnosis.simulate import calibration
+from gsl.diagnosis.verdict.document import document
+from gsl.diagnosis.verdict.findings import Findings
 from gsl.effects.effect import SCOPE, Scope, applied, built, scope, use_own
 from gsl.report.diagnosis_text import summary_lines
 from gsl.worlds.held import Held, Windows
@@ -64,9 +64,9 @@ def motions() -> dict[str, np.ndarray]:
 def log(effects: Mapping[str, Any], seed: int = 1, *, jitter: float = 1.0, noise: float = NOISE) -> Batch:
     """What the arm with effects and small deviations of its own would log; one motion is played twice."""
     rng, robot = np.random.default_rng(seed), arm()
-    drawn = nuisance.SIZES[:, None] * rng.standard_normal((len(nuisance.SIZES), 2)) * 0.7 * jitter
-    drawn[nuisance.COULOMB] = np.abs(drawn[nuisance.COULOMB])
-    held = Held.of(nuisance.calibrated(applied(nominal(robot), built(effects)), drawn), 0.002, PERIOD)
+    drawn = calibration.SPREADS[:, None] * rng.standard_normal((len(calibration.SPREADS), 2)) * 0.7 * jitter
+    drawn[calibration.COULOMB] = np.abs(drawn[calibration.COULOMB])
+    held = Held.of(calibration.calibrate(applied(nominal(robot), built(effects)), drawn), 0.002, PERIOD)
     played = motions()
     names = [*played, "steps_a"]
     return Batch(
@@ -88,7 +88,7 @@ def _logged(held: Held, targets: np.ndarray, noise: float, rng: np.random.Genera
 
 
 def found(effects: Mapping[str, Any], *, seed: int = 1, **options: Any) -> Findings:
-    return diagnosed(log(effects, seed), arm(), nominal(arm()), 0.002, replace(QUICK, **options), lambda phase: None)
+    return diagnose(log(effects, seed), nominal(arm()), 0.002, replace(QUICK, **options), lambda phase: None)
 
 
 def test_no_effect_is_no_gap_and_the_self_test_knows_what_chance_gains() -> None:
@@ -135,13 +135,13 @@ def test_an_effect_of_ones_own_is_a_cause_like_ours_and_a_hook_is_left_out_by_na
     use_own({"cold_grease": ColdGrease, "magnet": Magnet})
     try:
         cold = log({"cold_grease": {"thickness": 0.5}})
-        result = diagnosed(cold, arm(), nominal(arm()), 0.002, QUICK, said.append)
+        result = diagnose(cold, nominal(arm()), 0.002, QUICK, said.append)
     finally:
         use_own({})
     assert result.selection.chosen.names == ("cold_grease",), result.verdict
     assert result.selection.chosen.parameters[0][0] == pytest.approx(0.5, rel=0.1)
     assert "without magnet, whose torque hook acts in Bullet alone" in said
-    assert "magnet" not in {one.effect for one in result.arena.library}
+    assert "magnet" not in {one.effect for one in result.problem.library}
 
 
 @pytest.mark.parametrize("effect", CAUSES)
@@ -165,7 +165,7 @@ def test_a_fault_of_one_joint_is_named_there() -> None:
 
 def test_a_simulator_fifty_times_too_stiff_is_told_so() -> None:
     stiff = replace(arm(), gains=dict.fromkeys(("shoulder", "elbow"), (2000.0, 4.0)), ranges=WIDE)
-    told = diagnosed(log({}), stiff, nominal(stiff), 0.002, replace(QUICK, most=2), lambda _: None)
+    told = diagnose(log({}), nominal(stiff), 0.002, replace(QUICK, most=2), lambda _: None)
     chosen = told.selection.chosen
     assert not {"coulomb_friction", "viscous_friction"} & set(told.selection.screening.invisible)  # once it is soft
     assert chosen.names == ("servo_gain",) and chosen.candidates[0].scope == "all"
@@ -193,7 +193,7 @@ def test_one_motion_alone_makes_nobody_sure() -> None:
     steps = [one for one, about in zip(whole.episodes, whole.metadata["episodes"], strict=True)
              if about["policy"] == "steps_a"][0]  # fmt: skip
     lone = replace(whole, episodes=(steps,), metadata={"episodes": [{"policy": "steps_a"}]})
-    found = document(diagnosed(lone, arm(), nominal(arm()), 0.002, QUICK, lambda _: None))
+    found = document(diagnose(lone, nominal(arm()), 0.002, QUICK, lambda _: None))
     assert [cause["effect"] for cause in found["causes"]] == ["command_latency"]
     assert found["causes"][0]["probability"] <= 0.8 and not found["sure"]
     assert found["summary"].partition("it leaves is ")[2].startswith("probably caused by command latency")
@@ -211,15 +211,11 @@ def test_a_reference_log_takes_the_model_error_away() -> None:
     """The diagnoser's plant is wrong in a way of its own, in both logs."""
     foreign = {"viscous_friction": {"coefficient": 0.25}}
     reference = log(foreign, seed=5)
-    result = diagnosed(
-        log({**foreign, "command_latency": {"delay": 0.015}}, seed=5),
-        arm(), nominal(arm()), 0.002, QUICK, lambda phase: None, reference=reference,
-    )  # fmt: skip
+    late = log({**foreign, "command_latency": {"delay": 0.015}}, seed=5)
+    result = diagnose(late, nominal(arm()), 0.002, QUICK, lambda phase: None, reference=reference)
     assert result.selection.chosen.names == ("command_latency",)
-    same = diagnosed(
-        log(foreign, seed=6, jitter=0.0), arm(), nominal(arm()), 0.002, QUICK, lambda phase: None,
-        reference=log(foreign, seed=7, jitter=0.0),
-    )  # fmt: skip
+    alike, reference = (log(foreign, seed=seed, jitter=0.0) for seed in (6, 7))
+    same = diagnose(alike, nominal(arm()), 0.002, QUICK, lambda phase: None, reference=reference)
     assert same.verdict.word == "no_gap"
 
 
@@ -232,9 +228,9 @@ def test_a_latency_is_not_claimed_where_clocks_are_apart() -> None:
 def test_the_diagnosed_world_moves_as_the_robot() -> None:
     effects = {"servo_gain": {"kp": 0.6}}
     result = found(effects)
-    exp = result.experiment
-    world: Plant = applied(nominal(arm()), built(diagnosed_effects(result)))
-    told = replace(result.simulator, plant=world).told({}, nuisance.none(2), exp.pieces)
+    exp = result.log
+    world: Plant = applied(nominal(arm()), built(result.effects))
+    told = replace(result.simulator, plant=world).simulate({}, calibration.no_shifts(2), exp.pieces)
     left = exp.comparison.floor * exp.comparison.residual(told, exp.pieces)
     assert np.sqrt(np.mean(left**2)) < 1.1 * NOISE
 
@@ -256,15 +252,32 @@ def test_the_document_has_what_the_contract_asks_for() -> None:
 
 def test_the_noise_floor_comes_from_repeats_and_else_from_roughness() -> None:
     batch = log({}, jitter=0.0)
-    measured = noise_floor(records(batch, arm()), 1e-4)
+    measured = noise_floor(to_records(batch, arm()), 1e-4)
     assert measured.source == "repeats" and measured.sd == pytest.approx(NOISE, rel=0.2)
-    alone = noise_floor(records(replace(batch, episodes=batch.episodes[:-1], metadata={}), arm()), 1e-4)
+    alone = noise_floor(to_records(replace(batch, episodes=batch.episodes[:-1], metadata={}), arm()), 1e-4)
     assert alone.source == "estimated" and alone.sd == pytest.approx(NOISE, rel=0.35)
-    assert noise_floor(records(log({}, noise=0.0), arm()), 0.01).sd == pytest.approx(0.01 / np.sqrt(12.0))
+    assert noise_floor(to_records(log({}, noise=0.0), arm()), 0.01).sd == pytest.approx(0.01 / np.sqrt(12.0))
+
+
+@pytest.mark.parametrize("own_names", [True, False])
+def test_the_order_of_files_changes_nothing(own_names: bool) -> None:
+    """Files may be called anything as well, unless a label says what a motion is."""
+    batch, cuts = log({}), []
+    for order in (np.arange(9), np.random.default_rng(0).permutation(9)):
+        labels = [{**batch.metadata["episodes"][k], "file": f"{place}"} for place, k in enumerate(order)]
+        labels = labels if own_names else [{"policy": label["file"], "file": label["file"]} for label in labels]
+        episodes = tuple(batch.episodes[k] for k in order)
+        cuts.append(cut_log(replace(batch, episodes=episodes, metadata={"episodes": labels}), arm()))
+        assert [order[place] for place in cuts[-1].order] == [cuts[0].order[k] for k in range(9)]
+    first, second = cuts
+    for part in ("real", "record", "tick"):
+        np.testing.assert_array_equal(getattr(first.pieces, part), getattr(second.pieces, part))
+    np.testing.assert_array_equal(first.held_out, second.held_out)
+    np.testing.assert_array_equal(first.comparison.floor, second.comparison.floor)
 
 
 def test_repeats_stay_on_one_side_of_the_split() -> None:
-    exp = experiment(log({}), arm())
+    exp = cut_log(log({}), arm())
     held = {exp.records[k].name for k in exp.pieces.record[exp.held_out]}
     fitted = {exp.records[k].name for k in exp.pieces.record[exp.train]}
     assert held and fitted and not held & fitted
@@ -282,7 +295,7 @@ def test_the_library_is_tried_whole_but_for_what_is_left_out() -> None:
 
 def test_threads_do_not_change_the_answer() -> None:
     one, other = (
-        diagnosed(log({}, 3), arm(), nominal(arm()), 0.002, replace(QUICK, threads=threads), lambda phase: None)
+        diagnose(log({}, 3), nominal(arm()), 0.002, replace(QUICK, threads=threads), lambda phase: None)
         for threads in (1, 3)
     )
     assert one.selection.none.cost == other.selection.none.cost

@@ -13,7 +13,7 @@ import yaml
 from commands import done
 
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.logs import read_logs
+from gsl.diagnosis.log.files import read_logs
 from gsl.storage.importers.suspicions import STUCK, saturated, stopped
 from gsl.storage.trajectories import read
 

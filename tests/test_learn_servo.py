@@ -10,8 +10,8 @@ import pytest
 
 from gsl.core.plant import Plant, nominal
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.diagnosis.experiment import Experiment, experiment
-from gsl.diagnosis.records import slope
+from gsl.diagnosis.log.log import Log, cut_log
+from gsl.diagnosis.log.records import slope
 from gsl.effects.effect import applied, built
 from gsl.errors import ConfigError, InputError
 from gsl.models.servo import ServoModel, neutral, with_group, without_group
@@ -66,11 +66,11 @@ def real(effects: dict[str, Any]) -> Plant:
     return applied(nominal(ROBOT), built(effects))
 
 
-def prepared(effects: dict[str, Any], **how: Any) -> Experiment:
-    return experiment(log(real(effects), **how), ROBOT)
+def prepared(effects: dict[str, Any], **how: Any) -> Log:
+    return cut_log(log(real(effects), **how), ROBOT)
 
 
-def learned(exp: Experiment, *, threads: int = 1, step: float = STEP) -> LearnedServo:
+def learned(exp: Log, *, threads: int = 1, step: float = STEP) -> LearnedServo:
     return learn_servo(exp, nominal(ROBOT), step, labelled=False, seed=1, threads=threads)
 
 
@@ -135,7 +135,7 @@ def test_a_torque_hook_is_refused_where_it_would_be_left_out() -> None:
 
 
 def test_a_network_learns_what_no_number_says() -> None:
-    exp = experiment(played_by_bullet(replace(nominal(ROBOT), hook=pushed)), ROBOT)
+    exp = cut_log(played_by_bullet(replace(nominal(ROBOT), hook=pushed)), ROBOT)
     found = learned(exp)
     assert found.model.network["last"].any()
     assert found.before["all"] > 10.0
@@ -147,7 +147,7 @@ def test_a_group_that_gets_worse_keeps_its_servo() -> None:
     fitted, held = log(real({"servo_gain": {"kp": 0.5}})), log(real({}), seed=1)
     labels = [{**one, "robot": name} for name, batch in (("soft", fitted), ("plain", held)) for one in about(batch)]
     both = replace(fitted, episodes=(*fitted.episodes, *held.episodes), metadata={"episodes": labels})
-    exp = experiment(both, ROBOT, held_out={"robot": "plain"})
+    exp = cut_log(both, ROBOT, held_out={"robot": "plain"})
     found = learn_servo(exp, nominal(ROBOT), STEP, labelled=True, seed=1, threads=1)
     assert found.after == found.before
     assert not any(values.any() for values in found.model.numbers.values())
@@ -166,7 +166,7 @@ def test_known_conditions_are_no_news() -> None:
     first, second = log(real(late), motions=6), log(real(late | soft), motions=6, seed=1)
     labels = [*about(first), *({**one, "conditions": soft} for one in about(second))]
     both = replace(first, episodes=(*first.episodes, *second.episodes), metadata={"episodes": labels})
-    found = learned(experiment(both, ROBOT))
+    found = learned(cut_log(both, ROBOT))
     assert found.after["all"] < 1.3 < found.before["all"]
     assert found.model.numbers["delay"][0] == pytest.approx(0.03, abs=0.005)
     assert found.model.numbers["kp"][0] == pytest.approx(0.0, abs=0.1)
@@ -187,18 +187,18 @@ def at_gains(*friction: float) -> Batch:
 def test_what_does_not_hold_at_a_gain_that_is_left_out_is_not_learned(
     friction: tuple[float, float, float], holds: bool
 ) -> None:
-    found = learned(experiment(at_gains(*friction), ROBOT))
+    found = learned(cut_log(at_gains(*friction), ROBOT))
     assert document(found)["learned"] is holds
 
 
 def test_each_condition_is_left_out_in_turn() -> None:
-    exp = experiment(at_gains(0.0, 0.0, 0.0), ROBOT)
+    exp = cut_log(at_gains(0.0, 0.0, 0.0), ROBOT)
     parts = split(exp, labelled=False)
     folds = left_out(exp, parts)
     assert [set(exp.pieces.record[one.test]) for one in folds] == [set(range(k, k + 4)) for k in (0, 4, 8)]
     for one in folds:
         assert sorted(np.concatenate([one.train, one.judge, one.test])) == list(range(len(exp.pieces)))
-    labelled = experiment(at_gains(0.0, 0.0, 0.0), ROBOT, held_out={"kp": 2.0})
+    labelled = cut_log(at_gains(0.0, 0.0, 0.0), ROBOT, held_out={"kp": 2.0})
     last = left_out(labelled, split(labelled, labelled=False))[2]
     assert last.judge.size
     assert not np.isin(exp.pieces.record[last.judge], exp.pieces.record[last.test]).any()

@@ -11,11 +11,11 @@ import pytest
 from test_diagnosis import QUICK, arm, found, log
 
 from gsl.core.plant import nominal
-from gsl.diagnosis.deviations import far_off
-from gsl.diagnosis.diagnose import diagnosed
-from gsl.diagnosis.limits import Limit, limits
-from gsl.diagnosis.nuisance import INERTIA, bounded
-from gsl.diagnosis.shrinkage import unexplained
+from gsl.diagnosis.diagnose import diagnose
+from gsl.diagnosis.simulate.calibration import INERTIA, clip_shifts
+from gsl.diagnosis.verdict.caveats import out_of_family
+from gsl.diagnosis.verdict.limits import Limit, limits
+from gsl.diagnosis.verdict.shrinkage import find_unexplained
 from gsl.report.diagnosis_limits import limits_sentence
 
 NEAR: dict[str, Any] = {"by_joint": [{"after": 1.0}], "by_regime": []}  # as `shrinkage` tells it
@@ -27,7 +27,7 @@ HIDDEN = {
 
 
 def left_room(effects: Mapping[str, Any], **how: Any) -> dict[str, Limit]:
-    result = diagnosed(log(effects, **how), arm(), nominal(arm()), 0.002, QUICK, lambda _: None)
+    result = diagnose(log(effects, **how), nominal(arm()), 0.002, QUICK, lambda _: None)
     assert result.answer.names == ()
     return {one.effect: one for one in limits(result, NEAR, lambda _: None)}
 
@@ -58,11 +58,11 @@ def test_where_a_gap_is_unexplained_nothing_is_ruled_out() -> None:
 def test_what_shakes_walks_or_is_explained_in_part_has_no_limits() -> None:
     result = found({})
     assert limits(result, NEAR, lambda _: None)
-    shaking = replace(result.experiment.comparison, shaking=np.array([True, False]))
+    shaking = replace(result.log.comparison, shaking=np.array([True, False]))
     part = replace(result.verdict, word="causes", explained=0.88, remaining=1.5)
     for other in (
         replace(result, verdict=part),
-        replace(result, experiment=replace(result.experiment, comparison=shaking)),
+        replace(result, log=replace(result.log, comparison=shaking)),
     ):
         assert limits(other, NEAR, lambda _: None) == []
     turning = {"by_joint": [], "by_regime": [{"regime": "reversal", "before": 10.4, "after": 7.1}]}
@@ -79,21 +79,21 @@ def test_a_sentence_tells_the_tightest() -> None:
     assert limits_sentence({"limits": []}) is None
 
 
-def test_a_rotor_that_is_as_light_as_it_can_be_is_far_off() -> None:
+def test_a_rotor_that_is_as_light_as_it_can_be_is_out_of_family() -> None:
     result = found({})
     fit = result.answer.fit
-    light = bounded(np.where(np.arange(7)[:, None] == INERTIA, -99.0, 0.0) * np.array([1.0, 0.0]))
-    answer = replace(result.selection.none, fit=replace(fit, nuisances=light))
+    light = clip_shifts(np.where(np.arange(7)[:, None] == INERTIA, -99.0, 0.0) * np.array([1.0, 0.0]))
+    answer = replace(result.selection.none, fit=replace(fit, shifts=light))
     selection = replace(result.selection, none=answer, chosen=answer)
-    assert far_off(replace(result, selection=selection)) == ["shoulder (inertia -6.2 g·m², at its limit)"]
-    assert far_off(result) == []
+    assert out_of_family(replace(result, selection=selection)) == ["shoulder (inertia -6.2 g·m², at its limit)"]
+    assert out_of_family(result) == []
 
 
 def test_a_part_of_the_log_that_is_as_far_off_as_before_is_not_explained() -> None:
     regimes = [{"regime": "all", "before": 4.0, "after": 4.0}, {"regime": "high_load", "before": 11.0, "after": 12.0}]
     joints = [{"joint": "Jaw", "before": 2.5, "after": 2.4}, {"joint": "Elbow", "before": 5.0, "after": 3.0},
               {"joint": "Wrist", "before": 1.5, "after": 1.6}]  # fmt: skip
-    assert unexplained({"by_regime": regimes, "by_joint": joints}) == [
+    assert find_unexplained({"by_regime": regimes, "by_joint": joints}) == [
         {"part": "asked for much torque", "before": 11.0, "after": 12.0},
         {"part": "Jaw", "before": 2.5, "after": 2.4},
     ]

@@ -7,23 +7,23 @@ import pytest
 
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.diagnose import diagnosed
-from gsl.diagnosis.document import document
-from gsl.diagnosis.experiment import Experiment, experiment
-from gsl.diagnosis.localise import Cell, cells, regimes
+from gsl.diagnosis.diagnose import diagnose
+from gsl.diagnosis.log.log import Log, cut_log
+from gsl.diagnosis.verdict.document import document
+from gsl.diagnosis.verdict.localise import Cell, cells, find_regimes
 from gsl.errors import GslError
 from tests.test_diagnosis import QUICK, arm, found, log
 
 
-def part(count: int) -> Experiment:
+def part(count: int) -> Log:
     """Some trajectories of the arm."""
     whole = log({})
     labels = {"episodes": whole.metadata["episodes"][:count]}
-    return experiment(replace(whole, episodes=whole.episodes[:count], metadata=labels), arm())
+    return cut_log(replace(whole, episodes=whole.episodes[:count], metadata=labels), arm())
 
 
-def mapped(one: Experiment, z: np.ndarray) -> list[Cell]:
-    return cells(one, z, regimes(one, nominal(arm())))
+def mapped(one: Log, z: np.ndarray) -> list[Cell]:
+    return cells(one, z, find_regimes(one, nominal(arm())))
 
 
 @pytest.mark.parametrize("count", [1, 2, 9])
@@ -50,7 +50,7 @@ def test_a_joint_that_shakes_is_told_as_large_as_it_is_and_in_no_regime() -> Non
 def test_intervals_of_one_held_out_trajectory_have_a_width() -> None:
     whole = log({"command_latency": {"delay": 0.02}})
     two = replace(whole, episodes=whole.episodes[:2], metadata={"episodes": whole.metadata["episodes"][:2]})
-    result = diagnosed(two, arm(), nominal(arm()), 0.002, QUICK, lambda phase: None)
+    result = diagnose(two, nominal(arm()), 0.002, QUICK, lambda phase: None)
     cause = result.verdict.causes[0]
     assert result.selection.chosen.names == ("command_latency",)
     assert cause.low < cause.value < cause.high
@@ -59,7 +59,7 @@ def test_intervals_of_one_held_out_trajectory_have_a_width() -> None:
 def test_a_joint_that_is_stuck_is_told_first() -> None:
     whole = log({})
     still = tuple(replace(one, position=one.position * [1.0, 0.0]) for one in whole.episodes)
-    result = diagnosed(replace(whole, episodes=still), arm(), nominal(arm()), 0.002, QUICK, lambda phase: None)
+    result = diagnose(replace(whole, episodes=still), nominal(arm()), 0.002, QUICK, lambda phase: None)
     (said,) = [one for one in document(result)["caveats"] if "do not" in one]
     assert "elbow" in said and "shoulder" not in said
 
@@ -71,7 +71,7 @@ def test_a_log_without_a_whole_window_is_refused() -> None:
         for one in whole.episodes
     )
     with pytest.raises(GslError, match="no trajectory lasts 1 s"):
-        experiment(Batch(short, whole.joints, whole.control_period, whole.metadata), arm())
+        cut_log(Batch(short, whole.joints, whole.control_period, whole.metadata), arm())
 
 
 def test_an_effect_that_does_not_exist_cannot_be_left_out() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from gsl.core.body import lumped
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.diagnosis.logs import check_log, log_files, on_ground, read_logs
+from gsl.diagnosis.log.files import check_log, log_files, on_ground, read_logs
 from gsl.errors import GslError
 from gsl.robots.nao import nao
 from gsl.storage.trajectories import write

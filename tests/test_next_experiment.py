@@ -14,12 +14,13 @@ from test_diagnosis import motions as whole
 from gsl.core.body import Robot
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch
-from gsl.diagnosis import nuisance
-from gsl.diagnosis.diagnose import Findings, diagnosed
-from gsl.diagnosis.menu import Dish, menu, to_the_ends
-from gsl.diagnosis.next_experiment import next_experiment
-from gsl.diagnosis.questions import NOTHING, hidden, rivals
-from gsl.diagnosis.rehearsal import Explanation, Rehearsal
+from gsl.diagnosis.design.motions import Choice, motions, to_the_ends
+from gsl.diagnosis.design.next_experiment import next_experiment
+from gsl.diagnosis.design.questions import NOTHING, find_hidden, find_rivals
+from gsl.diagnosis.design.rehearsal import Explanation, Rehearsal
+from gsl.diagnosis.diagnose import diagnose
+from gsl.diagnosis.simulate import calibration
+from gsl.diagnosis.verdict.findings import Findings
 from gsl.effects.effect import applied, built, names
 from gsl.policies.limits import breach, limits
 from gsl.robots.nao import nao
@@ -46,18 +47,18 @@ def played(
 ) -> Findings:
     """The diagnosis of what the arm with effects logs; the first motion is played twice."""
     rng, robot = np.random.default_rng(3), arm()
-    drawn = 0.5 * nuisance.SIZES[:, None] * rng.standard_normal((len(nuisance.SIZES), 2))
-    drawn[nuisance.COULOMB] = np.abs(drawn[nuisance.COULOMB])
-    held = Held.of(nuisance.calibrated(applied(nominal(robot), built(effects)), drawn), 0.002, PERIOD)
+    drawn = 0.5 * calibration.SPREADS[:, None] * rng.standard_normal((len(calibration.SPREADS), 2))
+    drawn[calibration.COULOMB] = np.abs(drawn[calibration.COULOMB])
+    held = Held.of(calibration.calibrate(applied(nominal(robot), built(effects)), drawn), 0.002, PERIOD)
     order = [*commands, next(iter(commands))]
     episodes = tuple(logged(held, commands[name], NOISE, rng) for name in order)
     batch = Batch(episodes, robot.controlled, PERIOD, {"episodes": [{"policy": name} for name in order]})
     options = QUICK.__class__(**{**vars(QUICK), "without": without})
-    return diagnosed(batch, robot, nominal(robot), 0.002, options, lambda phase: None)
+    return diagnose(batch, nominal(robot), 0.002, options, lambda phase: None)
 
 
-def dishes() -> tuple[Dish, ...]:
-    return menu("test_diagnosis.arm", arm(), PERIOD)
+def choices() -> tuple[Choice, ...]:
+    return motions("test_diagnosis.arm", arm(), PERIOD)
 
 
 def but(*kept: str) -> tuple[str, ...]:
@@ -69,9 +70,9 @@ def but(*kept: str) -> tuple[str, ...]:
 def test_everything_on_the_menu_keeps_the_limits_and_begins_and_ends_at_rest(robot: str) -> None:
     body = ROBOTS[robot]()
     bounds = limits(body)
-    for dish in menu(robot, body, PERIOD):
-        assert len({name for name, _ in dish.variants}) == len(dish.variants) == len(dish.episodes) - 1
-        for name, targets in dish.variants:
+    for choice in motions(robot, body, PERIOD):
+        assert len({name for name, _ in choice.variants}) == len(choice.variants) == len(choice.episodes) - 1
+        for name, targets in choice.variants:
             assert breach(bounds, targets, PERIOD) is None, name
             for row in (0, -1):
                 np.testing.assert_allclose(targets[row], bounds.rest, atol=1e-12)
@@ -101,7 +102,7 @@ def test_playing_the_next_experiment_answers_the_question(truth: str) -> None:
     effects = {truth: UNTOLD[truth]}
     before = played(effects, swings(0.25, 0.0, 0.25), without=but(*LAGS))
     assert before.verdict.word == "inseparable" and len(before.verdict.inseparable[0]) == 2
-    wanted = next_experiment(before, dishes())
+    wanted = next_experiment(before, choices())
     assert wanted is not None and {frozenset(pair) for pair in wanted.separates} == {
         frozenset(group) for group in before.verdict.inseparable
     }
@@ -113,12 +114,12 @@ def test_playing_the_next_experiment_answers_the_question(truth: str) -> None:
 
 def test_nothing_speaks_against_the_truth_and_little_against_what_calibration_takes_up() -> None:
     found = played({"command_latency": {"delay": 0.012}}, swings(0.25, 0.0, 0.25), without=but(*LAGS))
-    rehearsal, question = Rehearsal.of(found, dishes()), rivals(found)[0]
+    rehearsal, question = Rehearsal.of(found, choices()), find_rivals(found)[0]
     itself = (question.truth,)
     assert (rehearsal.log_odds(question.truth, itself) == 0.0).all()
-    rows = len(nuisance.SIZES)
-    shift = 0.5 * nuisance.SIZES[:, None] * np.ones((rows, 2))
-    moved = Explanation(question.truth.effects, question.truth.nuisances + shift)
+    rows = len(calibration.SPREADS)
+    shift = 0.5 * calibration.SPREADS[:, None] * np.ones((rows, 2))
+    moved = Explanation(question.truth.effects, question.truth.shifts + shift)
     odds, most = rehearsal.log_odds(moved, itself), 0.5 * 0.5**2 * rows * 2
     assert (odds > 0.0).all() and (odds < 1.2 * most).all()
     assert rehearsal.log_odds(question.truth, question.rivals).max() > 10 * most
@@ -129,26 +130,26 @@ def test_one_load_does_not_show_friction_that_depends_on_it() -> None:
     pair = ("load_friction", "coulomb_friction")
     alone = played({}, swings(0.01, 0.3, 0.5), without=some)
     assert alone.verdict.word == "no_gap"
-    assert pair in [one.names for one in hidden(alone)] and ("torque_limit", NOTHING) in [
-        one.names for one in hidden(alone)
+    assert pair in [one.names for one in find_hidden(alone)] and ("torque_limit", NOTHING) in [
+        one.names for one in find_hidden(alone)
     ]
-    wanted = next_experiment(alone, dishes())
+    wanted = next_experiment(alone, choices())
     assert wanted is not None and pair in wanted.separates
-    assert pair not in [one.names for one in hidden(played({}, whole(), without=some))]
+    assert pair not in [one.names for one in find_hidden(played({}, whole(), without=some))]
 
 
 def test_a_log_that_shows_all_that_a_motion_can_leaves_nothing_to_play() -> None:
     found = played({}, whole(), without=but("command_latency", "coulomb_friction", "load_friction", "encoder_noise"))
-    assert found.verdict.word == "no_gap" and next_experiment(found, dishes()) is None
+    assert found.verdict.word == "no_gap" and next_experiment(found, choices()) is None
 
 
 def test_a_stop_that_nothing_hints_at_is_no_question() -> None:
     found = played({}, swings(0.01, 0.3, 0.5), without=but("torque_limit", "joint_limit"))
-    assert [one.names[0] for one in hidden(found)] == ["torque_limit"]
+    assert [one.names[0] for one in find_hidden(found)] == ["torque_limit"]
 
 
 def test_what_is_alike_in_the_air_by_nature_wants_feet_on_the_ground() -> None:
     found = played({"zero_offset": {"offset": 0.03}}, whole(), without=but("zero_offset", "sensor_bias"))
-    wanted = next_experiment(found, dishes())
+    wanted = next_experiment(found, choices())
     assert wanted is not None and wanted.separates == (("sensor_bias", "zero_offset"),)
     assert wanted.episodes == () and "ground" in wanted.excitation

@@ -7,10 +7,10 @@ import pytest
 
 from gsl.core.body import lumped
 from gsl.core.plant import GRAVITY, Plant, nominal
-from gsl.diagnosis import nuisance
-from gsl.diagnosis.candidates import library
-from gsl.diagnosis.experiment import Experiment, experiment
-from gsl.diagnosis.on_ground import Walking, _heights, _moving, jitter_error
+from gsl.diagnosis.hypothesis.candidates import library
+from gsl.diagnosis.log.log import Log, cut_log
+from gsl.diagnosis.simulate import calibration
+from gsl.diagnosis.simulate.on_ground import Walking, _heights, _moving, jitter_error
 from gsl.effects.effect import applied, built
 from gsl.robots.nao import nao
 from gsl.worlds.bullet import BulletWorld
@@ -20,23 +20,23 @@ NONE = np.zeros(0)
 
 
 @pytest.fixture(scope="module")
-def walk() -> Experiment:
+def walk() -> Log:
     sim = BulletWorld(robot="nao", effects={}, start_noise=0.02)
     log = Walks(episodes=2, duration=1.0).logged(sim, None, {}, 0.0, np.random.default_rng(0))
-    return experiment(log, lumped(nao()), walking=True)
+    return cut_log(log, lumped(nao()), walking=True)
 
 
 def plant(**effects: dict[str, float]) -> Plant:
     return applied(nominal(nao()), built(effects))
 
 
-def test_a_bias_of_the_encoders_moves_the_log_and_not_the_robot(walk: Experiment) -> None:
+def test_a_bias_of_the_encoders_moves_the_log_and_not_the_robot(walk: Log) -> None:
     simulator = Walking(plant(), 0.002, 0.02)
     biased = replace(walk.pieces, windows=walk.pieces.windows._replace(motion=walk.pieces.windows.motion.copy()))
     biased.windows.motion[:, 0] += 0.03
-    told = simulator.told({"sensor_bias": {"bias": 0.03}}, NONE, biased)
+    told = simulator.simulate({"sensor_bias": {"bias": 0.03}}, NONE, biased)
     joints = len(walk.joints)
-    expected = simulator.told({}, NONE, walk.pieces)
+    expected = simulator.simulate({}, NONE, walk.pieces)
     assert np.allclose(told[..., :joints] - 0.03, expected[..., :joints], atol=1e-9)
     assert np.allclose(told[..., joints:], expected[..., joints:], atol=1e-9)
 
@@ -48,15 +48,15 @@ def test_late_encoders_tell_of_where_joints_were() -> None:
     assert np.allclose(_moving(late, measured)[:, 0], 0.02)
 
 
-def test_zeros_are_calibrated_in_the_log(walk: Experiment) -> None:
+def test_zeros_are_calibrated_in_the_log(walk: Log) -> None:
     simulator, joints = Walking(plant(), 0.002, 0.02), len(walk.joints)
-    shifted = nuisance.none(len(walk.channels))
-    shifted[nuisance.ZERO] = 0.01
-    moved = simulator.told({}, shifted, walk.pieces) - simulator.told({}, NONE, walk.pieces)
+    shifted = calibration.no_shifts(len(walk.channels))
+    shifted[calibration.ZERO] = 0.01
+    moved = simulator.simulate({}, shifted, walk.pieces) - simulator.simulate({}, NONE, walk.pieces)
     assert np.allclose(moved[..., :joints], 0.01) and not moved[..., joints:].any()
 
 
-def test_soft_ground_is_entered_as_deep_as_the_log_has_it(walk: Experiment) -> None:
+def test_soft_ground_is_entered_as_deep_as_the_log_has_it(walk: Log) -> None:
     windows = walk.pieces.windows
     windows = windows._replace(base=windows.base.copy())
     before = {k: _heights(plant(ground_compliance={"stiffness": k}), windows) for k in (2e3, 1e8)}
@@ -70,7 +70,7 @@ def test_soft_ground_is_entered_as_deep_as_the_log_has_it(walk: Experiment) -> N
     assert 1e-3 < deeper[0] < 2e-3 and np.abs(deeper[1:]).max() < 5e-4  # the median moves a little
 
 
-def test_robots_of_one_make_are_apart_by_more_in_the_joints_that_carry(walk: Experiment) -> None:
+def test_robots_of_one_make_are_apart_by_more_in_the_joints_that_carry(walk: Log) -> None:
     simulator = Walking(plant(), 0.002, 0.02)
     error = jitter_error(simulator, walk.pieces, np.random.default_rng(0))
     names = dict(zip(walk.channels, error, strict=True))

@@ -16,7 +16,7 @@ from commands import ENVIRONMENT, done, gsl, refused
 from gsl import make_world
 from gsl.commandline.help import write_help
 from gsl.core.plant import nominal
-from gsl.diagnosis.candidates import library
+from gsl.diagnosis.hypothesis.candidates import library
 from gsl.effects.effect import applied, built, effect_class, names, own, use_own
 from gsl.errors import ConfigError
 from gsl.robots.nao import nao

@@ -19,8 +19,6 @@ from test_bad_input import refused
 from gsl.core.described import described, rebuilt
 from gsl.core.seeds import derived_seed
 from gsl.core.statistics import bootstrap_interval, rank_correlation
-from gsl.diagnosis.policy_gap import Effort, policy_gap
-from gsl.diagnosis.real_returns import MOST, measured_parents, real_returns
 from gsl.effects.effect import names
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
@@ -30,6 +28,8 @@ from gsl.storage.manifest import inventory
 from gsl.storage.policies import write_policies
 from gsl.storage.policy_choice import EVALUATION, policies, record
 from gsl.tasks.arm import Arm
+from gsl.validation.policy_gap import Effort, policy_gap
+from gsl.validation.real_returns import MOST, measured_parents, real_returns
 from gsl.worlds.bullet import BulletWorld
 
 TASK = Arm(duration=0.4)

@@ -11,7 +11,7 @@ from robots_of_files import as_bullet_reads, holding
 from gsl.core.body import Robot, lumped
 from gsl.core.dynamics import forward_kinematics, mass_matrix
 from gsl.core.plant import nominal
-from gsl.diagnosis.candidates import library
+from gsl.diagnosis.hypothesis.candidates import library
 from gsl.errors import GslError
 from gsl.robots.catalogue import names, robot
 from gsl.robots.urdf import urdf

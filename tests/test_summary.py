@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from gsl.diagnosis.summary import doubt, summary
-from gsl.diagnosis.verdict import Verdict
+from gsl.diagnosis.verdict.document import doubt, summary
+from gsl.diagnosis.verdict.verdict import Verdict
 
 FOUND = Verdict("causes", (), (), 0.9, 1.0, 1.0)
 

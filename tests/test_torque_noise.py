@@ -9,7 +9,7 @@ from scipy.linalg import solve_discrete_lyapunov
 from gsl.core.body import lumped
 from gsl.core.dynamics import mass_matrix
 from gsl.core.plant import noiseless, nominal
-from gsl.diagnosis.candidates import library
+from gsl.diagnosis.hypothesis.candidates import library
 from gsl.effects.effect import applied, built
 from gsl.robots.nao import nao
 from gsl.worlds.bullet import BulletEnv, BulletWorld

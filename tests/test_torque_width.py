@@ -10,10 +10,10 @@ from bodies import STANCE, followed, held
 
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.diagnosis.experiment import Experiment, experiment
-from gsl.diagnosis.torque_width import held_out_widths
+from gsl.diagnosis.log.log import Log, cut_log
 from gsl.effects.effect import applied, built
 from gsl.robots.nao import nao
+from gsl.training.torque_width import held_out_widths
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo_state import COMMANDS
 
@@ -27,7 +27,7 @@ def motion(seed: int, length: int = 200) -> np.ndarray:
     return STANCE + 0.15 * (np.sin(2.0 * np.pi * pace * time + phase) - np.sin(phase))
 
 
-def log(effects: dict[str, Any], count: int = 16) -> Experiment:
+def log(effects: dict[str, Any], count: int = 16) -> Log:
     """Motions in the air, every one with noise of its own."""
     world, episodes = held({**effects, **NOISE}), []
     env = world.make()
@@ -39,7 +39,7 @@ def log(effects: dict[str, Any], count: int = 16) -> Experiment:
         episodes.append(Trajectory(PERIOD * np.arange(len(rows)), actions, position, velocity))
     env.close()
     metadata = {"robot": "nao", "episodes": [{"policy": f"swing_{index}"} for index in range(count)]}
-    return experiment(Batch(tuple(episodes), nao().controlled, PERIOD, metadata), nao())
+    return cut_log(Batch(tuple(episodes), nao().controlled, PERIOD, metadata), nao())
 
 
 def widths(effects: dict[str, Any], known: dict[str, Any] | None = None) -> dict[str, tuple[float, float]]:

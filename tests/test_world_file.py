@@ -8,11 +8,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from test_limits import found
-from test_refuted import claim
+from test_plausibility import claim
 
-from gsl.diagnosis import nuisance
-from gsl.diagnosis.attribute import Hypothesis
-from gsl.diagnosis.world_file import diagnosed_effects
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
+from gsl.diagnosis.simulate import calibration
 from gsl.effects.effect import applied, built
 
 PARTS = ("kp", "kd", "coulomb", "viscous", "armature", "offset", "load_friction", "stribeck")
@@ -27,12 +26,12 @@ PARTS = ("kp", "kd", "coulomb", "viscous", "armature", "offset", "load_friction"
 def test_a_calibration_of_either_sign_is_in_the_file(cause: Hypothesis, size: float) -> None:
     result = found({})
     fit = result.answer.fit
-    shifted = nuisance.bounded(size * nuisance.SIZES[:, None] * np.ones_like(fit.nuisances))
+    shifted = calibration.clip_shifts(size * calibration.SPREADS[:, None] * np.ones_like(fit.shifts))
     parts = {"candidates": cause.candidates, "parameters": cause.parameters}
-    answer = replace(result.answer, fit=replace(fit, nuisances=shifted), **cast(Any, parts))
+    answer = replace(result.answer, fit=replace(fit, shifts=shifted), **cast(Any, parts))
     changed = replace(result, selection=replace(result.selection, chosen=answer, none=answer))
     assert changed.answer is answer
-    written = applied(result.simulator.plant, built(diagnosed_effects(changed)))
+    written = applied(result.simulator.plant, built(changed.effects))
     for part in PARTS:
         scored = getattr(changed.corrected.servo, part)
         np.testing.assert_allclose(getattr(written.servo, part), scored, rtol=1e-4, atol=2e-6, err_msg=part)

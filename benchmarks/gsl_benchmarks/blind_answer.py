@@ -14,7 +14,7 @@ import numpy as np
 from gsl.core.console import Console, Progress
 from gsl.core.setting import component, setting
 from gsl.core.validation import make
-from gsl.diagnosis.logs import check_log, on_ground
+from gsl.diagnosis.log.files import check_log, on_ground
 from gsl.diagnosis.options import Options
 from gsl.rollout.parallel import Workers, in_parallel
 from gsl.storage import documents

@@ -1,12 +1,43 @@
-"""How a diagnosis works."""
+"""What a user decides of a diagnosis, and how a stage says what it is at."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any, Literal
 
+from pydantic import AfterValidator
+
+from gsl.core.console import Console
+from gsl.core.interruption import checkpoint
+from gsl.core.setting import setting
+from gsl.diagnosis.settings import DesignSettings, PlausibilitySettings, SearchSettings, VerdictSettings
 from gsl.effects.effect import effect_class
+from gsl.errors import ConfigError
+
+QUIET = 15.0  # of a phase after which it says how far it is [s]
+
+
+def _check_names(effects: tuple[str, ...]) -> tuple[str, ...]:
+    """Refuse names that no effect has, before a robot moves."""
+    for name in effects:
+        try:
+            effect_class(name)
+        except ConfigError as error:
+            raise ValueError(f"{name}: {error.problem}") from None
+    return effects
+
+
+Without = Annotated[tuple[str, ...], setting("effects that are left out of the library"), AfterValidator(_check_names)]
+Clocks = Annotated[
+    Literal["synchronised", "unsynchronised"] | None,
+    setting("whether commands and measurements share a clock, else no latency is claimed; what the log says if null"),
+]
+Most = Annotated[int, setting("effects at once, at most; parted over groups it counts once", ge=1, le=6)]
+Duels = Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)]
+Nulls = Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)]
+Tolerance = Annotated[float, setting("difference of a joint that does not matter, beside the noise", unit="rad", ge=0)]
 
 
 @dataclass(frozen=True)
@@ -24,6 +55,8 @@ class Options:
         seed: Of the simulated logs and of the learned residual.
         tolerance: Difference of a joint that does not matter, beside the noise [rad]: the model's roughness.
         held_out: Labels of the trajectories that are for checking; empty for every second motion.
+        null_gains: What chance gains on these commands in this world, if it was measured already.
+        search, plausibility, verdict, design: The numbers that decide.
     """
 
     without: tuple[str, ...] = ()
@@ -36,8 +69,34 @@ class Options:
     seed: int = 0
     tolerance: float = 0.0
     held_out: Mapping[str, Any] = field(default_factory=dict)
+    null_gains: tuple[float, ...] = ()
+    search: SearchSettings = field(default_factory=SearchSettings)
+    plausibility: PlausibilitySettings = field(default_factory=PlausibilitySettings)
+    verdict: VerdictSettings = field(default_factory=VerdictSettings)
+    design: DesignSettings = field(default_factory=DesignSettings)
 
     def __post_init__(self) -> None:
         """Refuse names that no effect has."""
         for name in self.without:
             effect_class(name)
+
+
+class PhaseReporter:
+    """Reports a phase when it begins, and now and then how long it has worked; nothing goes on after a Ctrl-C."""
+
+    def __init__(self, console: Console) -> None:
+        self._console, self._phase, self._fits = console, "", 0
+        self._start = self._last = time.monotonic()
+
+    def __call__(self, phase: str) -> None:
+        """Begin a phase; without a word, some work of it is done."""
+        now = time.monotonic()
+        if phase:
+            self._console.status(phase)
+            self._phase, self._fits, self._start, self._last = phase, 0, now, now
+            return
+        checkpoint()
+        self._fits += 1
+        if now - self._last > QUIET:
+            self._console.status(f"{self._phase}: {self._fits} fits in {now - self._start:.0f} s")
+            self._last = now

@@ -1,60 +1,218 @@
-"""What the stages that diagnose share: their settings, and how they say what they are at."""
+"""The numbers that decide something in a diagnosis, frozen, each with its reason or source.
+
+Costs are robust costs of residuals in noise floors: one that holds nothing but noise costs 0.96 (`noise_cost`).
+"Measured" means: on logs whose cause is known. "Estimate" means: nobody has measured it yet, here is where to begin.
+"""
 
 from __future__ import annotations
 
-import time
-from typing import Annotated, Literal
-
-from pydantic import AfterValidator
-
-from gsl.core.console import Console
-from gsl.core.interruption import checkpoint
-from gsl.core.setting import setting
-from gsl.effects.effect import effect_class
-from gsl.errors import ConfigError
-
-QUIET = 15.0  # of a phase that takes long [s]
+import math
+from dataclasses import dataclass, field
 
 
-def _in_the_library(effects: tuple[str, ...]) -> tuple[str, ...]:
-    """Refuse names that no effect has, before a robot moves."""
-    for name in effects:
-        try:
-            effect_class(name)
-        except ConfigError as error:
-            raise ValueError(f"{name}: {error.problem}") from None
-    return effects
+@dataclass(frozen=True)
+class FloorSettings:
+    """How the noise floor is measured, and which joints count as shaking."""
+
+    settled: int = 15  # ticks after which the start of an episode is forgotten: 0.3 s at 50 Hz
+    estimate: int = 200  # samples that an estimate from roughness is worth: other motion than noise is in it
+    unsteady: float = 4.0  # spread of a joint's repeats, in medians of the joints, that is no noise any more
+    quiet: float = 0.3  # share of the ticks, those of the slowest motion, on which roughness is measured
+    coloured: float = 0.4  # correlation of a resting joint's log with itself some ticks later: noise has none
+    lags: int = 4  # ticks over which that correlation is looked for
+    usual: float = 0.75  # share of the resting windows, the calmest, that is looked at: a push is no shaking
+    rests: int = 2  # resting windows that it takes to judge
+    still: float = 1e-6  # a command that moves less rests [rad]: rounding in a file
+    unmeasured: float = 3.0  # encoder steps that are the floor where every joint shakes
 
 
-Without = Annotated[
-    tuple[str, ...], setting("effects that are left out of the library"), AfterValidator(_in_the_library)
-]
-Clocks = Annotated[
-    Literal["synchronised", "unsynchronised"] | None,
-    setting("whether commands and measurements share a clock, else no latency is claimed; what the log says if null"),
-]
-Most = Annotated[int, setting("effects at once, at most; parted over groups it counts once", ge=1, le=6)]
-Duels = Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)]
-Nulls = Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)]
-Tolerance = Annotated[float, setting("difference of a joint that does not matter, beside the noise", unit="rad", ge=0)]
+@dataclass(frozen=True)
+class LogSettings:
+    """How a log is cut into windows and parted for fitting and checking."""
+
+    warm_up: float = 0.4  # of a window, not scored [s]: shorter ones bias friction, whose state a log does not show
+    scored: float = 0.6  # of a window [s]
+    walk_warm_up: float = 0.1  # the same of a walk [s], where replays part soon
+    walk_scored: float = 0.2
+    walk_windows: int = 200  # of walks, spread over all: a replay in Bullet takes milliseconds
+    fit_windows: int = 32  # that a fit uses, spread over the training records
+    check_windows: int = 400  # that a check uses, spread over the others
+    base_floor: tuple[float, ...] = (1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 2e-3)  # of x, y, z [m], roll, pitch, yaw. Estimate
+    floor: FloorSettings = field(default_factory=FloorSettings)
 
 
-class Telling:
-    """Says a phase when it begins, and now and then how long it has been at it; nothing goes on after a Ctrl-C."""
+@dataclass(frozen=True)
+class GridSettings:
+    """Where a screening tries an effect, as shares of the way from doing nothing to the end of its documented range."""
 
-    def __init__(self, console: Console) -> None:
-        self._console, self._phase, self._fits = console, "", 0
-        self._begun = self._said = time.monotonic()
+    one_sided: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)  # closer together near nothing
+    dense: tuple[float, ...] = (
+        0.02,
+        0.05,
+        0.1,
+        0.15,
+        0.22,
+        0.3,
+        0.4,
+        0.5,
+        0.65,
+        0.8,
+        1.0,
+    )  # where joints shake: minima are narrow
+    two_sided: tuple[float, ...] = (0.05, 0.15, 0.35, 0.65, 1.0)  # on either side
+    paired: tuple[float, ...] = (0.2, 0.6)  # where two strengths are searched together
+    shapes: tuple[float, ...] = (0.0, 0.3, 1.0)  # of the range of a velocity or another parameter that is no strength
+    beyond: float = 1.5  # how far past its range a strength is fitted; there it loses its claim to the name
 
-    def __call__(self, phase: str) -> None:
-        """Begin a phase; without a word, some work of it is done."""
-        now = time.monotonic()
-        if phase:
-            self._console.status(phase)
-            self._phase, self._fits, self._begun, self._said = phase, 0, now, now
-            return
-        checkpoint()
-        self._fits += 1
-        if now - self._said > QUIET:
-            self._console.status(f"{self._phase}: {self._fits} fits in {now - self._begun:.0f} s")
-            self._said = now
+
+@dataclass(frozen=True)
+class FitSettings:
+    """How a hypothesis is fitted."""
+
+    rounds: int = 4  # steps of a descent, at most
+    every: int = 2  # steps for which sensitivities to the calibration, which change little, are kept
+    dampings: tuple[float, ...] = (0.0, 1.0, 30.0)  # shares of the diagonal: friction's derivatives hold nearby only
+    well: float = 0.05  # relative descent of a step beside which others are not tried
+    enough: float = 1e-3  # relative descent at which a fit ends
+    factors: tuple[float, ...] = (1.2, 1.08)  # of a parameter, in a search without derivatives
+    poor: float = 1.5  # cost of a residual that makes such a search worth its time
+    probe: float = 0.02  # share of a parameter's range by which a derivative is probed
+    share: float = 0.2  # and of a positive parameter's value, at most
+    parts: float = 2.0  # change of a parameter's logarithm in one step, at most: a factor of 7
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Which hypotheses are tried, and what one has to gain to stand."""
+
+    noise_cost: float = 0.96  # of a residual that is nothing but noise: 0.947 if exactly normal. Estimate
+    gain: float = 20.0  # least gain of an effect: log-odds of 10, against some hundred candidates and scopes. Estimate
+    chance: float = 1.3  # how far above the best gain of chance, of a few simulated nulls, an effect has to be
+    walk_share: float = (
+        0.1  # share of the cost that chance gains on the ground, where no log is simulated. Measured on walks
+    )
+    shaking_share: float = 0.1  # the same of joints that shake: their phase is chance. Estimate
+    least_share: float = 0.2  # of what is left, that a further effect has to explain. Estimate
+    minor: float = 0.005  # of what is explained already: less is no cause but a flaw of the model
+    flaw: float = 0.005  # of the calibration's cost, that a simulator's own flaws (its time step) let any effect gain
+    room: float = 1.0  # cost of a residual that leaves room for a second effect
+    room_after: float = 1.1  # and for a third and later ones: these have to be more than small
+    hidden: float = 1.5  # mean prior cost of a shift beyond which the calibration hides a cause; 1 is what it costs
+    leads: int = 8  # that are fitted after the first screening
+    leads_after: int = 5  # that are fitted beside an effect that stands already
+    per_effect: int = 2  # of these, of one effect
+    beam: int = 2  # single effects that are continued
+    few: int = 20  # training windows of which a screening leaves none out
+    walk_windows: int = 8  # of a walk that a screening looks at
+    invisible: float = 0.25  # rms [floors] below which the strongest setting of an effect leaves no trace
+    dominant: float = 0.25  # share of the excess that makes a joint a suspect, in which every effect is tried alone
+    suspects: int = 2  # such joints, at most
+    near: float = 0.2  # share of what is explained within which rivals are polished, where joints shake
+    challengers: int = 2  # how many of them
+    apart: float = 1.5  # spreads by which the mean calibration of a group is off that is a cause's
+    many: int = 4  # joints whose mean zero is looked at
+    aside: float = 4.0  # standard errors by which it is off that are no chance
+    restarts: int = 40  # windows that measure what a log of a walk does not show
+    same_robot: float = 0.3  # of the usual spread: how far a calibration may change from a reference to the log
+    clock_starts: tuple[float, ...] = (0.002, 0.02, 0.05)  # where a fit of two clocks' shift starts [s]
+    fit: FitSettings = field(default_factory=FitSettings)
+    grids: GridSettings = field(default_factory=GridSettings)
+
+
+@dataclass(frozen=True)
+class PlausibilitySettings:
+    """What a logged channel has to show of a cause."""
+
+    spread: tuple[float, float] = (2.0, 98.0)  # percentiles between which a channel moves
+    sag: float = 0.2  # predicted fall of the voltage from which on a log has to show it [V]
+    sag_share: float = 0.5  # and the least part of it that it must show
+    warmth: float = 1.0  # by which a motor warms up in an episode before its gain can fade for it [°C]
+    worse: float = 1.3  # factor on the error of a predicted torque, with a cause over without it, that refutes it
+
+
+@dataclass(frozen=True)
+class VerdictSettings:
+    """What the evidence allows to say."""
+
+    survivors: int = 3  # hypotheses that duel, at most
+    behind: float = 200.0  # cost by which one may be behind to duel
+    behind_share: float = 0.1  # or share of what is explained
+    settle: int = 25  # ticks for which the first command is held before a simulated record begins
+    start: float = 0.02  # spread of the joints before that [rad]
+    separated: float = 0.75  # probability below which two causes are not told apart: odds of 3
+    blunt: float = 12.0  # least spread of a difference of costs, where no self-test has measured it
+    coarse: float = 0.12  # share of a difference of costs that an imperfect model makes. Estimate
+    walk_doubt: float = 0.05  # share of the cost by which two causes differ by chance on the ground. Estimate
+    shaking_doubt: float = 0.08  # the same of joints that shake. Estimate
+    foreign: float = 1.12  # remaining cost, and
+    explained: float = 0.85  # share explained, beyond which nothing of the library is the cause
+    local: float = 1.5  # remaining cost of one joint that is as strange
+    soft: float = 0.15  # how gradually strangeness turns into `unknown`
+    unrivalled: float = 0.9  # probability of an effect in whose place no other was tried: where replays are slow
+    lone: float = 0.8  # factor on probabilities where parts of one motion are held out: they share what is its own
+    whole: float = 0.9  # share of the excess from which on causes are all there is
+    sure: float = 0.9  # probability of every cause from which on they are the causes
+    even: float = 0.5  # and probable ones
+    wider: float = 2.0  # than white noise makes intervals: residuals of a joint hang together in time. Estimate
+    off: float = 4.5  # spreads from which on a calibration is out of family: nearly what a rotor may be too light by
+    far: float = 2.0  # floors above which a part of the log may be unexplained,
+    as_before: float = 0.95  # if it is more than this share of what it was before,
+    farthest: float = 5.0  # or above as many floors
+    no_excess: float = 0.02  # in squared floors: below it there is nothing to shrink
+    limit: float = 0.5  # share of a documented range above which a limit says nothing
+    hardly: float = 0.002  # share that is hardly any of an effect: play of no width has teeth that give all the same
+    halvings: int = 4  # of a limit: to a factor of 1.4
+    limit_rounds: int = 3  # of its fits
+    asked: float = 0.05  # command [rad],
+    stuck: float = 0.1  # and share of it, below which a joint that moves less does not move
+    rough: float = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
+    left: float = 0.1  # share of the held-out excess that is left, from which on something else is at work
+
+    def widening(self, remaining: float) -> float:
+        """Return how much wider an interval is than noise alone makes it: what is left unexplained widens it.
+
+        Args:
+            remaining: Cost of a residual over that of noise.
+        """
+        return self.wider * math.sqrt(max(1.0, remaining))
+
+
+@dataclass(frozen=True)
+class LocaliseSettings:
+    """Where residuals are looked at apart."""
+
+    rest: float = 0.01  # share of the no-load speed: slower is rest
+    fast: float = 0.12  # and faster is fast
+    reversal: float = 0.06  # before and after a change of direction [s]
+    loaded: float = 0.4  # share of the torque limit that the nominal servo would want
+    saturated: float = 1.0
+    contact: float = 0.08  # after a foot has touched the ground [s]
+    samples: int = 400  # of the bootstrap
+    above: float = 1.1  # floors: a lower bound has to be above it, for of many cells some are high by chance
+    least: int = 3  # samples that have to show a cell, and windows a pair of joints
+    alike: float = 0.1  # share of the larger reach by which those of two commands may differ
+
+
+@dataclass(frozen=True)
+class DesignSettings:
+    """When a question is worth asking, and how a next experiment is chosen."""
+
+    strength: float = 0.5  # share of the way to the end of its range at which an effect should be seen
+    visible: float = 30.0  # log-odds from which a log shows an effect of that strength: two a joint of a NAO
+    dry: tuple[float, ...] = (0.0, 0.03, 0.1, 0.22, 0.45)  # Coulomb friction tried in load friction's place [N·m]
+    loose: float = 10.0  # how much freer the calibration is beside it: under one load the two are one
+    enough: float = 30.0  # log-odds with which a question is answered: what comes on top decides only between equals
+    worth: float = 3.0  # log-odds below which a motion is not worth playing
+    certain: float = 100.0  # log-odds beyond which their size says nothing any more
+    listed: int = 4  # effects that a sentence names
+    threads: int = 2  # of a rehearsal: more would hold more logs at once for little
+    wrong: float = 1.0  # share of a load beyond which it is no longer taken for wrong instead of a zero
+    zero: float = 1.5  # spreads of the zeros of one make beyond which a zero is worth a thought
+    told_apart: float = 30.0  # squared distance, in noise, from which on a log tells a zero from a load
+    windows: int = 60  # whose gravity is looked at
+    positions: int = 21  # of a joint between which the farthest two are chosen
+    own: float = 1.2  # times as much another joint has to do to be moved in a joint's place
+    rungs: int = 5  # of each joint on a ladder of poses
+    hold: float = 0.8  # of a rung [s]
+    way: float = 0.8  # least time from one rung to the next [s]
+    plays: int = 3  # of a rung: two variants and a repeat

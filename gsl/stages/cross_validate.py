@@ -15,18 +15,19 @@ from gsl.core.labels import alike
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.core.transitions import usable
-from gsl.diagnosis import nuisance
-from gsl.diagnosis.attribute import Hypothesis
-from gsl.diagnosis.candidates import library
-from gsl.diagnosis.diagnose import Findings, diagnosed, prepared
-from gsl.diagnosis.experiment import Experiment
-from gsl.diagnosis.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
-from gsl.diagnosis.options import Options
-from gsl.diagnosis.records import Record
-from gsl.diagnosis.settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
-from gsl.diagnosis.shrinkage import ceiling, removed
-from gsl.diagnosis.whole import mean_errors
-from gsl.effects.effect import applied, built, effect_class
+from gsl.diagnosis.diagnose import diagnose, prepare
+from gsl.diagnosis.hypothesis.candidates import library
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
+from gsl.diagnosis.log.files import check_log, clock_caveat, log_parents, on_ground, read_logs, share_clock
+from gsl.diagnosis.log.log import Log
+from gsl.diagnosis.log.records import Record
+from gsl.diagnosis.options import Clocks, Duels, Most, Nulls, Options, PhaseReporter, Tolerance, Without
+from gsl.diagnosis.simulate.calibration import no_shifts
+from gsl.diagnosis.simulate.in_the_air import change
+from gsl.diagnosis.simulate.simulator import mean_errors
+from gsl.diagnosis.verdict.findings import Findings
+from gsl.diagnosis.verdict.shrinkage import ceiling, removed_share
+from gsl.effects.effect import effect_class
 from gsl.errors import ConfigError, InputError
 from gsl.report.cross_validation import (
     AS_IT_WAS,
@@ -113,7 +114,7 @@ class CrossValidate:
         check_log(log, lumped(self.sim.plant.robot), self.real)
         if on_ground(log):
             raise InputError(f"{self.real}: whole replays are for logs in the air")
-        if caveat := other_clocks(log, self.clocks):
+        if caveat := clock_caveat(log, self.clocks):
             console.status(f"warning: {caveat}")
         groups = self._groups(log)
         if self.gat is not None:
@@ -157,14 +158,14 @@ class CrossValidate:
         told = f"{self.by} {', '.join(map(str, values))}"
         console.status(f"{told} is held out")
         options = Options(
-            self.without, self.most, self.duels, self.nulls, threads(self.workers), synchronised(log, self.clocks),
+            self.without, self.most, self.duels, self.nulls, threads(self.workers), share_clock(log, self.clocks),
             seed=self.seed, tolerance=self.tolerance, held_out={self.by: inner} if inner else {},
         )  # fmt: skip
         plant, robot = self.sim.plant, lumped(self.sim.plant.robot)
-        found = diagnosed(self._rest(log, values), robot, plant, self.sim.step, options, Telling(console))
-        exp, chosen = prepared(log, robot, replace(options, held_out={self.by: values})), found.selection.chosen
-        before = found.simulator.told({}, nuisance.none(len(exp.joints)), exp.pieces)
-        after = found.simulator.told(chosen.effects, chosen.fit.nuisances, exp.pieces)
+        found = diagnose(self._rest(log, values), plant, self.sim.step, options, PhaseReporter(console))
+        exp, chosen = prepare(log, robot, replace(options, held_out={self.by: values})), found.selection.chosen
+        before = found.simulator.simulate({}, no_shifts(len(exp.joints)), exp.pieces)
+        after = found.simulator.simulate(chosen.effects, chosen.fit.shifts, exp.pieces)
         causes = [chosen.names[one.index] for one in found.verdict.causes]
         console.status(f"{told}: {' '.join([found.verdict.word, *causes])}")
         errors, servos = self._errors(found, _checked(exp))
@@ -173,7 +174,7 @@ class CrossValidate:
             verdict=found.verdict.word,
             causes=causes,
             parameters=chosen.effects,
-            removed=removed(exp, *(exp.comparison.residual(one, exp.pieces) for one in (before, after)))[0],
+            removed=removed_share(exp, exp.residual(before), exp.residual(after))[0],
             ceiling=ceiling(exp, before, seed=self.seed),
             names=[one.name for one in _checked(exp)],
             errors=errors,
@@ -188,12 +189,12 @@ class CrossValidate:
 
     def _errors(self, found: Findings, held: Sequence[Record]) -> tuple[dict[str, list[float]], dict[str, Any]]:
         """Return the mean absolute error of every held-out trajectory [rad] by what replays it, and what servos say."""
-        n = len(found.experiment.joints)
-        ways: dict[str, tuple[Mapping[str, Any], np.ndarray]] = {AS_IT_WAS: ({}, nuisance.none(n))}
+        n = len(found.log.joints)
+        ways: dict[str, tuple[Mapping[str, Any], np.ndarray]] = {AS_IT_WAS: ({}, no_shifts(n))}
         fits = {CALIBRATED: found.selection.none, _names(self.usual): _usual(found, self.usual)}
         for way, fit in {**fits, DIAGNOSED: found.selection.chosen}.items():
-            ways[way] = fit.effects, fit.fit.nuisances
-        robot = found.experiment.robot
+            ways[way] = fit.effects, fit.fit.shifts
+        robot = found.log.robot
         errors = {
             way: mean_errors(found.simulator, effects, nuisances, held, robot).mean(axis=1).tolist()
             for way, (effects, nuisances) in ways.items()
@@ -201,29 +202,29 @@ class CrossValidate:
         for name, way in ((GAT, AS_IT_WAS), (DIAGNOSED_GAT, DIAGNOSED)) if self.gat is not None else ():
             assert self.gat is not None
             world = Simulated(self.sim, found.simulator, robot, *ways[way])
-            errors[name] = self.gat.errors(world, found.experiment.records, held, self.seed)
+            errors[name] = self.gat.errors(world, found.log.records, held, self.seed)
         servos: dict[str, Any] = {}
         for name, way in ((SERVO, AS_IT_WAS), (DIAGNOSED_SERVO, DIAGNOSED)) if self.servo else ():
             effects, nuisances = ways[way]
-            plant = nuisance.calibrated(applied(found.simulator.plant, built(effects)), nuisances)
+            plant = change(found.simulator.plant, effects, nuisances)
             errors[name], servos[name] = servo_errors(
-                found.experiment, plant, found.simulator.step, held, seed=self.seed, threads=threads(self.workers)
+                found.log, plant, found.simulator.step, held, seed=self.seed, threads=threads(self.workers)
             )
         return errors, servos
 
 
-def _checked(exp: Experiment) -> list[Record]:
+def _checked(exp: Log) -> list[Record]:
     """Return the trajectories that are held out, those too short for a window left out."""
     return [exp.records[k] for k in np.unique(exp.pieces.record[exp.held_out])]
 
 
 def _usual(found: Findings, effects: Sequence[str]) -> Hypothesis:
     """Return these effects on all joints, fitted together as a diagnosis fits a hypothesis."""
-    arena = found.arena
-    everywhere = {one.effect: one for one in library(found.experiment.robot) if one.on_joints}
+    problem = found.problem
+    everywhere = {one.effect: one for one in library(found.log.robot) if one.on_joints}
     chosen = tuple(everywhere[name] for name in effects)
     start = [one.neutral + SLIGHT * (one.documented[1] - one.neutral) for one in chosen]
-    return arena.fitted(chosen, np.concatenate(start), nuisance.none(arena.train.joints), every=1, rounds=8)
+    return problem.fit(chosen, np.concatenate(start), no_shifts(problem.train.joints), every=1, rounds=8)
 
 
 def _names(effects: Sequence[str]) -> str:

@@ -16,22 +16,21 @@ from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.command_file import write_next_experiment
-from gsl.diagnosis.diagnose import Findings, diagnosed
-from gsl.diagnosis.document import document
-from gsl.diagnosis.limits import limits
-from gsl.diagnosis.logs import check_log, log_parents, on_ground, other_clocks, read_logs, synchronised
-from gsl.diagnosis.options import Options
-from gsl.diagnosis.policy_gap import Effort, policy_gap
-from gsl.diagnosis.real_returns import RealReturns, measured_parents, real_returns
-from gsl.diagnosis.settings import Clocks, Duels, Most, Nulls, Telling, Tolerance, Without
-from gsl.diagnosis.verify import in_bullet
-from gsl.diagnosis.world_file import diagnosed_effects, joined
+from gsl.diagnosis.design.next_experiment import write_next_experiment
+from gsl.diagnosis.diagnose import diagnose
+from gsl.diagnosis.log.files import check_log, clock_caveat, log_parents, on_ground, read_logs, share_clock
+from gsl.diagnosis.options import Clocks, Duels, Most, Nulls, Options, PhaseReporter, Tolerance, Without
+from gsl.diagnosis.simulate.simulator import compare_with_bullet
+from gsl.diagnosis.verdict.document import document
+from gsl.diagnosis.verdict.findings import Findings, join_effects
+from gsl.diagnosis.verdict.limits import limits
 from gsl.errors import InputError
 from gsl.report.diagnosis import report_html
 from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.diagnosis_report import PAGE, REPORT, SIMULATOR, WORLD, report_of
+from gsl.validation.policy_gap import Effort, policy_gap
+from gsl.validation.real_returns import RealReturns, measured_parents, real_returns
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.held import refuse_hook
 from gsl.worlds.velocity_motors import check_servos
@@ -81,7 +80,6 @@ class Diagnose:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json, report.html, the diagnosed world and the next experiment."""
         begin = time.perf_counter()
-        robot = lumped(self.sim.plant.robot)
         measured = real_returns(self.policies, self.sim, trust=self.trust) if self.policies else None
         logs = {role: self._read(role) for role in ("real", "reference") if getattr(self, role)}
         if "reference" in logs and any(on_ground(log) for log in logs.values()):
@@ -90,19 +88,11 @@ class Diagnose:
             )
         if warning := self._stranger(logs["real"]):
             console.status(f"warning: {warning}")
-        telling = Telling(console)
-        found = diagnosed(
-            logs["real"],
-            robot,
-            self.sim.plant,
-            self.sim.step,
-            self._options(logs["real"]),
-            telling,
-            reference=logs.get("reference"),
-            walking=on_ground(logs["real"]),
-        )
-        gap = self._policy_gap(measured, found, console) if measured else None
-        return self._written(found, logs["real"], gap, folder, telling, begin)
+        tick, options = PhaseReporter(console), self._options(logs["real"])
+        plant, step = self.sim.plant, self.sim.step
+        findings = diagnose(logs["real"], plant, step, options, tick, reference=logs.get("reference"))
+        gap = self._policy_gap(measured, findings, console) if measured else None
+        return self._write(findings, logs["real"], gap, folder, tick, begin)
 
     def document(self, folder: Path) -> dict[str, Any]:
         """Return what --json shows of an artifact: the report without its curves."""
@@ -123,67 +113,75 @@ class Diagnose:
 
     def _options(self, batch: Batch) -> Options:
         return Options(
-            self.without, self.most, self.duels, self.nulls, threads(self.workers), synchronised(batch, self.clocks),
+            self.without, self.most, self.duels, self.nulls, threads(self.workers), share_clock(batch, self.clocks),
             seed=self.seed, tolerance=self.tolerance, held_out=self.held_out,
         )  # fmt: skip
 
-    def _policy_gap(self, measured: RealReturns, found: Findings, console: Console) -> Mapping[str, Any]:
+    def _policy_gap(self, measured: RealReturns, findings: Findings, console: Console) -> Mapping[str, Any]:
         effort = Effort(self.episodes, threads(self.workers), self.seed)
-        after = replace(self.sim, effects=self._effects(found))
-        named = bool(found.answer.candidates)
+        after = replace(self.sim, effects=self._effects(findings))
+        named = bool(findings.answer.candidates)
         return policy_gap(measured, self.sim, after, named=named, effort=effort, console=console)
 
-    def _written(
+    def _write(
         self,
-        found: Findings,
+        findings: Findings,
         batch: Batch,
         gap: Mapping[str, Any] | None,
         folder: Path,
-        telling: Telling,
+        tick: PhaseReporter,
         begin: float,
     ) -> Mapping[str, Any]:
-        checked = found.verdict.word in ("causes", "inseparable") and not found.experiment.walking
-        told = document(
-            found,
-            verified=in_bullet(found, iterations=self.sim.iterations) if checked else None,
-            next_experiment=write_next_experiment(found, self.sim.robot, folder),
-            effects=diagnosed_effects(found),
+        report = document(
+            findings,
+            verified=self._verify(findings),
+            next_experiment=write_next_experiment(findings, self.sim.robot, folder),
+            effects=findings.effects,
             policy_gap=gap,
             world_file=WORLD,
             report=PAGE,
-            data=self._data(found, batch),
+            data=self._data(findings, batch),
             command=self._command(),
-            own=self._own(found),
+            own=self._own(findings),
         )
         if self.limits:
-            told["limits"] = [asdict(one) for one in limits(found, told["shrinkage"], telling)]
-        told["seconds"] = time.perf_counter() - begin
-        told["caveats"] += filter(None, [self._stranger(batch), other_clocks(batch, self.clocks)])
-        documents.write_json(folder / REPORT, told)
-        (folder / PAGE).write_text(report_html(told), encoding="utf-8")
+            report["limits"] = [asdict(one) for one in limits(findings, report["shrinkage"], tick)]
+        report["seconds"] = time.perf_counter() - begin
+        report["caveats"] += filter(None, [self._stranger(batch), clock_caveat(batch, self.clocks)])
+        documents.write_json(folder / REPORT, report)
+        (folder / PAGE).write_text(report_html(report), encoding="utf-8")
         (folder / WORLD).parent.mkdir()
-        (folder / WORLD).write_text(self._world(found, told["summary"]), encoding="utf-8")
-        if told["own"]:
+        (folder / WORLD).write_text(self._world(findings, report["summary"]), encoding="utf-8")
+        if report["own"]:
             plain = yaml.safe_dump(documents.plain(described(self.sim)), sort_keys=False, allow_unicode=True)
             (folder / SIMULATOR).write_text(
                 f"# The simulator that was diagnosed, as it was.\n{plain}", encoding="utf-8"
             )
         return {
-            "verdict": told["verdict"],
-            "causes": [one["effect"] for one in told["causes"]],
-            "before": told["shrinkage"]["before"],
-            "after": told["shrinkage"]["after"],
-            "fraction": told["shrinkage"]["fraction"],
+            "verdict": report["verdict"],
+            "causes": [one["effect"] for one in report["causes"]],
+            "before": report["shrinkage"]["before"],
+            "after": report["shrinkage"]["after"],
+            "fraction": report["shrinkage"]["fraction"],
         }
 
-    def _own(self, found: Findings) -> dict[str, Any] | None:
+    def _verify(self, findings: Findings) -> Mapping[str, Any] | None:
+        """Return how far Bullet differs from the chain model in a log of the air whose causes are named."""
+        if not findings.verdict.names_causes or findings.log.walking:
+            return None
+        answer = findings.answer
+        return compare_with_bullet(
+            findings.log, findings.simulator, answer.effects, answer.fit.shifts, self.sim.iterations
+        )
+
+    def _own(self, findings: Findings) -> dict[str, Any] | None:
         """Return what commands for another robot than the default one have to name."""
         if self.sim.robot == DEFAULT_ROBOT:
             return None
-        return {"robot": self.sim.robot, "period": found.experiment.period, "world": PurePosixPath(SIMULATOR).stem}
+        return {"robot": self.sim.robot, "period": findings.log.period, "world": PurePosixPath(SIMULATOR).stem}
 
     def _command(self) -> str:
-        """Return the settings to type again, of those that say what is diagnosed; the simulator is told in the data."""
+        """Return the settings to type again, of those that say what is diagnosed; the data name the simulator."""
         said = [f"real={self.real}"]
         said += [f"reference={self.reference}"] if self.reference else []
         said += [f"without=[{','.join(self.without)}]"] if self.without else []
@@ -193,33 +191,33 @@ class Diagnose:
         said += [f"clocks={self.clocks}"] if self.clocks else []
         return shlex.join(["gsl", "diagnose", *said])
 
-    def _data(self, found: Findings, batch: Batch) -> dict[str, Any]:
-        exp = found.experiment
-        held = {int(k) for k in exp.pieces.record[exp.held_out]}
+    def _data(self, findings: Findings, batch: Batch) -> dict[str, Any]:
+        log = findings.log
+        held = {int(k) for k in log.pieces.record[log.held_out]}
         return {
-            "robot": exp.robot.name,
+            "robot": log.robot.name,
             "sim": f"the simulated {self.sim.robot}"
             + (" with " if self.sim.effects else "")
             + ", ".join(self.sim.effects),
-            "records": len(exp.records),
-            "seconds": sum(len(one) for one in exp.records) * exp.period,
-            "train": len(exp.records) - len(held) if exp.by_record else len(exp.records),
+            "records": len(log.records),
+            "seconds": sum(len(one) for one in log.records) * log.period,
+            "train": len(log.records) - len(held) if log.by_record else len(log.records),
             "held_out": len(held),
-            "windows": len(exp.pieces),
+            "windows": len(log.pieces),
             "source": self.real,
             "reference": self.reference,
-            "engine": "bullet" if exp.walking else "chain",
+            "engine": "bullet" if log.walking else "chain",
         }
 
-    def _effects(self, found: Findings) -> dict[str, Any]:
+    def _effects(self, findings: Findings) -> dict[str, Any]:
         """Return all effects of the diagnosed simulator, those that it had before included."""
-        return joined([described(self.sim)["effects"], diagnosed_effects(found)])
+        return join_effects(described(self.sim)["effects"], findings.effects)
 
-    def _world(self, found: Findings, summary: str) -> str:
-        config = described(self.sim) | {"effects": self._effects(found)}
+    def _world(self, findings: Findings, summary: str) -> str:
+        config = described(self.sim) | {"effects": self._effects(findings)}
         text = yaml.safe_dump(documents.plain(config), sort_keys=False, allow_unicode=True)
-        told = "with it switched on, and calibrated" if found.answer.candidates else "calibrated"
-        return f"# {summary}\n# The simulator {told} joint by joint.\n{text}"
+        how = "with it switched on, and calibrated" if findings.answer.candidates else "calibrated"
+        return f"# {summary}\n# The simulator {how} joint by joint.\n{text}"
 
 
 def _typed(value: Any) -> str:

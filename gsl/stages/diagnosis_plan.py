@@ -9,7 +9,7 @@ from typing import Annotated
 from gsl.core.console import Console
 from gsl.core.interfaces import REAL, Grounding, World
 from gsl.core.setting import component, setting
-from gsl.diagnosis.settings import Without
+from gsl.diagnosis.options import Without
 from gsl.errors import ConfigError
 from gsl.grounding.diagnosis_file import Diagnosis, read_diagnosis
 from gsl.grounding.effects import DiagnosedEffects, innermost, switched_on

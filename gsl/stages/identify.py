@@ -15,17 +15,17 @@ from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
-from gsl.diagnosis import nuisance
-from gsl.diagnosis.arena import arena_of
-from gsl.diagnosis.identified import identified
-from gsl.diagnosis.logs import log_parents, read_motions
-from gsl.diagnosis.options import Options
-from gsl.diagnosis.replay import Bench, Effects
-from gsl.diagnosis.settings import Without
-from gsl.diagnosis.world_file import joined
+from gsl.diagnosis.log.files import log_parents, read_motions
+from gsl.diagnosis.options import Options, Without
+from gsl.diagnosis.search.reference import Nominal
+from gsl.diagnosis.simulate.calibration import no_shifts
+from gsl.diagnosis.simulate.in_the_air import Effects
+from gsl.diagnosis.simulate.simulator import Bench
+from gsl.diagnosis.verdict.findings import join_effects
 from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.diagnosis_report import REPORT
+from gsl.training.system_identification import identify
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.held import refuse_hook
 from gsl.worlds.velocity_motors import check_servos
@@ -60,14 +60,14 @@ class Identify:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json and the identified world."""
-        found = read_motions(self.real, lumped(self.sim.plant.robot))
+        log = read_motions(self.real, lumped(self.sim.plant.robot))
         options = Options(self.without, threads=threads(self.workers))
-        arena = arena_of(found, self.sim.plant, self.sim.step, options, lambda phase: checkpoint())
+        problem = Nominal(self.sim.plant, self.sim.step).problem(log, options, lambda phase: checkpoint())
         with console.progress(self.evaluations, "fitting all parameters at once") as progress:
-            fitted = identified(arena, evaluations=self.evaluations, seed=self.seed, tick=progress.advance)
-        before, after = (_gap(arena.held_out, effects) for effects in ({}, fitted.effects))
-        effects = joined([fitted.effects])
-        fit = f"{len(fitted.candidates)} parameters of {len(effects)} effects were fitted at once"
+            system = identify(problem, evaluations=self.evaluations, seed=self.seed, tick=progress.advance)
+        before, after = (_gap(problem.held_out, effects) for effects in ({}, system.effects))
+        effects = join_effects(system.effects)
+        fit = f"{len(system.candidates)} parameters of {len(effects)} effects were fitted at once"
         summary = f"{fit}: held out, {before:.1f} noise floors became {after:.1f}."
         report = {
             "verdict": "identified",
@@ -77,7 +77,7 @@ class Identify:
             "shrinkage": {"before": before, "after": after},
         }
         documents.write_json(folder / REPORT, report)
-        world = described(replace(self.sim, effects=joined([described(self.sim)["effects"], effects])))
+        world = described(replace(self.sim, effects=join_effects(described(self.sim)["effects"], effects)))
         (folder / WORLD).parent.mkdir()
         text = yaml.safe_dump(documents.plain(world), sort_keys=False, allow_unicode=True)
         (folder / WORLD).write_text(f"# {summary}\n{text}", encoding="utf-8")
@@ -86,6 +86,6 @@ class Identify:
 
 def _gap(bench: Bench, effects: Effects) -> float:
     """Return the root mean square of the residuals [noise floors]."""
-    z = bench.residual(effects, nuisance.none(bench.joints))
+    z = bench.residual(effects, no_shifts(bench.joints))
     used = bench.comparison.used(z.shape[1])
     return float(np.sqrt((z**2).sum() / (used.sum() * len(z))))

@@ -14,10 +14,9 @@ from gsl.core.body import lumped
 from gsl.core.console import Console
 from gsl.core.described import described
 from gsl.core.setting import component, setting
-from gsl.diagnosis.experiment import Experiment
-from gsl.diagnosis.logs import check_log, log_parents, on_ground, read_logs, read_motions
-from gsl.diagnosis.settings import Tolerance
-from gsl.diagnosis.torque_width import held_out_widths
+from gsl.diagnosis.log.files import check_log, log_parents, on_ground, read_logs, read_motions
+from gsl.diagnosis.log.log import Log
+from gsl.diagnosis.options import Tolerance
 from gsl.errors import ConfigError, InputError
 from gsl.models.servo import ServoModel, neutral
 from gsl.models.servo_file import FILE
@@ -30,6 +29,7 @@ from gsl.storage.workplace import destination
 from gsl.training.learn_servo import LearnedServo, document, learn_servo
 from gsl.training.servo_verdict import problems, remarks
 from gsl.training.servo_walks import Walks, walks
+from gsl.training.torque_width import held_out_widths
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.fits import fitting_step
 from gsl.worlds.held import refuse_hook
@@ -94,7 +94,7 @@ class TrainServo:
         noise = dict(zip(model.joints, model.noise.tolist(), strict=True))
         return {**told, "torque_noise": noise, "problems": problems(told)}
 
-    def _walks(self, exp: Experiment) -> Walks | None:
+    def _walks(self, exp: Log) -> Walks | None:
         """Return the log on the ground, if there is one.
 
         Raises:
@@ -111,7 +111,7 @@ class TrainServo:
             raise InputError(f"{self.walks}: has another control period, {rates}; resample one of them")
         return walks(batch, exp.robot, self.sim.plant, self.sim.step, threads(self.workers))
 
-    def _unexplained(self, exp: Experiment, model: ServoModel) -> np.ndarray:
+    def _unexplained(self, exp: Log, model: ServoModel) -> np.ndarray:
         """Return the torque noise that held-out motions leave unexplained [N·m], at every step and constant, (n, 2)."""
         group = neutral(self.sim.plant, np.random.default_rng(0)).group  # of those that keep their servo, too
         groups = {name: group[: len(exp.joints)] == g for g, name in enumerate(model.groups)}

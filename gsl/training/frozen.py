@@ -8,7 +8,7 @@ import numpy as np
 
 from gsl.core.compiled import compiled
 from gsl.core.plant import Plant
-from gsl.diagnosis.records import Pieces
+from gsl.diagnosis.log.records import Pieces
 from gsl.worlds.chain import COLUMNS, Chain, accelerate, chain, nothing
 from gsl.worlds.servo_state import ROTOR, packed
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gsl.diagnosis.residual import loss
+from gsl.diagnosis.log.residual import loss
 
 SAMPLES = 1000  # of a bootstrap
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.diagnosis.experiment import Experiment
+from gsl.diagnosis.log.log import Log
 from gsl.errors import InputError
 from gsl.models.servo import ServoModel, neutral, with_groups, without_group
 from gsl.training.servo_bench import CHANCE, LIKELY, Duel, ServoBench, cut_windows
@@ -61,7 +61,7 @@ class LearnedServo:
 
 
 def learn_servo(
-    exp: Experiment,
+    exp: Log,
     plant: Plant,
     step: float,
     *,
@@ -121,7 +121,7 @@ def learn_servo(
         some = cut_windows(exp, parts.train, SHORT)
 
         def member(begun: ServoModel, index: np.ndarray) -> ServoModel:
-            new = bench.network(some.chosen(index), parts.judge, begun, ITERATIONS)[0]
+            new = bench.network(some.take(index), parts.judge, begun, ITERATIONS)[0]
             return with_groups(new, begun, bare | bench.refuse([Duel(parts.held, begun, new)], 1.0 - CHANCE, WORTH))
 
         others = further(
@@ -133,7 +133,7 @@ def learn_servo(
         return LearnedServo(model, gaps[0], gaps[1], worse, way, sizes, tuple(others), on_foot, exp.by_record)
 
 
-def _check_motion(exp: Experiment) -> None:
+def _check_motion(exp: Log) -> None:
     """Refuse a log that shows nothing of its servos.
 
     Raises:

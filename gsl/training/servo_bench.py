@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.diagnosis.experiment import Experiment
-from gsl.diagnosis.records import Pieces, pieces
-from gsl.diagnosis.residual import Comparison
+from gsl.diagnosis.log.log import Log
+from gsl.diagnosis.log.records import Pieces, cut_pieces
+from gsl.diagnosis.log.residual import Comparison
 from gsl.models.servo import ServoModel, with_group
 from gsl.training.frozen import freeze
 from gsl.training.held_out_change import levels, relative_changes
@@ -38,7 +38,7 @@ class Duel(NamedTuple):
 class ServoBench:
     """A log on which servos are compared, in windows of a second; `start` changes nothing."""
 
-    exp: Experiment
+    exp: Log
     replays: Replays
     start: ServoModel
 
@@ -86,7 +86,7 @@ class ServoBench:
         """
         replays, period = self.replays, self.exp.period
         alike = [
-            Alike(known, freeze(known, some.chosen(part), self.floor, period)) for known, part in replays.known(some)
+            Alike(known, freeze(known, some.take(part), self.floor, period)) for known, part in replays.known(some)
         ]
         return fit_network(
             replays.plant, begun, alike, replays.step, period, replays.pool,
@@ -96,12 +96,12 @@ class ServoBench:
     def fitted_residual(self, index: np.ndarray) -> Callable[[ServoModel], np.ndarray]:
         """Return what numbers are fitted by: residuals of long windows [floors], by model."""
         some, floor = cut_windows(self.exp, index, LONG), self.floor
-        plain = Comparison(floor, np.zeros(len(floor), dtype=bool), np.zeros(len(floor)))
+        plain = Comparison.plain(floor)
         return lambda model: plain.residual(self.replays.replay(model, some), some)
 
     def residuals(self, index: np.ndarray, model: ServoModel) -> np.ndarray:
         """Return residuals of some windows [floors], shape (W, scored, n_joints)."""
-        some = self.exp.pieces.chosen(index)
+        some = self.exp.pieces.take(index)
         return self.exp.comparison.residual(self.replays.replay(model, some), some)
 
     def level(self, index: np.ndarray, model: ServoModel) -> float:
@@ -120,7 +120,7 @@ class ServoBench:
 
     def change(self, *duels: Duel) -> dict[str, np.ndarray]:
         """Return the relative change of the robust cost in bootstraps over motions, by group, shape (SAMPLES,) each."""
-        sample = self.exp.pieces.chosen(np.concatenate([one.windows for one in duels])).samples
+        sample = self.exp.pieces.take(np.concatenate([one.windows for one in duels])).samples
         before = np.concatenate([self.residuals(one.windows, one.old) for one in duels])
         after = np.concatenate([self.residuals(one.windows, one.new) for one in duels])
         return relative_changes(before, after, sample, self.group, self.start.groups)
@@ -147,7 +147,7 @@ class ServoBench:
         """
         test, air = walks.exp.held_out, self.change(Duel(index, old, new))
         before, after = (walks.residuals(test, one) for one in (old, new))
-        sample = walks.exp.pieces.chosen(test).samples
+        sample = walks.exp.pieces.take(test).samples
         ground = relative_changes(before, after, sample, self.group, old.groups)
         for name in ground:
             if np.quantile(ground[name], LIKELY) >= 0.0 or np.quantile(air[name], CHANCE) > 0.0:
@@ -155,7 +155,7 @@ class ServoBench:
         return new
 
 
-def cut_windows(exp: Experiment, index: np.ndarray, lengths: tuple[float, float]) -> Pieces:
+def cut_windows(exp: Log, index: np.ndarray, lengths: tuple[float, float]) -> Pieces:
     """Return windows of another length of the same motions; the same ones of motions that are short or shared.
 
     Args:
@@ -167,6 +167,6 @@ def cut_windows(exp: Experiment, index: np.ndarray, lengths: tuple[float, float]
     shared = np.isin(np.delete(exp.pieces.record, index), chosen).any()  # with windows that are not to be fitted
     warm_up, scored = (max(1, round(part / exp.period)) for part in lengths)
     if shared or any(len(exp.records[k]) < warm_up + scored for k in chosen):
-        return exp.pieces.chosen(index)
-    cut = pieces([exp.records[k] for k in chosen], exp.robot, exp.period, warm_up=warm_up, scored=scored)
-    return cut.chosen(np.unique(np.linspace(0, len(cut) - 1, min(WINDOWS, len(cut))).round().astype(int)))
+        return exp.pieces.take(index)
+    cut = cut_pieces([exp.records[k] for k in chosen], exp.robot, exp.period, warm_up=warm_up, scored=scored)
+    return cut.take(np.unique(np.linspace(0, len(cut) - 1, min(WINDOWS, len(cut))).round().astype(int)))

@@ -7,16 +7,16 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from gsl.core.plant import Plant
-from gsl.diagnosis import nuisance
-from gsl.diagnosis.experiment import Experiment
-from gsl.diagnosis.records import Record
-from gsl.diagnosis.whole import mean_errors
+from gsl.diagnosis.log.log import Log
+from gsl.diagnosis.log.records import Record
+from gsl.diagnosis.simulate.calibration import no_shifts
+from gsl.diagnosis.simulate.simulator import mean_errors
 from gsl.training.learn_servo import document, learn_servo
 from gsl.training.servo_replays import Replays
 
 
 def servo_errors(
-    exp: Experiment, plant: Plant, step: float, held: Sequence[Record], *, seed: int, threads: int
+    exp: Log, plant: Plant, step: float, held: Sequence[Record], *, seed: int, threads: int
 ) -> tuple[list[float], Mapping[str, Any]]:
     """Return the mean absolute error of every held-out trajectory [rad], and what was learned.
 
@@ -34,5 +34,5 @@ def servo_errors(
     learned = learn_servo(exp, plant, step, labelled=False, seed=seed, threads=threads)
     with ThreadPoolExecutor(threads) as pool:
         replays = Replays(plant, step, exp.period, threads, pool).having(learned.model)
-        errors = mean_errors(replays, {}, nuisance.none(replays.joints), held, exp.robot)
+        errors = mean_errors(replays, {}, no_shifts(replays.joints), held, exp.robot)
     return errors.mean(axis=1).tolist(), document(learned)

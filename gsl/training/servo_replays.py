@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.diagnosis.records import Pieces
-from gsl.diagnosis.replay import Effects
+from gsl.diagnosis.log.records import Pieces
+from gsl.diagnosis.simulate.in_the_air import Effects
 from gsl.effects.effect import applied, built
 from gsl.models.servo import ServoModel
 from gsl.worlds.held import Held, Windows, shares
@@ -61,7 +61,7 @@ class Replays:
             result[index] = np.concatenate(list(self.pool.map(held.replay, windows)))[..., : self.joints]
         return result
 
-    def told(self, effects: Effects, nuisances: np.ndarray, pieces: Pieces) -> np.ndarray:
+    def simulate(self, effects: Effects, shifts: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return what the fixed servo replays, as a simulator without effects of its own does."""
-        assert not effects and not nuisances.any(), "effects lie below a learned servo"
+        assert not effects and not shifts.any(), "effects lie below a learned servo"
         return self.replay(self.model, pieces)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsl.diagnosis.experiment import Experiment
+from gsl.diagnosis.log.log import Log
 
 LEAST_CONDITIONS = 3  # known of a log, of which one is left out: two others are the least to show how a servo depends
 
@@ -31,7 +31,7 @@ class Split:
         return np.concatenate([self.judge, self.test])
 
 
-def split(exp: Experiment, *, labelled: bool) -> Split:
+def split(exp: Log, *, labelled: bool) -> Split:
     """Divide a log: held-out motions judge and test in turn; where labels chose them, all test and others judge.
 
     Args:
@@ -45,7 +45,7 @@ def split(exp: Experiment, *, labelled: bool) -> Split:
     return Split(exp.train, judge, np.setdiff1d(exp.held_out, judge))
 
 
-def left_out(exp: Experiment, parts: Split) -> list[Split]:
+def left_out(exp: Log, parts: Split) -> list[Split]:
     """Return splits that leave out one known condition each, such as a firmware gain, and test on it.
 
     A servo learned at some gains is used at others. Motions held out at the same gains cannot say how far it holds.
@@ -61,7 +61,7 @@ def left_out(exp: Experiment, parts: Split) -> list[Split]:
     return [_without(exp, parts, index) for index in kinds] if len(kinds) >= LEAST_CONDITIONS else []
 
 
-def _without(exp: Experiment, parts: Split, index: np.ndarray) -> Split:
+def _without(exp: Log, parts: Split, index: np.ndarray) -> Split:
     judge = np.setdiff1d(parts.judge, index)
     train = np.setdiff1d(np.concatenate([parts.train, parts.test]), index)
     if not judge.size:
@@ -70,7 +70,7 @@ def _without(exp: Experiment, parts: Split, index: np.ndarray) -> Split:
     return Split(train, judge, index)
 
 
-def _share(exp: Experiment, part: np.ndarray, every: int) -> np.ndarray:
+def _share(exp: Log, part: np.ndarray, every: int) -> np.ndarray:
     """Return the windows of every so many'th motion, or every so many'th window of few motions."""
     names = np.unique(exp.pieces.record[part])
     return part[np.isin(exp.pieces.record[part], names[::every])] if len(names) >= every else part[::every]

@@ -13,8 +13,8 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.experiment import Experiment, experiment
-from gsl.diagnosis.on_ground import Walking, model_error
+from gsl.diagnosis.log.log import Log, cut_log
+from gsl.diagnosis.simulate.on_ground import Walking, model_error
 from gsl.errors import InputError
 from gsl.models.servo import ServoModel
 from gsl.worlds.fits import fitting_step
@@ -32,7 +32,7 @@ class Walks:
         simulator: The robot that the servo stands on.
     """
 
-    exp: Experiment
+    exp: Log
     simulator: Walking
 
     @property
@@ -48,11 +48,11 @@ class Walks:
             index: Of the windows, shape (W,).
             model: The servo.
         """
-        some = self.exp.pieces.chosen(index)
+        some = self.exp.pieces.take(index)
         simulator = Walking(
             model.on(self.simulator.plant), self.simulator.step, self.simulator.period, workers=self.simulator.workers
         )
-        replayed = simulator.told({}, np.zeros(0), some)
+        replayed = simulator.simulate({}, np.zeros(0), some)
         return self.exp.comparison.residual(replayed, some)[..., : len(self.exp.joints)]
 
     def level(self, model: ServoModel) -> float:
@@ -73,10 +73,10 @@ def walks(batch: Batch, robot: Robot, plant: Plant, step: float, workers: int) -
     Raises:
         GslError: No walk is long enough for a window, or they are too few to fit and to check.
     """
-    exp = experiment(batch, robot, walking=True)
+    exp = cut_log(batch, robot, walking=True)
     if not len(exp.train) or not len(exp.held_out):
         raise InputError("the walks are too few to fit and to check: two of some seconds are the least")
     simulator = Walking(plant, fitting_step(step, exp.period), exp.period, workers=workers)
-    some = exp.pieces.chosen(np.arange(0, len(exp.pieces), max(1, len(exp.pieces) // ERRORS)))
+    some = exp.pieces.take(np.arange(0, len(exp.pieces), max(1, len(exp.pieces) // ERRORS)))
     error = model_error(simulator, some, np.random.default_rng(0))
     return Walks(exp.with_model_error(error), simulator)

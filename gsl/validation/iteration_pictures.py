@@ -14,7 +14,7 @@ from gsl.core.observation import missing, observations
 from gsl.core.seeds import derived_seed
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import actions
-from gsl.diagnosis.experiment import experiment
+from gsl.diagnosis.log.log import cut_log
 from gsl.grounding.none import NoGrounding
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.render import walk_strip
@@ -117,6 +117,6 @@ def _centre(world: World | EnsembleWorld | RandomisedWorld) -> BulletWorld | Non
 
 def _largest_held_out(log: Batch, world: BulletWorld) -> Trajectory:
     """Return the largest motion of a log that a diagnosis or a learned servo was not fitted to."""
-    split = experiment(log, lumped(world.plant.robot))
-    episodes = [log.episodes[k] for k in np.unique(split.pieces.record[split.held_out])]
+    split = cut_log(log, lumped(world.plant.robot))
+    episodes = [log.episodes[split.order[k]] for k in np.unique(split.pieces.record[split.held_out])]
     return max(episodes, key=lambda episode: np.ptp(episode.position, axis=0).max())

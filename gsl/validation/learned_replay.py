@@ -14,11 +14,9 @@ from gsl.core.seeds import derived_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import transitions
-from gsl.diagnosis.nuisance import calibrated
-from gsl.diagnosis.records import Record, pieces, same, slope
-from gsl.diagnosis.replay import Effects, Simulator
-from gsl.diagnosis.whole import driven, mean_errors
-from gsl.effects.effect import applied, built
+from gsl.diagnosis.log.records import Record, cut_pieces, group_alike, slope
+from gsl.diagnosis.simulate.in_the_air import Effects, change
+from gsl.diagnosis.simulate.simulator import Simulator, mean_errors
 from gsl.errors import ConfigError, GslError
 from gsl.grounding.gat import LoadedTransformation
 from gsl.models.config import FARTHEST, ModelConfig
@@ -104,10 +102,10 @@ class LearnedReplay:
             ConfigError: There are too few trajectories to learn from.
         """
         learner = replace(self, model=looking_ahead(self.model, world.extra_ticks))
-        known = [one for one in map(driven, known) if len(one) >= self.needed]
+        known = [one for one in (record.cut_to_driven() for record in known) if len(one) >= self.needed]
         self.check([len(one) for one in known], "the rest")
         every = [*known, *held]
-        kinds = same([one.conditions for one in every])
+        kinds = group_alike([one.conditions for one in every])
         kind = {k: number for number, index in enumerate(kinds) for k in index}
         solvers = [learner._solver(world, known, every[index[0]].conditions, seed) for index in kinds]
         forwards = learner._forwards(world, known, [kind[k] for k in range(len(known))], solvers, seed)
@@ -163,7 +161,7 @@ class Simulated:
     @property
     def extra_ticks(self) -> int:
         """Ticks more than one that a model has to look ahead."""
-        return extra_ticks_of(applied(self.simulator.plant, built(self.effects)).servo, self.simulator.period)
+        return extra_ticks_of(change(self.simulator.plant, self.effects).servo, self.simulator.period)
 
     def played(
         self, known: Sequence[Record], conditions: Mapping[str, Any], noise: float, seed: int
@@ -173,19 +171,19 @@ class Simulated:
         rng = np.random.default_rng(derived_seed(seed, "played"))
         for one in known:
             about, length = replace(one, about={**one.about, "conditions": conditions}), min(longest, len(one))
-            cut = pieces([about], self.robot, self.simulator.period, warm_up=0, scored=length)
+            cut = cut_pieces([about], self.robot, self.simulator.period, warm_up=0, scored=length)
             assert isinstance(cut.windows, Windows)
             commands = cut.windows.commands.copy()
             commands[:, :length] += noise * rng.standard_normal((len(cut), length, joints))[..., self.robot.drive]
             noisy = replace(cut, windows=cut.windows._replace(commands=commands))
-            told = self.simulator.told(self.effects, self.nuisances, noisy)
+            told = self.simulator.simulate(self.effects, self.nuisances, noisy)
             for start, path, asked in zip(cut.windows.motion[:, :1, :joints], told, commands, strict=True):
                 if np.isfinite(path).all():
                     yield self._trajectory(asked[:length, :joints][::-1], np.vstack([start, path]))
 
     def replayed(self, one: Record, grounding: LoadedTransformation, seed: int) -> float:
         """Return the mean absolute error of a replay behind a grounding [rad]; NaN if it diverges."""
-        one = driven(one)
+        one = one.cut_to_driven()
         if not len(one) or np.isnan(mean_errors(self.simulator, self.effects, self.nuisances, [one], self.robot)).any():
             return float("nan")  # Bullet bounds speeds, so that it does not say
         start = resting(self.robot, one.position[0][self.robot.drive], one.targets[0], floating=False)
@@ -206,8 +204,8 @@ class Simulated:
         """Return the engine with this simulator, in which a grounding can act, without noise as in all replays."""
         period, step = self.simulator.period, self.simulator.step
         world = replace(self.world, floating=False, step=step, period=period)
-        plant = calibrated(applied(self.simulator.plant, built(self.effects)), self.nuisances)
-        return BulletEnv(world, noiseless(applied(plant, built(conditions))))
+        plant = change(self.simulator.plant, self.effects, self.nuisances)
+        return BulletEnv(world, noiseless(change(plant, conditions)))
 
     def recorded(self, one: Record) -> Trajectory:
         """Return a log's trajectory as a model learns it."""

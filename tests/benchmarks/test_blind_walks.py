@@ -11,7 +11,7 @@ from commands import done
 from test_blind import answer, cause, keep_a_secret, label
 
 from gsl.core.plant import nominal
-from gsl.diagnosis.logs import on_ground
+from gsl.diagnosis.log.files import on_ground
 from gsl.effects.effect import names
 from gsl.robots.nao import nao
 from gsl.storage.trajectories import read

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,11 @@ import numpy as np
 from gsl.core.body import Robot, lumped
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.arena import arena_of
-from gsl.diagnosis.diagnose import diagnosed
-from gsl.diagnosis.document import document
-from gsl.diagnosis.experiment import experiment
+from gsl.diagnosis.diagnose import diagnose
+from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.options import Options
-from gsl.diagnosis.reference import calibrated_on
+from gsl.diagnosis.search.reference import Nominal, calibrate_on
+from gsl.diagnosis.verdict.document import document
 from gsl_benchmarks.blind.baselines import BASELINES
 
 BULKY = ("replays", "horizon", "sides", "next_experiment")  # parts of a document that no mark asks for
@@ -52,17 +51,8 @@ def answered(
 ) -> dict[str, Any]:
     """Return the document of a diagnosis with the time it took [s] and the gains of chance that it measured."""
     begin = time.perf_counter()
-    found = diagnosed(
-        question.log,
-        question.robot,
-        question.plant,
-        question.step,
-        options,
-        tick,
-        reference=question.reference,
-        walking=question.walking,
-        known_nulls=known_nulls,
-    )
+    options = replace(options, null_gains=tuple(known_nulls or ()))
+    found = diagnose(question.log, question.plant, question.step, options, tick, reference=question.reference)
     told = document(found, seconds=time.perf_counter() - begin, null_gains=list(found.null_gains))
     return {key: value for key, value in told.items() if key not in BULKY}
 
@@ -76,12 +66,12 @@ def answered_by_baselines(
     """
     if question.walking:
         return {}
-    plant, step = question.plant, question.step
-    found = experiment(question.log, question.robot)
+    nominal = Nominal(question.plant, question.step)
+    found = cut_log(question.log, question.robot)
     if question.reference is not None:
-        base = calibrated_on(question.reference, question.robot, plant, step, options, tick)
-        found, plant, options = base.taken_out(found, plant, options)
-    arena = arena_of(found, plant, step, options, tick)
+        base = calibrate_on(cut_log(question.reference, question.robot), nominal, options, tick)
+        found, nominal, options = base.take_out(found, nominal, options)
+    arena = nominal.problem(found, options, tick)
     answers = {}
     for name, baseline in BASELINES.items():
         begin = time.perf_counter()

@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from gsl.diagnosis import nuisance
-from gsl.diagnosis.attribute import Arena
-from gsl.diagnosis.candidates import Candidate, switched_on
-from gsl.diagnosis.experiment import Experiment
-from gsl.diagnosis.fit import projected, sensitivities
-from gsl.diagnosis.records import pieces
-from gsl.diagnosis.replay import Bench
-from gsl.diagnosis.screen import Ground, Lead, screened
+from gsl.diagnosis.hypothesis.candidates import Candidate, effects_of
+from gsl.diagnosis.hypothesis.problem import Problem
+from gsl.diagnosis.log.log import Log
+from gsl.diagnosis.log.records import cut_pieces
+from gsl.diagnosis.search.screening import Ground, Lead, screen_candidates
+from gsl.diagnosis.simulate.calibration import no_shifts
+from gsl.diagnosis.simulate.simulator import Bench
 from gsl_benchmarks.blind.rules import ruled
 
 GAIN, SHIFT = 20.0, 0.02  # in units of cost, or as a share of a range: less is nothing
@@ -32,36 +31,32 @@ FAR = 50.0  # floors beyond which it does not look at a residual
 Answer = dict[str, Any]
 
 
-def least_error_one_step(found: Experiment, arena: Arena) -> Answer:
+def least_error_one_step(found: Log, arena: Problem) -> Answer:
     """Return the effect with which the simulator best predicts one control period from the measured state."""
     period, robot = found.period, found.robot
     held = {int(k) for k in found.pieces.record[found.held_out]}
     kept = [one for k, one in enumerate(found.records) if k not in held] if found.by_record else list(found.records)
-    cut = pieces(kept, robot, period, warm_up=0, scored=1)
+    cut = cut_pieces(kept, robot, period, warm_up=0, scored=1)
     spread = np.unique(np.linspace(0, len(cut) - 1, min(STEPS, len(cut))).round().astype(int))
     calm = replace(found.comparison, shaking=np.zeros_like(found.comparison.shaking))
-    return _least(Bench(arena.train.simulator, cut.chosen(spread), calm), arena)
+    return _least(Bench(arena.train.simulator, cut.take(spread), calm), arena)
 
 
-def least_training_error(found: Experiment, arena: Arena) -> Answer:
+def least_training_error(found: Log, arena: Problem) -> Answer:
     """Return the effect whose replays of the training windows are nearest to the log, nuisances free."""
     return _least(arena.train, arena)
 
 
-def _least(bench: Bench, arena: Arena) -> Answer:
-    at = nuisance.none(bench.joints)
-    z = bench.residual({}, at)
-    slopes = sensitivities(bench, {}, at, z)
-    best, costs = projected(z, slopes, at, bench.simulator.spread)
-    ground = Ground({}, at, z, slopes, costs, best)
-    leads = screened(bench, ground, arena.library, arena.scopes, arena.tick).leads
-    if not leads or leads[0].cost > float(costs.sum()) - GAIN:
+def _least(bench: Bench, arena: Problem) -> Answer:
+    ground = Ground.of(bench, {})
+    leads = screen_candidates(ground, arena.library, arena.scopes, arena.tick, arena.settings).leads
+    if not leads or leads[0].cost > float(ground.costs.sum()) - GAIN:
         return _answer("no_gap", [])
     ranking = [{"effects": [lead.candidate.effect]} for lead in leads[:20]]
     return _answer("causes", [_cause(arena, leads[0])], ranking)
 
 
-def everything_at_once(found: Experiment, arena: Arena) -> Answer:
+def everything_at_once(found: Log, arena: Problem) -> Answer:
     """Return the effect that moves furthest in its documented range when all are fitted together, on all joints.
 
     Effects with several parameters have one of them fitted at a time, and stiction, which has no size alone, none.
@@ -69,11 +64,11 @@ def everything_at_once(found: Experiment, arena: Arena) -> Answer:
     library = [one for one in arena.library if len(one.free) == 1]
     start, reach = np.array([one.neutral[0] for one in library]), np.array([_reach(one) for one in library])
     ends = np.sort([(one.documented[:, 0] - one.neutral[0]) / _reach(one) for one in library], axis=1).T
-    none = nuisance.none(arena.train.joints)
+    none = no_shifts(arena.train.joints)
 
     def residual(shifted: np.ndarray) -> np.ndarray:
         values = [np.array([value]) for value in start + np.clip(shifted - 1.0, *ends) * reach]
-        return np.tanh(arena.train.residual(switched_on(library, values), none).ravel() / FAR)
+        return np.tanh(arena.train.residual(effects_of(library, values), none).ravel() / FAR)
 
     around = 1.0 + ends + [[-1e-9], [1e-9]]
     fitted = (
@@ -94,7 +89,7 @@ def _reach(candidate: Candidate) -> float:
     return float(ends[np.argmax(np.abs(ends))])
 
 
-def rule_table(found: Experiment, arena: Arena) -> Answer:
+def rule_table(found: Log, arena: Problem) -> Answer:
     """Return the effect that a table of rules reads off lags, static errors, hysteresis and saturation."""
     effects, joints = ruled(found, arena)
     if not effects:
@@ -103,7 +98,7 @@ def rule_table(found: Experiment, arena: Arena) -> Answer:
     return _answer("causes", [cause], [{"effects": [name]} for name in effects])
 
 
-BASELINES: Mapping[str, Callable[[Experiment, Arena], Answer]] = {
+BASELINES: Mapping[str, Callable[[Log, Problem], Answer]] = {
     "one_step": least_error_one_step,
     "everything": everything_at_once,
     "training_error": least_training_error,
@@ -115,7 +110,7 @@ def _answer(verdict: str, causes: Sequence[Answer], ranking: Sequence[Answer] = 
     return {"verdict": verdict, "causes": list(causes), "inseparable": [], "ranking": list(ranking)}
 
 
-def _cause(arena: Arena, lead: Lead) -> Answer:
+def _cause(arena: Problem, lead: Lead) -> Answer:
     candidate = lead.candidate
     mask = arena.scopes.get(candidate.scope) if candidate.on_joints else None
     single = [name for name, own in arena.scopes.items() if own.sum() == 1]

@@ -11,7 +11,7 @@ import numpy as np
 from gsl.core.body import lumped
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.diagnosis.records import slope
+from gsl.diagnosis.log.records import slope
 from gsl.effects.effect import TWINS
 from gsl.errors import GslError
 from gsl_benchmarks.blind.dials import CALIBRATED, Dial, drawn, drawn_extra, takes_joint, visible

@@ -9,9 +9,9 @@ import numpy as np
 
 from gsl.core.body import lumped
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.experiment import experiment
-from gsl.diagnosis.on_ground import Walking, model_error
-from gsl.diagnosis.records import BASE, Pieces
+from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.log.records import BASE, Pieces
+from gsl.diagnosis.simulate.on_ground import Walking, model_error
 from gsl.errors import GslError
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.fits import fitting_step
@@ -53,11 +53,11 @@ class Yardstick:
     def of(cls, sim: BulletWorld, walks: Walks, noise: float, rng: np.random.Generator) -> Yardstick:
         """Let the nominal robot walk, and replay it."""
         log = replace(walks, episodes=WALKED).logged(sim, None, {}, noise, rng)
-        found = experiment(log, lumped(sim.plant.robot), walking=True)
+        found = cut_log(log, lumped(sim.plant.robot), walking=True)
         simulator = Walking(sim.plant, fitting_step(sim.step, sim.period), sim.period)
         pieces = _some(found.pieces)
         floor = found.with_model_error(model_error(simulator, pieces, rng)).comparison.floor
-        return cls(simulator, pieces, floor, simulator.told({}, np.zeros(0), pieces))
+        return cls(simulator, pieces, floor, simulator.simulate({}, np.zeros(0), pieces))
 
     def gap(self, dial: Dial) -> Callable[[float], float]:
         """Return what tells the gap [floors] at a share of an effect's range, over what it acts on.
@@ -66,7 +66,7 @@ class Yardstick:
         """
 
         def gap(share: float) -> float:
-            told = self.simulator.told({dial.effect: dial.entry(share)}, np.zeros(0), self.pieces)
+            told = self.simulator.simulate({dial.effect: dial.entry(share)}, np.zeros(0), self.pieces)
             return float(np.sqrt(1.0 + self._square(told - self.without, dial)))
 
         return gap
@@ -77,9 +77,9 @@ class Yardstick:
         A window begins with what a log tells of a state, and not with what springs, gears and delays hold: an effect
         can move a robot from there and yet not be what a replay of it shows.
         """
-        pieces = _some(experiment(log, lumped(self.simulator.plant.robot), walking=True).pieces)
+        pieces = _some(cut_log(log, lumped(self.simulator.plant.robot), walking=True).pieces)
         left = [
-            self._square(self.simulator.told(effects, np.zeros(0), pieces) - pieces.real, dial)
+            self._square(self.simulator.simulate(effects, np.zeros(0), pieces) - pieces.real, dial)
             for effects in ({dial.effect: dial.entry(share)}, {})
         ]
         return 1.0 - left[0] / left[1]
@@ -93,7 +93,7 @@ class Yardstick:
 
 def _some(pieces: Pieces) -> Pieces:
     spread = np.linspace(0, len(pieces) - 1, min(WINDOWS, len(pieces))).round().astype(int)
-    return pieces.chosen(np.unique(spread))
+    return pieces.take(np.unique(spread))
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.diagnosis import nuisance
-from gsl.diagnosis.attribute import Arena
-from gsl.diagnosis.experiment import Experiment
+from gsl.diagnosis.hypothesis.problem import Problem
+from gsl.diagnosis.log.log import Log
+from gsl.diagnosis.simulate.calibration import no_shifts
 
 MOVING, RESTING = 0.3, 0.02  # speeds of a replay [rad/s]
 CLEAR = 1.0  # floors that a feature has to have
 ALONE = 0.6  # share of a feature that one joint has to have to be the only one
 
 
-def ruled(found: Experiment, arena: Arena) -> tuple[list[str], list[str]]:
+def ruled(found: Log, arena: Problem) -> tuple[list[str], list[str]]:
     """Return the effects that the rules read, likeliest first, and the joints of the first; none for no gap."""
-    told = arena.train.simulator.told({}, nuisance.none(len(found.joints)), arena.train.pieces)
+    told = arena.train.simulator.simulate({}, no_shifts(len(found.joints)), arena.train.pieces)
     part, first = arena.train.pieces, arena.train.pieces.warm_up
     real, sim = part.real[:, first:], told[:, first:]
     floor, error = found.comparison.floor, real - sim
@@ -45,7 +45,7 @@ def ruled(found: Experiment, arena: Arena) -> tuple[list[str], list[str]]:
     return order, [found.joints[worst]] if alone else list(found.joints)
 
 
-def _known(arena: Arena) -> set[str]:
+def _known(arena: Problem) -> set[str]:
     return {candidate.effect for candidate in arena.library}
 
 

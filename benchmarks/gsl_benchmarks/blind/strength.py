@@ -17,8 +17,8 @@ import numpy as np
 
 from gsl.core.body import lumped
 from gsl.core.plant import Plant
-from gsl.diagnosis.experiment import SCORED, WARM_UP
-from gsl.diagnosis.records import Pieces, Record, pieces, slope
+from gsl.diagnosis.log.records import Pieces, Record, cut_pieces, slope
+from gsl.diagnosis.settings import LogSettings
 from gsl.worlds.held import Held, Windows
 from gsl_benchmarks.blind.mix import MEDIUM, STRONG, WEAK
 from gsl_benchmarks.blind.programmes import Programme
@@ -95,8 +95,8 @@ class Yardstick:
             Record(name, path, told[:, :n], slope(told[:, :n], self.period))
             for name, path, told in zip(self.programme.names, targets, played, strict=True)
         ]
-        warm_up, scored = round(WARM_UP / self.period), round(SCORED / self.period)
-        cut = pieces(made, robot, self.period, warm_up=warm_up, scored=scored)
+        warm_up, scored = (round(part / self.period) for part in (LogSettings.warm_up, LogSettings.scored))
+        cut = cut_pieces(made, robot, self.period, warm_up=warm_up, scored=scored)
         return self._replayed(cut)[:, warm_up:, :n] - cut.real[:, warm_up:]
 
     def _replayed(self, cut: Pieces) -> np.ndarray:

@@ -13,7 +13,7 @@ from gsl.core.body import lumped
 from gsl.core.plant import Plant
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.diagnosis.records import slope
+from gsl.diagnosis.log.records import slope
 from gsl.policies.policy import neighbour
 from gsl.policies.walk_engine import WalkEngine
 from gsl.worlds.bullet import BulletWorld

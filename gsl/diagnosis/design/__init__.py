@@ -1,0 +1,1 @@
+"""The motions that best separate what a log leaves open."""

@@ -1,0 +1,192 @@
+"""A log ready for a diagnosis: windows, their noise floor, residuals, and which part is for fitting or checking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from gsl.core.body import Robot
+from gsl.core.labels import alike
+from gsl.core.trajectory import Batch
+from gsl.diagnosis.log.records import BASE, Pieces, Record, cut_pieces, to_records
+from gsl.diagnosis.log.residual import Comparison, NoiseFloor, compare, noise_floor
+from gsl.diagnosis.settings import LogSettings
+from gsl.errors import InputError
+
+
+@dataclass(frozen=True)
+class Log:
+    """Trajectories of one robot in windows.
+
+    Attributes:
+        robot: Whose log it is.
+        records: Its trajectories.
+        pieces: All windows.
+        noise: The noise floor.
+        comparison: How replays are compared with it.
+        train: Windows for fitting, shape (n_train,).
+        held_out: Windows for checking, shape (n_held_out,).
+        period: Control period [s].
+        by_record: Whether whole records are held out; else parts of one, which is weaker.
+        order: Place in the batch of each record.
+        settings: How it was cut.
+    """
+
+    robot: Robot
+    records: tuple[Record, ...]
+    pieces: Pieces
+    noise: NoiseFloor
+    comparison: Comparison
+    train: np.ndarray
+    held_out: np.ndarray
+    period: float
+    by_record: bool
+    order: tuple[int, ...] = ()
+    settings: LogSettings = field(default_factory=LogSettings)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the logged joints."""
+        return self.robot.controlled
+
+    @property
+    def walking(self) -> bool:
+        """Whether the robot is on the ground."""
+        return self.records[0].base is not None
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of what is compared: the joints, and the base if it moves."""
+        return (*self.joints, *BASE) if self.walking else self.joints
+
+    @property
+    def train_pieces(self) -> Pieces:
+        """The windows of a fit."""
+        return self.pieces.take(spread(self.train, self.settings.fit_windows))
+
+    @property
+    def held_out_pieces(self) -> Pieces:
+        """The windows of a check."""
+        return self.pieces.take(spread(self.held_out, self.settings.check_windows))
+
+    @property
+    def used(self) -> np.ndarray:
+        """How many residuals of a window count for each channel, shape (n_channels,)."""
+        return self.comparison.used(self.pieces.scored)
+
+    @property
+    def shaking_share(self) -> float:
+        """The share of the residuals that are of joints that shake."""
+        return float(self.used[self.comparison.shaking].sum() / self.used.sum())
+
+    def residual(self, replayed: np.ndarray) -> np.ndarray:
+        """Return the residuals of replays of all windows, shape (W, T, n_channels), in floors, (W, scored, ...)."""
+        return self.comparison.residual(replayed, self.pieces)
+
+    def only_train(self) -> Log:
+        """Return the log of which nothing but the windows for fitting is seen."""
+        return replace(self, pieces=self.pieces.take(self.train))
+
+    def with_model_error(self, error: np.ndarray) -> Log:
+        """Return the log with a floor that holds a known error of the model, [rad], shape (n_channels,)."""
+        return replace(self, comparison=replace(self.comparison, floor=np.hypot(self.comparison.floor, error)))
+
+
+def cut_log(
+    batch: Batch,
+    robot: Robot,
+    *,
+    walking: bool = False,
+    held_out: Mapping[str, Any] | None = None,
+    settings: LogSettings | None = None,
+) -> Log:
+    """Cut a batch into windows and part it; the order of its trajectories changes nothing.
+
+    Args:
+        batch: Of this robot, with records long enough for a window.
+        robot: Whose motors follow.
+        walking: Whether it is on the ground.
+        held_out: Labels of the records that are for checking; without any, every second motion is.
+        settings: How.
+
+    Raises:
+        InputError: No record, or every one, has these labels; or effects are known of records on the ground.
+    """
+    how, period = settings or LogSettings(), batch.control_period
+    records, order = _sort(to_records(batch, robot, walking=walking))
+    if walking and any(record.conditions for record in records):
+        raise InputError("conditions of a trajectory are for logs in the air; leave them out of its label")
+    asked = _label_indices(records, held_out or {})
+    parts = (how.walk_warm_up, how.walk_scored) if walking else (how.warm_up, how.scored)
+    warm_up, scored = (round(part / period) for part in parts)
+    pieces = cut_pieces(records, robot, period, warm_up=warm_up, scored=scored)
+    if walking:
+        pieces = pieces.take(spread(np.arange(len(pieces)), how.walk_windows))
+        joints = np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
+        noise = noise_floor(records, robot.encoder_step, np.r_[joints, list(how.base_floor)], asked, how.floor)
+        comparison = Comparison.plain(noise.sd)
+    else:
+        noise = noise_floor(records, robot.encoder_step, held=asked, settings=how.floor)
+        comparison = compare(pieces, noise, len(robot.controlled), how.floor)
+    held, by_record = _hold_out(records, pieces, asked)
+    train, check = np.flatnonzero(~held), np.flatnonzero(held)
+    return Log(robot, records, pieces, noise, comparison, train, check, period, by_record, order, how)
+
+
+def _sort(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[int, ...]]:
+    """Return records in an order of their own, by name and content, and their places before.
+
+    A name that is only that of the file counts for nothing: files may be called anything.
+    """
+
+    def key(k: int) -> tuple[str, bytes, bytes]:
+        record = records[k]
+        name = "" if record.about.get("file") == record.name else record.name
+        return name, record.targets.tobytes(), record.position.tobytes()
+
+    order = tuple(sorted(range(len(records)), key=key))
+    return tuple(records[k] for k in order), order
+
+
+def _hold_out(records: Sequence[Record], pieces: Pieces, asked: Sequence[int]) -> tuple[np.ndarray, bool]:
+    """Hold out what is asked for, else every second motion in the records' order; repeats stay together."""
+    if asked:
+        return np.isin(pieces.record, asked), True
+    motions: dict[bytes, list[int]] = {}
+    for index, record in enumerate(records):
+        motions.setdefault(np.round(record.targets, 6).tobytes(), []).append(index)
+    if len(motions) > 1:
+        held = [index for k, group in enumerate(motions.values()) if k % 2 for index in group]
+        return np.isin(pieces.record, held), True
+    return np.arange(len(pieces)) % 2 == 1, False
+
+
+def _label_indices(records: Sequence[Record], asked: Mapping[str, Any]) -> list[int]:
+    """Return the indices of the records that have some labels, each a value or several; none without labels.
+
+    Raises:
+        InputError: None of them has, or every one.
+    """
+    if not asked:
+        return []
+    wanted = {key: value if isinstance(value, list | tuple) else [value] for key, value in asked.items()}
+    chosen = [
+        k
+        for k, record in enumerate(records)
+        if all(any(alike(record.about.get(key), value) for value in some) for key, some in wanted.items())
+    ]
+    if 0 < len(chosen) < len(records):
+        return chosen
+    labels = ", ".join(f"{key}: {value}" for key, value in asked.items())
+    values = {key: sorted({str(record.about.get(key)) for record in records}) for key in asked}
+    there = "; ".join(f"{key} is {', '.join(some)}" for key, some in values.items())
+    which = "every trajectory" if chosen else "no trajectory"
+    raise InputError(f"held_out: {which} of the log has {{{labels}}}; there {there}")
+
+
+def spread(index: np.ndarray, most: int) -> np.ndarray:
+    """Return at most so many of some indices, spread evenly over them."""
+    return index[np.unique(np.linspace(0, len(index) - 1, min(most, len(index))).round().astype(int))]

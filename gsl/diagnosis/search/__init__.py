@@ -1,0 +1,1 @@
+"""Which set of effects explains a log."""

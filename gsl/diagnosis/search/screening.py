@@ -1,0 +1,222 @@
+"""A screening: what each candidate could explain, joint by joint, before any of them is fitted with care."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsl.diagnosis.hypothesis.candidates import Candidate
+from gsl.diagnosis.hypothesis.fit import fit_proportional, fit_shifts, sensitivities
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost
+from gsl.diagnosis.hypothesis.problem import Problem
+from gsl.diagnosis.settings import SearchSettings
+from gsl.diagnosis.simulate.calibration import no_shifts
+from gsl.diagnosis.simulate.in_the_air import Effects
+from gsl.diagnosis.simulate.simulator import Bench
+
+
+@dataclass(frozen=True)
+class Lead:
+    """A candidate that is worth a fit.
+
+    Attributes:
+        candidate: With its scope.
+        parameters: Where the fit starts, shape (p,).
+        shifts: That go with them, shape (7, n_joints).
+        cost: As the screening sees it.
+    """
+
+    candidate: Candidate
+    parameters: np.ndarray
+    shifts: np.ndarray
+    cost: float
+
+
+@dataclass(frozen=True)
+class Screening:
+    """What came of a screening.
+
+    Attributes:
+        leads: Best first.
+        invisible: Effects that leave no trace in this log.
+    """
+
+    leads: tuple[Lead, ...]
+    invisible: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where a screening stands.
+
+    Attributes:
+        bench: The windows that it looks at.
+        effects: That are switched on already.
+        shifts: Where the calibration begins, shape (7, n_joints).
+        residual: There, shape (W, scored, n_joints).
+        slopes: Sensitivities there.
+        costs: Of each joint, shifts free, shape (n_joints,).
+        best: These shifts, shape (7, n_joints).
+    """
+
+    bench: Bench
+    effects: Effects
+    shifts: np.ndarray
+    residual: np.ndarray
+    slopes: np.ndarray
+    costs: np.ndarray
+    best: np.ndarray
+
+    @classmethod
+    def of(cls, bench: Bench, effects: Effects) -> Ground:
+        """Return where a screening on top of effects starts: without shifts, which hide what is missing."""
+        at = no_shifts(bench.joints)
+        z = bench.residual(effects, at)
+        slopes = sensitivities(bench, effects, at, z)
+        best, costs = fit_shifts(z, slopes, at, bench.simulator.spread)
+        return cls(bench, effects, at, z, slopes, costs, best)
+
+    def suspects(self, scopes: Mapping[str, np.ndarray], settings: SearchSettings) -> list[str]:
+        """Return the joints in which most of what calibration leaves lies: there every effect is tried alone."""
+        used = self.bench.comparison.used(self.residual.shape[1]) * len(self.residual)
+        excess = np.maximum(0.0, self.costs - used)
+        order = np.argsort(excess)[::-1][: settings.suspects]
+        joints = {int(np.argmax(mask)): name for name, mask in scopes.items() if mask.sum() == 1}  # joints are last
+        if len(joints) < len(excess):
+            return []
+        return [joints[k] for k in order if excess[k] > settings.dominant * excess.sum()]
+
+
+def screen(problem: Problem, base: Hypothesis) -> Screening:
+    """Return what each candidate could explain on top of a hypothesis."""
+    ground = Ground.of(problem.glance, base.effects)
+    suspects = ground.suspects(problem.scopes, problem.settings)
+    local = [part.on(joint) for joint in suspects for part in problem.library if part.on_joints]
+    return screen_candidates(ground, (*problem.library, *local), problem.scopes, problem.tick, problem.settings)
+
+
+def extend(problem: Problem, base: Hypothesis, width: int) -> tuple[list[Hypothesis], Screening]:
+    """Return hypotheses with one effect more than `base`, best first, and the screening that led to them."""
+    screening = screen(problem, base)
+    new = [lead for lead in screening.leads if (lead.candidate.effect, lead.candidate.scope) not in base.places]
+    fits = [
+        problem.fit((*base.candidates, lead.candidate), np.r_[base.start, lead.parameters], lead.shifts)
+        for lead in _best_leads(new, width, problem.settings.per_effect)
+    ]
+    return sorted(fits, key=by_cost), screening
+
+
+def screen_candidates(
+    ground: Ground,
+    candidates: Iterable[Candidate],
+    scopes: Mapping[str, np.ndarray],
+    tick: Callable[[str], None],
+    settings: SearchSettings,
+) -> Screening:
+    """Try every candidate on top of what is switched on.
+
+    Args:
+        ground: Where to start.
+        candidates: Those on joints may have any scope; `all` is read out for every scope in `scopes`.
+        scopes: Names of scopes and their joints, each of shape (n_joints,).
+        tick: Called with an empty word after each candidate.
+        settings: What counts as invisible.
+    """
+    leads: list[Lead] = []
+    traces: dict[str, float] = {}
+    for candidate in candidates:
+        grid = candidate.grid if len(candidate.grid) else _answer(ground, candidate)[None]
+        costs, shifts, trace = _costs(ground, candidate, grid)
+        traces[candidate.effect] = max(trace, traces.get(candidate.effect, 0.0))
+        if trace > 0.0:
+            leads += _leads(candidate, grid, costs, shifts, ground, scopes)
+        tick("")
+    leads.sort(key=lambda lead: lead.cost)
+    invisible = sorted(name for name, trace in traces.items() if trace <= settings.invisible)
+    return Screening(tuple(leads), tuple(invisible))
+
+
+def _answer(ground: Ground, candidate: Candidate) -> np.ndarray:
+    """Return the best parameters of an effect in proportion to them, shape (p,)."""
+    own, bench = [], ground.bench
+    for k, probe in enumerate(candidate.probes):
+        moved = candidate.neutral.copy()
+        moved[k] += probe
+        z = bench.residual(add_effect(ground.effects, candidate, moved), ground.shifts)
+        own.append((z - ground.residual) / probe)
+    spread = bench.simulator.spread
+    change = fit_proportional(ground.residual, np.array(own), ground.slopes, ground.shifts, spread)
+    return np.clip(candidate.neutral + change, *candidate.bounds)
+
+
+def _costs(ground: Ground, candidate: Candidate, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return costs, shape (g, n_joints), shifts, shape (g, 7, n_joints), of each point; and the strongest trace."""
+    bench = ground.bench
+    costs, shifts = np.full((len(grid), bench.joints), np.inf), np.zeros((len(grid), *ground.shifts.shape))
+    trace = 0.0
+    for row in range(len(grid) - 1, -1, -1):  # the strongest first: without a trace of it there is none
+        z = bench.residual(add_effect(ground.effects, candidate, grid[row]), ground.shifts)
+        trace = max(trace, float(np.sqrt(np.mean((z - ground.residual) ** 2, axis=(0, 1)).max())))
+        if trace == 0.0:
+            break
+        shifts[row], costs[row] = fit_shifts(z, ground.slopes, ground.shifts, bench.simulator.spread)
+    return costs, shifts, trace
+
+
+def _leads(
+    candidate: Candidate,
+    grid: np.ndarray,
+    costs: np.ndarray,
+    shifts: np.ndarray,
+    ground: Ground,
+    scopes: Mapping[str, np.ndarray],
+) -> list[Lead]:
+    wide = candidate.on_joints and candidate.scope == "all"
+    masks = scopes if wide else {candidate.scope: np.ones(costs.shape[1], dtype=bool)}
+    leads = []
+    for scope, mask in masks.items():
+        totals = costs[:, mask].sum(axis=1) + ground.costs[~mask].sum()
+        best = int(np.argmin(totals))
+        seen = grid[best, 0] == candidate.seen
+        at = grid[best] if seen else _between(grid, totals, best, wide=bool(candidate.wide.all()))
+        start = np.where(mask, shifts[best], ground.best)
+        leads.append(Lead(candidate.on(scope) if wide else candidate, at, start, float(totals[best])))
+    return leads
+
+
+def _between(grid: np.ndarray, totals: np.ndarray, best: int, *, wide: bool) -> np.ndarray:
+    """Return the lowest point of a parabola through the best grid value of one parameter and its neighbours.
+
+    Of a wide range it is one over the logarithms.
+    """
+    if grid.shape[1] > 1 or len(grid) == 1:
+        return grid[best]
+    order = np.argsort(grid[:, 0])
+    at = int(np.flatnonzero(order == best)[0])
+    if at in (0, len(order) - 1):
+        return grid[best]
+    near = grid[order[at - 1 : at + 2], 0]
+    x, y = np.log(near) if wide else near, totals[order[at - 1 : at + 2]]
+    a, b, _ = np.polyfit(x, y, 2)
+    if a <= 0.0:
+        return grid[best]
+    lowest = np.clip(np.array([-0.5 * b / a]), x[0], x[2])
+    return np.exp(lowest) if wide else lowest
+
+
+def add_effect(effects: Effects, candidate: Candidate, parameters: np.ndarray) -> Effects:
+    """Return effects with one more."""
+    return {**effects, candidate.effect: [*effects.get(candidate.effect, []), candidate.entry(parameters)]}
+
+
+def _best_leads(leads: Sequence[Lead], count: int, per_effect: int) -> list[Lead]:
+    """Return the best leads, not too many of one effect."""
+    taken: dict[str, int] = {}
+    best: list[Lead] = []
+    for lead in leads:
+        if taken.get(lead.candidate.effect, 0) < per_effect and len(best) < count:
+            taken[lead.candidate.effect] = taken.get(lead.candidate.effect, 0) + 1
+            best.append(lead)
+    return best

@@ -1,0 +1,228 @@
+"""The diagnosis as a document: what report.json holds, and what the page and the terminal show of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from gsl.core.body import Robot
+from gsl.core.setting import settings_of
+from gsl.diagnosis.hypothesis.candidates import Candidate
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, share_of_excess
+from gsl.diagnosis.settings import VerdictSettings
+from gsl.diagnosis.simulate.calibration import inertia_unit, no_shifts
+from gsl.diagnosis.verdict.caveats import caveats
+from gsl.diagnosis.verdict.findings import Findings
+from gsl.diagnosis.verdict.localise import cells, find_regimes, horizon, sides
+from gsl.diagnosis.verdict.shrinkage import find_unexplained, shrinkage
+from gsl.diagnosis.verdict.verdict import Cause, Verdict
+from gsl.diagnosis.verdict.zero_or_load import find_droops
+from gsl.effects.effect import confused_with, effect_class
+
+RANKED = 12  # hypotheses that are listed
+REPLAYS, TICKS = 6, 400  # pictures of replays, and their ticks at most
+WORDS = {
+    "no_gap": "The simulator and the robot agree as far as noise and a per-joint calibration can tell.",
+    "unknown": "There is a gap that no effect of the library explains.",
+}
+
+
+def document(findings: Findings, **about: Any) -> dict[str, Any]:
+    """Return the whole document; `about` is what the caller knows besides: data, world_file, report, command, ..."""
+    log, answer, simulator, verdict = findings.log, findings.answer, findings.simulator, findings.verdict
+    before = simulator.simulate({}, no_shifts(len(log.channels)), log.pieces)
+    after = simulator.simulate(answer.effects, answer.fit.shifts, log.pieces)
+    z = log.residual(before)
+    times, growth = horizon(log, before)
+    unsure = find_droops(findings)
+    suspects = [_cause(findings, cause) for cause in verdict.causes]
+    causes = suspects if verdict.names_causes else []
+    shrunk = shrinkage(findings, before, after)
+    far = find_unexplained(shrunk, findings.options.verdict) if causes else []
+    places = [asdict(cell) for cell in cells(log, z, find_regimes(log, findings.corrected))]
+    how_sure = doubt(causes, findings.options.verdict)
+    return {
+        "verdict": verdict.word,
+        "summary": summary(verdict, causes, shrunk, findings.options.verdict),
+        "causes": causes,
+        "sure": not how_sure,
+        "doubt": how_sure,
+        "suspects": suspects if verdict.word == "unknown" else [],
+        "inseparable": [list(group) for group in verdict.inseparable if causes],
+        "droops": [asdict(droop) for droop in unsure],
+        "where": [place for place in places if place["named"] or place["regime"] == "all"],
+        "horizon": {"time": times, "rms": growth},
+        "sides": sides(log, z),
+        "shrinkage": shrunk,
+        "ranking": _ranking(findings),
+        "least_gain": findings.selection.least,
+        "calibration": _calibration(findings),
+        "floor": {
+            "source": log.noise.source,
+            "pairs": log.noise.pairs,
+            "sd": dict(zip(log.channels, log.comparison.floor.tolist(), strict=True)),
+        },
+        "invisible": list(findings.selection.screening.invisible),
+        "unexplained": far,
+        "caveats": caveats(findings, unsure, shrunk, far),
+        "limits": [],
+        "next_experiment": None,
+        "policy_gap": None,
+        "replays": _replays(findings, before, after),
+        "self_test": _self_test(findings),
+        **about,
+    }
+
+
+def summary(
+    verdict: Verdict, causes: Sequence[Mapping[str, Any]], shrunk: Mapping[str, Any], how: VerdictSettings | None = None
+) -> str:
+    """Return the result in a sentence or two.
+
+    Args:
+        verdict: What the selection allows to say.
+        causes: What is said of each cause: effect, scope and probability.
+        shrunk: From `shrinkage`.
+        how: When a cause is sure.
+    """
+    if verdict.word in WORDS and not causes:
+        return WORDS[verdict.word]
+    *most, last = [f"{cause['effect'].replace('_', ' ')}{_of(cause['scope'])}" for cause in causes]
+    named = f"{', '.join(most)} and {last}" if most else last
+    if verdict.word == "inseparable":
+        groups = "; ".join(" or ".join(group) for group in verdict.inseparable).replace("_", " ")
+        return f"The gap looks like {named}, but this log cannot tell apart: {groups}."
+    caused = f"{doubt(causes, how)} caused".lstrip()
+    if shrunk["fraction"] is None:
+        return f"The gap is {caused} by {named}."
+    gone, alone = shrunk["fraction"], max(0.0, shrunk["calibration_fraction"])
+    share = "what" if gone - alone >= 0.5 * (1.0 - alone) else "a part of what"
+    return (
+        f"A calibration of each joint removes {100.0 * alone:.0f} % of the gap on held-out data; {share} it leaves is "
+        f"{caused} by {named}; together they remove {100.0 * gone:.0f} %."
+    )
+
+
+def doubt(causes: Sequence[Mapping[str, Any]], how: VerdictSettings | None = None) -> str:
+    """Return what the least sure cause needs said: nothing, probably or possibly."""
+    least, how = min((cause["probability"] for cause in causes), default=1.0), how or VerdictSettings()
+    return "" if least >= how.sure else "probably" if least >= how.even else "possibly"
+
+
+def _of(scope: str) -> str:
+    return "" if not scope else f" of {'all joints' if scope == 'all' else scope}"
+
+
+def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
+    chosen = findings.selection.chosen
+    candidate, values = chosen.pairs[cause.index]
+    interval = chosen.intervals(findings.widening)[cause.index]
+    sure = cause.probability >= findings.options.verdict.sure
+    return {
+        "effect": candidate.effect,
+        "joints": _joints(findings.log.robot, candidate),
+        "scope": candidate.scope,
+        "fixed": {key: value for key, value in candidate.fixed.items() if key != "joints"},
+        "parameters": _parameters(candidate, values, interval),
+        "probability": cause.probability,
+        "gain": {"value": cause.value, "low": cause.low, "high": cause.high},
+        "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
+        "confused": None if sure else confused_with(candidate.effect),
+    }
+
+
+def _joints(robot: Robot, candidate: Candidate) -> list[str]:
+    if not candidate.on_joints:
+        return []
+    scope = candidate.scope
+    members = robot.controlled if scope == "all" else robot.groups.get(scope, (scope,))
+    return [name for name in members if name in robot.controlled]
+
+
+def _parameters(candidate: Candidate, values: np.ndarray, interval: np.ndarray) -> dict[str, Any]:
+    settings = settings_of(effect_class(candidate.effect))
+    columns = (candidate.free, values, candidate.neutral, *interval)
+    return {
+        name: {
+            "value": float(value),
+            "low": float(low),
+            "high": float(high),
+            "unit": settings[name].unit or ("×" if neutral == 1.0 else ""),
+        }
+        for name, value, neutral, low, high in zip(*columns, strict=True)
+    }
+
+
+def _ranking(findings: Findings) -> list[dict[str, Any]]:
+    selection, rows = findings.selection, []
+    best: dict[frozenset[tuple[str, str]], Hypothesis] = {}
+    for fit in selection.tried:
+        best.setdefault(fit.places, fit)
+    for fit in [*best.values()][:RANKED]:
+        value, low, high = share_of_excess(fit, selection.none, selection.none, findings.options.search.noise_cost)
+        rows.append(
+            {
+                "effects": list(fit.names),
+                "scopes": [candidate.scope for candidate in fit.candidates],
+                "parameters": "; ".join(_write(*pair) for pair in fit.pairs),
+                "gain": {"value": value, "low": low, "high": high},
+                "level": fit.level,
+                "behind": fit.cost - selection.chosen.cost,
+                "passed_over": selection.objection(fit),
+            }
+        )
+    return rows
+
+
+def _write(candidate: Candidate, values: np.ndarray) -> str:
+    return ", ".join(f"{name} {value:.3g}" for name, value in zip(candidate.free, values, strict=True))
+
+
+def _calibration(findings: Findings) -> list[dict[str, Any]]:
+    unit, inertias = findings.log.robot.torque_unit, inertia_unit(findings.uncalibrated.servo)
+    columns = zip(findings.log.joints, findings.shifts.T, inertias, strict=False)  # coupled motors follow
+    return [
+        {
+            "joint": joint,
+            "kp": float(np.exp(kp)),
+            "kd": float(np.exp(kd)),
+            "coulomb": unit * float(coulomb),
+            "viscous": unit * float(viscous),
+            "zero": float(zero + offset),
+            "inertia": float(inertia * rotor),
+        }
+        for joint, (kp, kd, coulomb, zero, offset, inertia, viscous), rotor in columns
+    ]
+
+
+def _replays(findings: Findings, before: np.ndarray, after: np.ndarray) -> list[dict[str, Any]]:
+    """Return stretches of the held-out records in which the simulator is furthest off, one a joint."""
+    log, n = findings.log, len(findings.log.joints)
+    cut, first, held = log.pieces, log.pieces.warm_up, log.held_out
+    square = np.mean((((before - cut.real) / log.comparison.floor)[held, first:, :n]) ** 2, axis=1)
+    worst = np.argsort(np.nan_to_num(square, nan=np.inf).max(axis=0))[::-1][:REPLAYS]
+    pictures = []
+    for joint in worst:
+        record = cut.record[held[int(np.argmax(square[:, joint]))]]
+        windows = np.flatnonzero(cut.record == record)[: TICKS // cut.scored]
+        parts = {"command": cut.targets(n), "real": cut.real, "before": before, "after": after}
+        lines = {key: part[windows][:, first:, joint].ravel().tolist() for key, part in parts.items()}
+        ticks = (cut.tick[windows][:, None] + first + 1 + np.arange(cut.scored)).ravel()
+        times = (log.period * ticks).tolist()
+        pictures.append({"record": log.records[record].name, "joint": log.joints[joint], "time": times, **lines})
+    return pictures
+
+
+def _self_test(findings: Findings) -> dict[str, Any] | None:
+    if not findings.null_gains and not findings.trials:
+        return None
+    counts: dict[tuple[str, str], int] = {}
+    for trial in findings.trials:
+        key = (" + ".join(trial.truth) or "no effect", " + ".join(trial.answer) or "no effect")
+        counts[key] = counts.get(key, 0) + 1
+    confusions = [{"truth": truth, "answer": answer, "count": count} for (truth, answer), count in counts.items()]
+    cases = len(findings.null_gains) + len(findings.trials)
+    return {"cases": cases, "null_gain": max(findings.null_gains, default=None), "confusions": confusions}

@@ -1,0 +1,110 @@
+"""The self-test: the diagnosis of logs that the simulator makes of the user's own commands, whose causes are known.
+
+From calibration alone it learns what chance gains; from each surviving cause what is left when that is the truth, and
+by how much it then beats the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gsl.core.plant import Plant
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost
+from gsl.diagnosis.hypothesis.problem import Problem
+from gsl.diagnosis.log.log import Log
+from gsl.diagnosis.log.records import Pieces, Record, cut_pieces, slope
+from gsl.diagnosis.options import Options
+from gsl.diagnosis.search.screening import extend
+from gsl.diagnosis.settings import VerdictSettings
+from gsl.diagnosis.simulate.calibration import draw_shifts, no_shifts
+from gsl.diagnosis.simulate.in_the_air import change, play
+from gsl.diagnosis.simulate.simulator import Bench
+
+NULL_LEADS = 4  # that are fitted in a log without an effect: the best of them is what chance gains
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One simulated log and what came of it.
+
+    Attributes:
+        truth: Effects that made it; empty for calibration alone.
+        answer: Effects of the hypothesis that won.
+        costs: Held-out cost of each hypothesis that was fitted, in the order of the rivals.
+        level: Of the truth.
+    """
+
+    truth: tuple[str, ...]
+    answer: tuple[str, ...]
+    costs: tuple[float, ...]
+    level: float
+
+
+def relog(
+    log: Log, plant: Plant, step: float, rng: np.random.Generator, settings: VerdictSettings | None = None
+) -> tuple[Record, ...]:
+    """Return what a plant would have logged to the records' commands, with the floor's noise.
+
+    Args:
+        log: Whose commands, noise floor and conditions.
+        plant: With effects and calibration.
+        step: Physics period [s].
+        rng: Of starts and noise.
+        settings: How a record begins.
+    """
+    how, n = settings or VerdictSettings(), len(log.joints)
+    paths = [record.targets for record in log.records]
+    starts = [path[0] + how.start * rng.standard_normal(path.shape[1]) for path in paths]
+    played = play(log.records, plant, starts, step=step, period=log.period, settle=how.settle)
+    noisy = [path[:, :n] + log.comparison.floor * rng.standard_normal((len(path), n)) for path in played]
+    return tuple(
+        replace(record, position=position, velocity=slope(position, log.period))
+        for record, position in zip(log.records, noisy, strict=True)
+    )
+
+
+def repose(log: Log, problem: Problem, truth: Hypothesis, rng: np.random.Generator) -> Problem:
+    """Return the problem with a simulated log in the real one's place, made with a calibration drawn anew."""
+    simulator = problem.simulator
+    shifts = draw_shifts(rng, len(log.joints), simulator.spread)
+    made = relog(log, change(simulator.plant, truth.effects, shifts), simulator.step, rng)
+    cut = cut_pieces(made, log.robot, log.period, warm_up=log.pieces.warm_up, scored=log.pieces.scored)
+    index = {(int(r), int(t)): k for k, (r, t) in enumerate(zip(cut.record, cut.tick, strict=True))}
+
+    def same(part: Pieces) -> Pieces:
+        return cut.take(np.array([index[int(r), int(t)] for r, t in zip(part.record, part.tick, strict=True)]))
+
+    train, held_out = (
+        Bench(simulator, same(bench.pieces), bench.comparison) for bench in (problem.train, problem.held_out)
+    )
+    return replace(problem, train=train, held_out=held_out)
+
+
+def simulate_nulls(log: Log, problem: Problem, none: Hypothesis, options: Options) -> list[float]:
+    """Return the best gains over calibration in logs without an effect."""
+    gains = []
+    for trial in range(options.nulls):
+        rng = np.random.default_rng((options.seed, trial, 1))
+        fake = repose(log, problem, replace(none, candidates=(), parameters=()), rng)
+        base = fake.fit_calibration()
+        singles, _ = extend(fake, base, NULL_LEADS)
+        gains.append(base.cost - singles[0].cost if singles else 0.0)
+        problem.tick("")
+    return gains
+
+
+def duel(log: Log, problem: Problem, rivals: Sequence[Hypothesis], options: Options) -> list[Trial]:
+    """Return what comes of logs whose truth is one of the rivals, each some times, when the rivals are fitted."""
+    trials = []
+    for k, truth in enumerate(rivals):
+        for trial in range(options.duels):
+            fake = repose(log, problem, truth, np.random.default_rng((options.seed, trial, 2, k)))
+            still = no_shifts(fake.train.joints)
+            fits = [fake.fit(rival.candidates, rival.start, still) for rival in rivals]
+            winner = min(fits, key=by_cost)
+            trials.append(Trial(truth.names, winner.names, tuple(fit.cost for fit in fits), fits[k].level))
+            problem.tick("")
+    return trials

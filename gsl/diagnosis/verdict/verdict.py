@@ -1,0 +1,147 @@
+"""The verdict: what the evidence allows to say, and with which probability."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost, gain, share_of_excess
+from gsl.diagnosis.search.stepwise import Selection
+from gsl.diagnosis.settings import SearchSettings, VerdictSettings
+from gsl.effects.effect import TWINS
+
+ALIKE = tuple(frozenset(pair) for pair in TWINS.items())  # in the air
+SHARPNESS = 2.0  # of log-odds, over a margin in its spread
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One effect of the chosen hypothesis.
+
+    Attributes:
+        index: Its place there.
+        probability: That it is this effect.
+        rival: The effect that comes nearest in its place, if any.
+        value, low, high: Share of the cost that a calibration leaves above the noise, which comes back without it, with
+            95 % interval.
+    """
+
+    index: int
+    probability: float
+    rival: str | None
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What can be said.
+
+    Attributes:
+        word: `no_gap`, `causes`, `inseparable` or `unknown`.
+        causes: Of the chosen hypothesis; empty for `no_gap`.
+        inseparable: Groups of effects that the log cannot tell apart.
+        explained: Share of the excess that the chosen hypothesis explains.
+        remaining: Its cost of a residual over that of noise.
+        complete: Probability that nothing else is at work.
+        whole: Share of the excess from which on causes are all there is.
+    """
+
+    word: str
+    causes: tuple[Cause, ...]
+    inseparable: tuple[tuple[str, ...], ...]
+    explained: float
+    remaining: float
+    complete: float
+    whole: float = VerdictSettings.whole
+
+    @property
+    def names_causes(self) -> bool:
+        """Whether it names causes, be some of them inseparable from others."""
+        return self.word in ("causes", "inseparable")
+
+    @property
+    def in_part(self) -> bool:
+        """Whether causes are named and leave so much that something else is at work as well."""
+        return self.names_causes and 0.0 < self.explained < self.whole
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Judges selections on one log.
+
+    Attributes:
+        expected: Cost of a residual where only noise is left.
+        margins: Spread of the difference of costs to a rival, by the rival's effect, as a self-test measured it.
+        doubt: Share of a cost by which that of two causes differs by chance.
+        walking: Whether the robot is on the ground, where the base shows what is alike in the air.
+        lone: Whether there is one motion only.
+        settings: What counts.
+        noise_cost: Of a residual that is nothing but noise.
+    """
+
+    expected: float
+    margins: Mapping[str, float] = field(default_factory=dict)
+    doubt: float = 0.0
+    walking: bool = False
+    lone: bool = False
+    settings: VerdictSettings = field(default_factory=VerdictSettings)
+    noise_cost: float = SearchSettings.noise_cost
+
+    def judge(self, selection: Selection) -> Verdict:
+        """Return what a selection allows to say."""
+        how, chosen, none = self.settings, selection.chosen, selection.none
+        least = self.expected * float(none.counts.sum())
+        excess = max(none.cost - least, 1e-9)
+        explained = float(np.clip((none.cost - chosen.cost) / excess, 0.0, 1.0))
+        remaining = chosen.level / self.expected
+        worst_joint = chosen.levels.max() / max(1.0, self.expected)
+        strange = max(np.log(remaining) / np.log(how.foreign), np.log(worst_joint) / np.log(how.local))
+        if not chosen.candidates:
+            return Verdict("unknown" if strange > 1.0 else "no_gap", (), (), 0.0, remaining, 1.0, how.whole)
+        causes = tuple(self._cause(selection, k) for k in range(chosen.size))
+        complete = self._completeness(explained, float(strange))
+        groups = self._inseparable(chosen, causes)
+        sure = complete * (how.lone if self.lone else 1.0)
+        scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
+        word = "unknown" if complete < 0.5 else "inseparable" if groups else "causes"
+        return Verdict(word, scaled, groups, explained, remaining, complete, how.whole)
+
+    def _inseparable(self, chosen: Hypothesis, causes: tuple[Cause, ...]) -> tuple[tuple[str, ...], ...]:
+        alike = () if self.walking else ALIKE
+        groups: list[tuple[str, ...]] = [tuple(sorted(twins)) for twins in alike if twins & set(chosen.names)]
+        for cause in causes:
+            name = chosen.names[cause.index]
+            if cause.rival not in (None, name) and cause.probability < self.settings.separated:
+                groups.append((name, str(cause.rival)))
+        return tuple(dict.fromkeys(tuple(sorted(set(group))) for group in groups))
+
+    def _completeness(self, explained: float, strange: float) -> float:
+        """Return the probability that the library holds what is at work: much is left only where that is missing."""
+        missing, enough = strange - 1.0, self.settings.explained
+        unexplained = (enough - explained) / (1.0 - enough)
+        return float(1.0 / (1.0 + np.exp(min(missing, unexplained) / self.settings.soft)))
+
+    def _cause(self, selection: Selection, k: int) -> Cause:
+        chosen, none = selection.chosen, selection.none
+        rivals = [fit for fit in selection.rivals if fit.size <= chosen.size and fit.lacks(chosen, k)]
+        fewer = min((fit for fit in rivals if fit.size < chosen.size), key=by_cost, default=none)
+        noise = min(self.expected, self.noise_cost)
+        value, low, high = (max(0.0, x) for x in share_of_excess(chosen, fewer, none, noise))
+        best = min((fit for fit in rivals if fit.size == chosen.size), key=by_cost, default=None)
+        if best is None:
+            return Cause(k, self.settings.unrivalled, None, value, low, high)
+        other = next((name for name in best.names if name not in chosen.names), best.names[-1])
+        spread = max(self.margins.get(other, 0.0), self.doubt * chosen.cost)
+        return Cause(k, self._probability(best, chosen, spread), other, value, low, high)
+
+    def _probability(self, rival: Hypothesis, chosen: Hypothesis, spread: float) -> float:
+        """Return the probability that the chosen one is the truth and not its rival, from how much less it costs."""
+        margin, over_records = rival.cost - chosen.cost, gain(chosen, rival)
+        coarse = self.settings.coarse * abs(rival.residual_cost - chosen.residual_cost)
+        noise = max(self.settings.blunt, spread, coarse)
+        wide = max(noise, (over_records.high - over_records.low) / 4.0 * 0.5)
+        return float(np.clip(1.0 / (1.0 + np.exp(-SHARPNESS * margin / wide)), 0.01, 0.99))

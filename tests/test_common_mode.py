@@ -1,0 +1,67 @@
+"""What joints share in their calibration is handed over to a cause, and a cause is split where groups differ."""
+
+import numpy as np
+import pytest
+
+from gsl.core.body import lumped
+from gsl.core.plant import nominal
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.diagnosis.hypothesis.candidates import library
+from gsl.diagnosis.hypothesis.common_mode import hand_over, shares
+from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.options import Options
+from gsl.diagnosis.search.reference import Nominal
+from gsl.diagnosis.search.stepwise import Search
+from gsl.diagnosis.simulate.calibration import COULOMB, KD, no_shifts
+from gsl.effects.effect import applied, built
+from gsl.robots.nao import nao
+from gsl.worlds.held import Held
+
+PERIOD = 0.02
+NAO = lumped(nao())
+MASKS = {"all": np.ones(15, dtype=bool), "legs": np.arange(15) < 11, "arms": np.arange(15) >= 11}
+
+
+def candidate(effect: str, *free: str):
+    return next(one for one in library(NAO) if one.effect == effect and one.free == free)
+
+
+def test_a_factor_that_all_joints_share_goes_to_the_gain_and_the_rest_stays() -> None:
+    common = shares([candidate("servo_gain", "kp", "kd")], MASKS)
+    shifts = no_shifts(15)
+    shifts[KD] = np.log(1.25) + np.linspace(-0.1, 0.1, 15)
+    bounds = np.array([[0.1, 0.1], [2.0, 2.0]])
+    theta, left = hand_over(np.array([0.5, 0.4]), shifts, bounds, common)
+    np.testing.assert_allclose(theta, [0.5, 0.5])
+    np.testing.assert_allclose(left[KD], np.linspace(-0.1, 0.1, 15), atol=1e-12)
+
+
+def test_no_more_is_handed_over_than_the_bounds_take() -> None:
+    common = shares([candidate("coulomb_friction", "torque").on("arms")], MASKS)
+    shifts = no_shifts(15)
+    shifts[COULOMB] = 0.1
+    theta, left = hand_over(np.array([0.2]), shifts, np.array([[0.0], [0.25]]), common)
+    np.testing.assert_allclose(theta, [0.25])
+    np.testing.assert_allclose(left[COULOMB], np.where(MASKS["arms"], 0.05, 0.1))
+
+
+def test_friction_that_differs_between_legs_and_arms_is_told_apart() -> None:
+    plant = nominal(NAO)
+    effects = {"coulomb_friction": [{"torque": 0.2, "joints": "legs"}, {"torque": 0.1, "joints": "arms"}]}
+    time = PERIOD * np.arange(150)
+    paths = [0.2 * np.sin(2 * np.pi * f * time)[:, None] * np.ones(len(NAO.motors)) for f in (0.4, 0.7, 1.0, 1.4)]
+    paths = [path + np.array([NAO.stance.get(motor, 0.0) for motor in NAO.motors]) for path in paths]
+    rng = np.random.default_rng(0)
+    played = Held.of(applied(plant, built(effects)), 0.002, PERIOD).play(paths, [path[0] for path in paths], 25)
+    logged = [told[:, :15] + 0.001 * rng.standard_normal((len(told), 15)) for told in played]
+    episodes = tuple(
+        Trajectory(PERIOD * np.arange(151), path[:, :15], told, np.zeros_like(told))
+        for path, told in zip(paths, logged, strict=True)
+    )
+    batch = Batch(episodes, NAO.controlled, PERIOD, {"episodes": [{"policy": str(k)} for k in range(4)]})
+    problem = Nominal(plant, 0.002).problem(cut_log(batch, NAO), Options(threads=1), lambda phase: None)
+    friction = candidate("coulomb_friction", "torque")
+    everywhere = problem.fit((friction,), np.array([0.15]), no_shifts(15), every=1)
+    apart = Search(problem, problem.fit_calibration()).split(everywhere)
+    found = {one.scope: float(value[0]) for one, value in zip(apart.candidates, apart.parameters, strict=True)}
+    assert found == pytest.approx({"legs": 0.2, "arms": 0.1}, rel=0.1)
