@@ -147,14 +147,14 @@ def test_the_document_has_every_parameter_with_its_unit_and_range(name: str) -> 
 
 
 def described(one: Setting) -> str:
-    """A parameter as docs/effects.md has it."""
+    """A parameter as docs/reference/effects.md has it."""
     said = f"`{one.name}`{f' {one.unit}' if one.unit else ''}"
     return said if one.lower is None else f"{said}, {one.lower:g} to {one.upper:g}"
 
 
 @cache
 def document() -> str:
-    return (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")
+    return (Path(__file__).parents[1] / "docs/reference/effects.md").read_text("utf-8")
 
 
 FACTORS, SQUARES = {"kp", "kd", "limit", "friction"}, {"encoder_noise", "noise", "torque_noise"}
