@@ -1,4 +1,4 @@
-"""A hook of mkdocs: links that leave docs/, to sources and data, become plain text on the site, which has no such files."""
+"""A hook of mkdocs: on the site, which has neither sources nor data, links out of docs/ become plain text."""
 
 from __future__ import annotations
 

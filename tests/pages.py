@@ -1,4 +1,4 @@
-"""The pages for readers, README.md and docs/, taken apart: sentences, links, anchors, and the commands in their blocks."""
+"""The pages for readers, README.md and docs/, taken apart: sentences, links, anchors, and commands."""
 
 from __future__ import annotations
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from pages import FENCE, GUIDES, LINK, RESULTS, ROOT, anchors, sentences, words
@@ -60,6 +62,13 @@ def test_notebooks_and_messages_name_pages_that_exist() -> None:
     dead = {(name(path), page) for path in files for page in named.findall(path.read_text("utf-8"))
             if not (ROOT / page).exists()}  # fmt: skip
     assert dead == set()
+
+
+def test_the_site_keeps_links_within_docs_alone() -> None:
+    hook = runpy.run_path(str(ROOT / ".ci/docs_links.py"))["on_page_markdown"]
+    page = SimpleNamespace(file=SimpleNamespace(src_uri="howto/own-robot.md"))
+    told = hook("[a](../glossary.md#x) [b](../../gsl/cli.py) [c](own-logs.md) ![d](../images/walk.png)", page=page)
+    assert told == "[a](../glossary.md#x) `b` [c](own-logs.md) ![d](../images/walk.png)"
 
 
 def test_the_index_and_the_site_have_every_page() -> None:
