@@ -58,7 +58,7 @@ check: $(INSTALLED) ## Check style, format and types.
 	$(VENV)/bin/mypy
 
 docs: $(SITE) ## Build the documentation as a site, build/site; dead links fail.
-	$(dir $(SITE))bin/mkdocs build --strict --quiet
+	$(dir $(SITE))bin/mkdocs build --strict
 	@echo "build/site/index.html"
 
 # Beside gsl's own environment: its libraries are of the site alone.
