@@ -2,12 +2,13 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo test iterate real xl330 so101 logs-of-so101 menagerie go2 check clean FORCE
+.PHONY: help install demo test docs iterate real xl330 so101 logs-of-so101 menagerie go2 check clean FORCE
 
 VENV ?= .venv
 GSL ?= $(VENV)/bin/gsl
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 INSTALLED := $(VENV)/.stamp
+SITE := .venv-docs/.stamp
 
 
 DEMO ?= name=demo beside=true force=true
@@ -27,7 +28,7 @@ test: $(INSTALLED) ## Check the style, run the tests.
 	$(VENV)/bin/ruff check
 	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n 2
 
-real: xl330 so101 menagerie go2 ## Diagnose logs of three real robots (docs/real-robots.md); half an hour.
+real: xl330 so101 menagerie go2 ## Diagnose logs of three real robots (docs/howto/shipped-logs.md); half an hour.
 
 xl330: $(INSTALLED)
 	$(GSL) import mapping=xl330_pendulum name=xl330
@@ -57,6 +58,16 @@ check: $(INSTALLED) ## Check style, format and types.
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/ruff format --check
 	$(VENV)/bin/mypy
+
+docs: $(SITE) ## Build the documentation as a site, build/site; dead links fail.
+	$(dir $(SITE))bin/mkdocs build --strict
+	@echo "build/site/index.html"
+
+# Beside gsl's own environment: its libraries are of the site alone.
+$(SITE): pyproject.toml
+	test -d $(@D) || $(PYTHON) -m venv $(@D)
+	$(@D)/bin/python -m pip install --quiet 'mkdocs-material>=9.5,<10'
+	touch $@
 
 clean: ## Remove caches and build files; runs/ and the virtual environment stay.
 	rm -rf .mypy_cache .pytest_cache .ruff_cache build dist *.egg-info

@@ -25,7 +25,7 @@ def effects() -> Iterator[Sequence[str]]:
         "parameters, documented range",
         "what it is",
         "signature",
-        "confused with, and told apart by",
+        "confused with, and separated by",
     )
     classes = {name: effect_class(name) for name in names()}
     for name, kind in sorted(classes.items(), key=lambda one: (KINDS.index(one[1].kind), one[1].rank)):

@@ -143,7 +143,7 @@ def test_it_keeps_the_contract_of_an_effect(name: str) -> None:
     check_effect(built({name: [halfway(name)]})[0], neutral=NEUTRAL.get(name))
 
 
-@pytest.mark.parametrize("page", ["effects", "own-components"])
+@pytest.mark.parametrize("page", ["reference/effects", "howto/own-components"])
 def test_tables_of_the_docs_say_what_the_classes_declare(page: str) -> None:
     docs = Path(__file__).parents[1] / "docs"
     fill = runpy.run_path(str(docs / "tables.py"))["fill"]

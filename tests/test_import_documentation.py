@@ -1,4 +1,4 @@
-"""The example of docs/import.md runs as it is printed, and so does that with a bag, where the library is at hand."""
+"""The examples of docs/howto/own-logs.md run as printed; that with a bag does where the library is at hand."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from commands import done, refused
 
 from gsl.storage.trajectories import read
 
-PAGE = (Path(__file__).parents[1] / "docs/import.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[1] / "docs/howto/own-logs.md").read_text(encoding="utf-8")
 
 
 def blocks(language: str) -> list[str]:

@@ -120,10 +120,11 @@ def test_a_log_that_lacks_a_joint(place: Path) -> None:
     done("collect", *arm, "name=log", folder=place)
     (place / "more.urdf").write_text(EXAMPLE.read_text().replace('"elbow"', '"wrist"'))
     line = refused("diagnose", "real=log", "sim=urdf", "sim.robot=more.urdf", "out=runs/refused", folder=place)
-    assert "It lacks wrist; choose the simulator with sim=, or hold the joint in a robot file (docs/robots.md)" in line
+    told = "It lacks wrist; choose the simulator with sim=, or hold the joint in a robot file (docs/howto/own-robot.md)"
+    assert told in line
 
 
-PAGE = (Path(__file__).parents[1] / "docs/robots.md").read_text()
+PAGE = (Path(__file__).parents[1] / "docs/howto/own-robot.md").read_text()
 TYPED = [line.partition("#")[0].split()[2:] for line in PAGE.splitlines() if line.startswith("$ gsl ")]
 WRITTEN = [part.partition("```")[0] for part in PAGE.split("```yaml\n")[1:]]
 

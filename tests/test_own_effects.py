@@ -23,7 +23,7 @@ from gsl.robots.nao import nao
 from gsl.testing import check_effect
 from gsl.worlds.bullet import BulletWorld
 
-PAGE = Path(__file__).parents[1] / "docs/own-components.md"
+PAGE = Path(__file__).parents[1] / "docs/howto/own-components.md"
 MODULE, NAME = "cold_grease", "cold_grease"
 OWN = ("--config-dir", "my_conf")
 QUICK = ("preset=toy", "task.duration=0.4", "workers=1")

@@ -1,4 +1,4 @@
-"""Commands of other packages: the example of docs/own-components.md, broken ones, and what stays as it is."""
+"""Commands of other packages: the example of docs/howto/own-components.md, broken ones, and what stays as it is."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def install(folder: Path, name: str, commands: dict[str, str]) -> None:
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of packages: that of the page, and one of which most is broken."""
-    page = (ROOT / "docs/own-components.md").read_text(encoding="utf-8").partition("## A command")[2]
+    page = (ROOT / "docs/howto/own-components.md").read_text(encoding="utf-8").partition("## A command")[2]
     blocks = dict(BLOCK.findall(page))
     packages = tmp_path / "packages"
     for name, text in {**blocks, **{f"others/{file}": code for file, code in OTHERS.items()}}.items():

@@ -245,7 +245,7 @@ def test_a_urdf_that_describes_no_robot(text: str, line: str, tmp_path: Path) ->
             "{",
             "is not YAML, or damaged: while parsing a flow node expected the node content, but found '<stream end>'",
         ),
-        ("- arm", "says nothing of a robot; see docs/robots.md"),
+        ("- arm", "says nothing of a robot; see docs/howto/own-robot.md"),
         ("urdf: arm.urdf\ngain: 3", "gain: no such setting"),
         ("urdf: arm.urdf\njoints: {elbo: {}}", "joints.elbo: the URDF has no such joint; did you mean elbow?"),
         ("urdf: arm.urdf\njoints: {elbow: {kp: -1}}", "joints.elbow.kp = -1: must be above 0"),

@@ -15,7 +15,7 @@ def read_trajectories(reference: Path | str) -> Batch:
     """Return the trajectories of a file, or of a run of collect or import.
 
     Raises:
-        TrajectoryError: The file breaks the contract (docs/files.md).
+        TrajectoryError: The file breaks the contract (docs/reference/files.md).
         ArtifactError: There is none.
     """
     return read_file(data_file(str(reference)))
@@ -25,7 +25,7 @@ def write_trajectories(path: Path | str, batch: Batch) -> None:
     """Write trajectories to a file, whole or not at all.
 
     Raises:
-        TrajectoryError: They break the contract (docs/files.md).
+        TrajectoryError: They break the contract (docs/reference/files.md).
     """
     place = Path(path)
     if not isinstance(batch, Batch):

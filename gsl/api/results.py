@@ -55,7 +55,7 @@ class Verdict(Result):
 
     @property
     def report(self) -> Mapping[str, Any]:
-        """Everything that was found (docs/diagnose.md)."""
+        """Everything that was found (docs/howto/diagnose.md)."""
         return report_of(self.folder)
 
     @property

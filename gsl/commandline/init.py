@@ -27,11 +27,12 @@ ROBOT, WORLD = "robot.yaml", "world/{}.yaml"
 
 _ROBOT_HEAD = """\
 # The robot of {urdf}: the joints that an action names, in this order, and their servos.
-# Gains and rotors (armature) are derived from effort and velocity (docs/robots.md); what you know better, write here.
+# Gains and rotors (armature) are derived from effort and velocity (docs/howto/own-robot.md).
+# Write here what you know better.
 # A diagnosis fits gains, friction and rotors of every joint anew before it looks for a cause.
 """
 _WORLD_TEXT = """\
-# {name}, its base fixed. What you know that the simulator lacks is for effects to say (docs/effects.md).
+# {name}, its base fixed. What you know that the simulator lacks is for effects to say (docs/reference/effects.md).
 defaults: [urdf, _self_]
 robot: {robot}   # as seen from where you type gsl
 period: {period:g}   # [s]: the control period of your logs

@@ -18,7 +18,7 @@ class ActionNoise:
 
     Signature: repeats of one command drift apart, the more the longer they run; what is measured at rest is smooth from
     one step to the next. Confused with encoder noise, which is white and does not grow, and with an uneven ground,
-    which needs contact; repeats in the air tell them apart.
+    which needs contact; repeats in the air separate them.
     """
 
     kind: ClassVar[str] = "command"

@@ -16,8 +16,8 @@ class Armature:
     """A heavier rotor, or another gear ratio.
 
     Signature: slower to set off and more overshoot; nothing at rest and in slow motion. Confused with a torque limit in
-    large steps, kd, and a payload, which also weighs; steps of several sizes, and the same with a weight, tell them
-    apart.
+    large steps, kd, and a payload, which also weighs; steps of several sizes, and the same with a weight, separate
+    them.
     """
 
     kind: ClassVar[str] = "body"

@@ -20,7 +20,7 @@ class CentreOfMass:
 
     Signature: a torque that follows the pose and is zero where gravity passes through the joint; on the ground the
     robot leans. Confused with a link's mass, which also resists acceleration, zero offsets, which do not depend on the
-    pose, and gravity tilt, which all joints feel; a ladder of static poses and a fast swing tell them apart.
+    pose, and gravity tilt, which all joints feel; a ladder of static poses and a fast swing separate them.
     """
 
     kind: ClassVar[str] = "body"

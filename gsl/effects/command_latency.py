@@ -16,7 +16,7 @@ class CommandLatency:
     """Time between issuing a command and the servo's seeing it.
 
     Signature: a pure time shift, error in proportion to speed, zero at rest. Confused with target smoothing, viscous
-    friction and a higher kd in slow motion; steps of several sizes tell them apart: the onset is late, the slope as
+    friction and a higher kd in slow motion; steps of several sizes separate them: the onset is late, the slope as
     ever. Also with a sensor delay, which in open loop shifts the log as much; a higher kp makes that one ring.
     """
 

@@ -17,7 +17,7 @@ class CoulombFriction:
 
     Signature: a lag of constant size with the sign of the speed, flat tops at reversals, a band of static errors of
     +-torque / kp. Confused with backlash, a dead band, stiction and load-dependent friction; triangles at three speeds
-    (the error does not depend on speed) and under two loads tell them apart.
+    (the error does not depend on speed) and under two loads separate them.
     """
 
     kind: ClassVar[str] = "servo"

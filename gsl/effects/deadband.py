@@ -17,7 +17,7 @@ class Deadband:
 
     Signature: a joint without load stops anywhere within +-width of its target, steps smaller than that move nothing,
     and a loaded joint hangs lower by width. Confused with backlash, dry friction and a low kp; a ladder of static loads
-    tells it apart: the error grows by load / kp from width on, whereas friction's depends on where the joint came from
+    separates it: the error grows by load / kp from width on, whereas friction's depends on where the joint came from
     and kp's goes through zero.
     """
 

@@ -17,7 +17,7 @@ class DutyLoss:
 
     Signature: under load the error grows faster than the load, large steps are slower, small ones are not. Confused
     with a torque limit, which cuts off at one torque only, and a low kp, whose error is in proportion to the load; a
-    ladder of loads tells them apart.
+    ladder of loads separates them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -118,7 +118,7 @@ def effect_class(name: str) -> type:
 
 
 def confused_with(name: str) -> str:
-    """Return what an effect is confused with and what tells them apart, from its class."""
+    """Return what an effect is confused with and what separates them, from its class."""
     told = " ".join((effect_class(name).__doc__ or "").split()).partition("Confused with ")[2]
     return re.split(r"\.(?:\s|$)", told, maxsplit=1)[0]
 

@@ -19,7 +19,8 @@ class ExternalPush:
     """Somebody pushes the robot, or a cable pulls at it.
 
     Signature: a deviation that no command explains, isolated in time, in all joints between the link and the ground.
-    Confused with a gravity tilt, if it lasts, and with nothing, if it is short; the same episode without it tells.
+    Confused with a gravity tilt, if it lasts, and with nothing, if it is short; the same episode without it separates
+    them.
     """
 
     kind: ClassVar[str] = "environment"

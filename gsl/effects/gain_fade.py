@@ -17,7 +17,7 @@ class GainFade:
 
     Signature: the same pose under the same load is held worse and worse; the error grows with time and is back at the
     next episode. Confused with a low kp, which is there from the start, and a drifting zero, which does not depend on
-    the load; returning to one pose again and again, and a rest, tell them apart.
+    the load; returning to one pose again and again, and a rest, separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -15,7 +15,7 @@ class GroundCompliance:
 
     Signature: standing, the robot is lower by weight / (stiffness x points); touchdown is softer and load passes from
     one foot to the other later, with a bounce where damping is low; nothing in the air. Confused with ground friction
-    and uneven ground; stamping on one spot tells: the force rises slowly, at every place, and nothing slips.
+    and uneven ground; stamping on one spot separates them: the force rises slowly, at every place, and nothing slips.
     """
 
     kind: ClassVar[str] = "contact"

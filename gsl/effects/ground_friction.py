@@ -14,7 +14,7 @@ class GroundFriction:
     """Coefficient of friction under the feet.
 
     Signature: slip of the stance foot, drift in yaw; nothing in the air and nothing while standing. Confused with
-    ground compliance and uneven ground; a ladder of push-offs tells them apart: it slips beyond one size.
+    ground compliance and uneven ground; a ladder of push-offs separates them: it slips beyond one size.
     """
 
     kind: ClassVar[str] = "contact"

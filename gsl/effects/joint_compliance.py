@@ -17,8 +17,8 @@ class JointCompliance:
 
     Signature: with the encoder on the motor's side the log shows next to nothing while the limb hangs lower by load ·
     compliance; with the encoder at the output the servo makes up for the load, and a resonance is left: quick motion
-    arrives larger than it was told, and with high gains it never comes to rest. Confused with a low kp, backlash and
-    kd; a sweep through the resonance, or a load on a joint that something else measures, tells them apart.
+    arrives larger than commanded, and with high gains it never comes to rest. Confused with a low kp, backlash and
+    kd; a sweep through the resonance, or a load on a joint that something else measures, separates them.
     """
 
     kind: ClassVar[str] = "body"

@@ -16,7 +16,7 @@ class LinkMass:
     """Mass that the model does not know: a payload, a battery, a cover.
 
     Signature: a bias that follows the sine of the pose and grows with reach. Confused with zero offsets, kp, centres of
-    mass, armature and load-dependent friction; a ladder of static poses and then a fast swing tell them apart.
+    mass, armature and load-dependent friction; a ladder of static poses and then a fast swing separate them.
     """
 
     kind: ClassVar[str] = "body"

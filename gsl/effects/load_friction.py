@@ -17,8 +17,8 @@ class LoadFriction:
 
     Signature: lifting a weight takes more torque than lowering it, and the difference grows with the weight; a joint
     holding a load stays within about 2 coefficient load / kp of where it would rest without friction. Confused with
-    Coulomb friction, a torque limit and kp; poses of different load, each come to from above and from below, tell them
-    apart: the width between them grows with the load, and width and middle together tell coefficient and kp.
+    Coulomb friction, a torque limit and kp; poses of different load, each come to from above and from below, separate
+    them: the width between them grows with the load, and width and middle together give coefficient and kp.
     """
 
     kind: ClassVar[str] = "servo"

@@ -17,8 +17,8 @@ class SensorBias:
     """A constant in what the log and the policy see of the positions.
 
     Signature: the same bias at every speed, load and pose, while the robot moves as if it were not there. Confused with
-    a zero offset: in the air the two are alike by nature; on the ground the base and the feet tell, which a bias leaves
-    alone. Also with gravity tilt and masses: poses in which gravity pulls the other way tell them apart.
+    a zero offset: in the air the two are alike by nature; on the ground the base and the feet separate them, which a
+    bias leaves alone. Also with gravity tilt and masses: poses in which gravity pulls the other way separate them.
     """
 
     kind: ClassVar[str] = "sensor"

@@ -1,4 +1,4 @@
-"""The encoders tell the past: what they measured some time ago is what the servo and the log see."""
+"""The encoders report the past: what they measured some time ago is what the servo and the log see."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ class SensorDelay:
     """Filters and buses between encoder and servo.
 
     Signature: the servo overshoots and rings, since it acts on old news, and the log is late on top. Confused with a
-    command latency, whose log is as late but does not ring, and with a low kd; a higher kp or kd tells: an old
+    command latency, whose log is as late but does not ring, and with a low kd; a higher kp or kd separates them: an old
     measurement makes the loop unstable, a late command does not.
     """
 
     kind: ClassVar[str] = "sensor"
     rank: ClassVar[int] = 3
 
-    delay: Annotated[float, setting("age of what the encoders tell", unit="s", ge=0, lower=0.0, upper=0.02,
+    delay: Annotated[float, setting("age of what the encoders report", unit="s", ge=0, lower=0.0, upper=0.02,
                                     source="estimate; B-Human: 36-42 ms from request to measurement in all",
                                     )]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"

@@ -19,7 +19,7 @@ class ServoGain:
 
     Signature: kp changes the static error under load and the rise time, kd the overshoot. Confused with viscous
     friction (kd), gravity, link mass and gain fade (kp); loaded against unloaded holds, a joint without torque, and the
-    same pose early and late tell them apart.
+    same pose early and late separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -17,7 +17,7 @@ class StribeckFriction:
 
     Signature: it sticks and then jumps at the start of a motion, slow ramps become staircases; at speeds well above
     `velocity` nothing. Confused with Coulomb friction, which lags at every speed, and with backlash and quantisation;
-    ramps of .01 to .1 rad/s beside fast ones tell them apart.
+    ramps of 0.01 to 0.1 rad/s beside fast ones separate them.
     """
 
     kind: ClassVar[str] = "servo"

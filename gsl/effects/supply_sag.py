@@ -17,7 +17,7 @@ class SupplySag:
 
     Signature: as weak and slow motors, but only while many of them work: one joint alone does better than the same
     joint among all. Confused with a torque limit, which does not care what the others do, and load-dependent friction;
-    moving one joint and then all of them, or a log of the voltage, tells them apart.
+    moving one joint and then all of them, or a log of the voltage, separates them.
     """
 
     kind: ClassVar[str] = "servo"

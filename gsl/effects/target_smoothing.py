@@ -1,4 +1,4 @@
-"""The servo filters its target: a first-order lag behind what it is told."""
+"""The servo filters its target: a first-order lag behind its command."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class TargetSmoothing:
 
     Signature: a step sets off at once but rounded, 63 % of the way after the time constant; quick motion arrives
     smaller and later; nothing at rest. Confused with a command latency, a higher kd and viscous friction, since a slow
-    motion is merely late; the onset of a step tells it from a latency, steps of several sizes from a torque limit,
+    motion is merely late; the onset of a step separates it from a latency, steps of several sizes from a torque limit,
     another load from the servo's own dynamics.
     """
 

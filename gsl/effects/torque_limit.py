@@ -17,7 +17,7 @@ class TorqueLimit:
 
     Signature: clipped acceleration in large fast steps and under load, nothing in small ones. Confused with supply sag,
     load-dependent friction, duty loss and target smoothing; a ladder of step sizes and of loads, one joint against all
-    at once, tell them apart.
+    at once, separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -22,7 +22,7 @@ class TorqueNoise:
 
     Signature: repeats of one command differ by constant / kp at rest, alike all through an episode, and tremble.
     Confused with action noise, which a stiff joint follows as well as a soft one, and with load friction and masses,
-    which are the same in every episode; repeats under another gain tell them apart.
+    which are the same in every episode; repeats under another gain separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -15,7 +15,7 @@ class UnevenGround:
 
     Signature: feet touch down early or late at random, repeats differ in contact and walks drift; nothing in the air.
     Confused with action noise, which also acts in the air, and ground compliance, which is the same at every place;
-    repeats on one path and on others tell them apart.
+    repeats on one path and on others separate them.
     """
 
     kind: ClassVar[str] = "contact"

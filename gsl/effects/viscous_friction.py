@@ -17,7 +17,7 @@ class ViscousFriction:
 
     Signature: a lag in proportion to speed, zero at rest, and a free fall that slows down. Confused with kd, which does
     the same while the servo is on, and with a command latency in slow motion; a joint whose torque is switched off, or
-    a step against its onset, tells them apart.
+    a step against its onset, separates them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -125,7 +125,7 @@ def _experiment(document: Document) -> list[Step]:
 
 
 def _robot(document: Document) -> str:
-    """The real robot as the world of a command, which asks for it (docs/robot-in-the-loop.md)."""
+    """The real robot as the world of a command, which asks for it (docs/howto/real-robot.md)."""
     own = _own(document)
     if not own:
         return ""

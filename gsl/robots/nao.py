@@ -31,7 +31,7 @@ ARMATURE = {  # gear ratio² x rotor inertia [kg·m²], E and M
 LEG_GAINS = (
     150.0,
     4.0,
-)  # [N·m/rad], [N·m·s/rad]: no published servo gains; chosen with the rotor inertia (docs/worlds.md)
+)  # [N·m/rad], [N·m·s/rad]: no published servo gains; chosen with the rotor inertia (docs/reference/worlds.md)
 SUPPLY_VOLTAGE = 21.6  # [V] B
 TORQUE_CONSTANT = {"1A": 4.3, "1B": 2.8, "2A": 2.5, "2B": 2.5}  # [N·m/A] D
 ENCODER_STEP = 2.0 * np.pi / 4096  # [rad] E: 12 bits a turn

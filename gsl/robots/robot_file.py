@@ -5,7 +5,7 @@
       shoulder: {kp: 40, kd: 1.2, armature: 0.005, effort: 3.0, velocity: 6.0}
       elbow: {}                   # what is left out comes from the URDF, or from defaults.py
 
-docs/robots.md tells all of it.
+docs/howto/own-robot.md tells all of it.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def _settings(path: Path) -> RobotSettings:
         told = " ".join(str(error).replace('in "<unicode string>", ', "in ").split())
         raise InputError(f"{path}: is not YAML, or damaged: {told}") from error
     if not isinstance(told, Mapping):
-        raise InputError(f"{path}: says nothing of a robot; see docs/robots.md")
+        raise InputError(f"{path}: says nothing of a robot; see docs/howto/own-robot.md")
     try:
         return make(RobotSettings, told)
     except ConfigError as error:

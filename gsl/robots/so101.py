@@ -14,7 +14,7 @@ by oscilloscope), and LeRobot and the collector set P 16, I 0, D 32. In the term
     kp = P .165 stall        kd = stall / no_load
 
 with the stall torque before friction: 11.7 N·m/rad and .94 N·m·s/rad. Calibrated around that the logs say 11 to 14;
-with the gain free they say 10 to 30 (docs/real-robots.md).
+with the gain free they say 10 to 30 (docs/howto/shipped-logs.md).
 
 The torque's limit, at full duty, is before friction too: friction is the world's, by its effects or as a diagnosis
 calibrates it, and must not be taken off twice. At the output 2.94 N·m arrive of 4.45 (C). The world so101 has .052 of

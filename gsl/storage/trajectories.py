@@ -82,7 +82,7 @@ def read(path: Path, *, joints: tuple[str, ...] | None = None) -> Batch:
 
 def imported(path: Path) -> str:
     """Return what to type to make a trajectory file of foreign logs."""
-    return f"gsl import source={path} mapping=... (docs/import.md)"
+    return f"gsl import source={path} mapping=... (docs/howto/own-logs.md)"
 
 
 def _table(path: Path) -> pa.Table:
@@ -108,7 +108,7 @@ def _stored_metadata(path: Path, table: pa.Table) -> Any:
     stored = (table.schema.metadata or {}).get(METADATA_KEY)
     if stored is None:
         raise TrajectoryError(
-            path, "has no metadata under the key `gsl`; it is no trajectory file; write it as docs/files.md says"
+            path, "has no metadata under the key `gsl`; it is no trajectory file; see docs/reference/files.md"
         )
     try:
         return json.loads(stored)

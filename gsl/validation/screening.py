@@ -1,7 +1,7 @@
 """Screening: winners of a search walk often in its simulator before the robot tries them; one that falls is not tried.
 
 A candidate is judged by few episodes, and the best of many had luck. Where the simulator yields as the robot does, a
-policy falls in it about as often as on the robot (docs/torque.md), and falling there costs nothing.
+policy falls in it about as often as on the robot (docs/explanation/torque.md), and falling there costs nothing.
 """
 
 from __future__ import annotations

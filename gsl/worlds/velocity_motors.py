@@ -5,7 +5,7 @@
     torque  = what the engine's solver needs for that speed, at most the torque limit
 
 SimSpark moves its joints so: an agent sends a speed every 20 ms, the effector clips it at the joint's greatest speed
-and hands it to the motor of ODE's hinge (dParamVel), which has a greatest torque (dParamFMax) (docs/worlds.md). The
+and hands it to the motor of ODE's hinge (dParamVel), which has a greatest torque (dParamFMax). The
 joint follows a path one tick late. It does not yield to a load below the torque limit: such motors are stiff.
 There is no gain, no friction and no rotor.
 """

@@ -29,7 +29,7 @@ from gsl_experiments.tried import foretelling
 
 ROOT = Path(__file__).parents[2]
 PLACE, TRIALS = ROOT / "docs/results", ROOT / "experiments/trials"
-PAGES = [*sorted(PLACE.glob("*.md")), ROOT / "docs/torque.md", ROOT / "docs/environments.md"]
+PAGES = [*sorted(PLACE.glob("*.md")), ROOT / "docs/howto/own-environment.md"]
 # What a row of a study is, and which of its fields its recipes go by.
 CELLS: dict[type, tuple[Any, ...]] = {
     Replays: (Replay, "trial", "world", "method"),
@@ -135,7 +135,7 @@ def test_the_aims_of_table_2_stand_beside_its_trials() -> None:
 
 def test_the_guide_tells_gains_and_falls_of_the_trials() -> None:
     """Of a policy that was returned, and of those that were tried."""
-    guide = (ROOT / "docs/grounding.md").read_text(encoding="utf-8")
+    guide = (ROOT / "docs/explanation/grounding.md").read_text(encoding="utf-8")
     _, (_, *worlds), rows = next(one for one in tables(guide) if "`nao_harsh`" in one[1])
     ten, twenty = trials_of("table2"), trials_of("table2", "table2_again")
     itself = [
@@ -214,6 +214,6 @@ def test_a_page_repeats_its_tables_to_the_letter() -> None:
                 repeated[page.stem] += 1
                 same = [(len(part), worlds) for part in of for worlds, below in part.items() if below == rows]
                 assert any(count == 1 or all(name in before for name in worlds) for count, worlds in same), page
-    once = ("budget", "fig5", "garat", "table2-paper", "table3", "table4", "torque", "worlds")
+    once = ("budget", "fig5", "garat", "table2-paper", "table3", "table4", "worlds")
     several = {"linear-walk": 2, "table2": 2, "fig13": 2, "fig12": 4, "replays": 3}
     assert repeated == {**dict.fromkeys(once, 1), **several}

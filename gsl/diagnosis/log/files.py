@@ -128,7 +128,7 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
         missing = [joint for joint in robot.controlled if joint not in batch.joints]
         other = [joint for joint in batch.joints if joint not in robot.controlled]
         what = f"lacks {missing[0]}" if missing else f"has {other[0]}, which the {robot.name} has not"
-        hold = ", or hold the joint in a robot file (docs/robots.md)" if missing else ""
+        hold = ", or hold the joint in a robot file (docs/howto/own-robot.md)" if missing else ""
         raise InputError(f"{name}: a log of another robot? It {what}; choose the simulator with sim={hold}")
     needed = ("base.position.x", "base.orientation.w")
     if on_ground(batch) and not all(column in episode.sensors for episode in batch.episodes for column in needed):

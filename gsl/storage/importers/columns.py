@@ -42,7 +42,7 @@ def joints_of(mapping: LogMapping, table: Table) -> dict[str, str]:
     names = [match.group(1) for match in found if match]
     if not names:
         there = ", ".join(table.names[:12]) or "none"
-        problem = f"is in no column; there is {there}; say in a mapping where things are (docs/import.md)"
+        problem = f"is in no column; there is {there}; say in a mapping where things are (docs/howto/own-logs.md)"
         raise TrajectoryError(table.path, problem, column=form)
     return {name: name for name in names}
 
