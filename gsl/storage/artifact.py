@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,21 +18,24 @@ from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
 from gsl.core.own_code import package_of
 from gsl.core.unit import Unit
-from gsl.errors import ArtifactError
+from gsl.errors import ArtifactError, GslError
 from gsl.storage import documents, manifest
-from gsl.storage.identity import Identity, changes, identify
+from gsl.storage.identity import Identity, changes, content_hash, identify
 from gsl.storage.manifest import Manifest, Parent
 from gsl.storage.read_files import read_files
 from gsl.storage.versions import commit, versions
-from gsl.storage.whole import explained, flush_tree
-from gsl.storage.workplace import KEY, install, locked, logged, stoppable, workplace
+from gsl.storage.whole import explained_work, flush_tree, remove_temporary
+from gsl.storage.workplace import KEY, complete, install, locked, logged, stoppable, workplace
 
 CONFIG = "config.yaml"
 METRICS = "metrics.json"
 
 
 class Stage(Protocol):
-    """What `build` needs of a stage; one that can be resumed sets `progress`, the file that it goes on from."""
+    """What `build` needs of a stage.
+
+    One that can be resumed sets `progress`, the file that it goes on from, and in `kept` what else it needs for that.
+    """
 
     kind: ClassVar[str]
 
@@ -61,14 +65,22 @@ class Artifact:
     @property
     def config(self) -> dict[str, Any]:
         """The resolved settings it was built with."""
-        config: dict[str, Any] = yaml.safe_load((self.folder / CONFIG).read_text(encoding="utf-8"))
-        return config
+        return self._read(CONFIG, yaml.safe_load)
 
     @property
     def metrics(self) -> dict[str, Any]:
         """The figures its stage reported; null where a number was not finite."""
-        metrics: dict[str, Any] = json.loads((self.folder / self.manifest.metrics).read_text(encoding="utf-8"))
-        return metrics
+        return self._read(self.manifest.metrics, json.loads)
+
+    def _read(self, name: str, parse: Callable[[str], Any]) -> dict[str, Any]:
+        path = self.folder / name
+        try:
+            stored = parse(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
+            raise ArtifactError(path, "is missing or damaged; build the artifact again with force=true") from error
+        if not isinstance(stored, dict):
+            raise ArtifactError(path, "is damaged: it holds no mapping; build the artifact again with force=true")
+        return stored
 
 
 def build(
@@ -86,20 +98,37 @@ def build(
 
     Raises:
         ArtifactError: `out` is something else, or was built otherwise and `force` is not set, or is being built.
-        GslError: The folder is full or cannot be written.
+        GslError: The folder is full or cannot be written, or what the stage read was changed meanwhile.
     """
+    if out.name in ("", ".."):
+        raise ArtifactError(out, "is no folder for an artifact, which is replaced as a whole; choose another out=")
     identity = identify(stage.kind, config, _sources(stage), package_of(type(stage)))
-    with locked(out), stoppable(), explained(out.parent):
+    with locked(out), stoppable(), explained_work(out.parent):
         forced = getattr(stage, "forced", "rebuilds it")
         if (existing := _existing(out, identity, config, force=force, forced=forced)) is not None:
             os.utime(out / manifest.NAME)
+            if (replaced := complete(out)) is not None:
+                shutil.rmtree(replaced)
             return existing
-        with workplace(out, identity.key, progress=getattr(stage, "progress", "")) as folder:
+        if (left := complete(out)) is not None and (same := _intact(left, identity.key)) is not None:
+            install(left, out)
+            return Artifact(out, same)
+        progress, kept = getattr(stage, "progress", ""), getattr(stage, "kept", ())
+        with workplace(out, identity.key, progress=progress, kept=kept) as folder:
             made = _work(stage, identity, config, folder, command, console)
             manifest.write(folder, made)
             flush_tree(folder)
             install(folder, out)
     return Artifact(out, made)
+
+
+def _intact(folder: Path, key: str) -> Manifest | None:
+    """Return the manifest of a folder that is the artifact of this key and as it was written."""
+    try:
+        found = manifest.read(folder)
+    except ArtifactError:
+        return None
+    return found if found.key == key and manifest.damaged_file(folder, found) is None else None
 
 
 def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force: bool, forced: str) -> Artifact | None:
@@ -109,6 +138,10 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
     try:
         found = Artifact(out, manifest.read(out), unchanged=True)
     except ArtifactError as error:
+        if manifest.resembles(out):
+            if force:
+                return None
+            raise
         raise ArtifactError(out, "exists and is no artifact of gsl; move it away or choose another out=") from error
     damaged = manifest.damaged_file(out, found.manifest)
     if found.manifest.key == identity.key and damaged is None:
@@ -132,12 +165,14 @@ def _work(
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
     documents.write_json(folder / METRICS, metrics)
+    parents = _parents(stage, identity, folder)
+    remove_temporary(folder)  # of a worker that was killed
     return Manifest(
         kind=identity.kind,
         key=identity.key,
         command=command,
         files={name: file for name, file in manifest.inventory(folder).items() if name != KEY},
-        parents=_parents(stage, identity, folder),
+        parents=parents,
         seeds=identity.seeds,
         sources=identity.sources,
         versions=versions(),
@@ -154,9 +189,24 @@ def _unit(stage: Stage) -> dict[str, Any] | None:
 
 
 def _parents(stage: Stage, identity: Identity, folder: Path) -> tuple[Parent, ...]:
+    """Return what the stage was made from; refuse what is no longer as it was when the work began: it may be of either.
+
+    Raises:
+        GslError: A parent was changed meanwhile.
+    """
+    sources = _sources(stage)
+    for role in sorted(identity.parents.keys() | sources.keys()):
+        path = sources.get(role)
+        try:
+            same = path is not None and content_hash(path) == identity.parents.get(role)
+        except (ArtifactError, OSError):
+            same = False
+        if not same:
+            what = f"{role} ({path or 'gone'})"
+            raise GslError(f"{what}: was changed while {identity.kind} was at work; run the command again")
     return tuple(
         Parent(role, Path(os.path.relpath(path, folder)).as_posix(), identity.parents[role])
-        for role, path in _sources(stage).items()
+        for role, path in sources.items()
     )
 
 
