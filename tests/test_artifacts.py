@@ -490,7 +490,7 @@ def test_a_full_disk_ends_the_log_without_a_traceback(out: Path, capfd: pytest.C
     def ending(folder: Path) -> None:
         handler = logging.getLogger("gsl").handlers[-1]
         assert isinstance(handler, logging.FileHandler)
-        handler.setStream(Path("/dev/full").open("w"))
+        handler.setStream(Path("/dev/full").open("w"))  # noqa: SIM115  the handler closes it
         logging.getLogger("gsl").info("one line more")
 
     with pytest.raises(GslError, match="cannot be written: No space left"):

@@ -112,14 +112,15 @@ def test_a_line_that_is_missing_repeated_or_moved_ends_the_log(tmp_path: Path) -
         log.append(Generation(n, [float(n)], [0]))
     path = tmp_path / "generations.jsonl"
     a, b, c = path.read_bytes().splitlines(keepends=True)
-    for lines, kept in (
-        ((a, c), 1),
-        ((b, c), 0),
-        ((a, b, b), 2),
-        ((a, c, b), 1),
-        ((a, b, b"[]\n"), 2),
-        ((a, b"\xff"), 1),
-    ):
+    cases: dict[tuple[bytes, ...], int] = {
+        (a, c): 1,
+        (b, c): 0,
+        (a, b, b): 2,
+        (a, c, b): 1,
+        (a, b, b"[]\n"): 2,
+        (a, b"\xff"): 1,
+    }
+    for lines, kept in cases.items():
         path.write_bytes(b"".join(lines))
         found = GenerationLog(tmp_path)
         assert [found.read(n) is not None for n in range(3)] == [n < kept for n in range(3)]

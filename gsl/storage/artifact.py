@@ -7,6 +7,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Mapping
+from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -21,6 +22,7 @@ from gsl.core.unit import Unit
 from gsl.errors import ArtifactError, GslError
 from gsl.storage import documents, manifest
 from gsl.storage.identity import Identity, changes, content_hash, identify
+from gsl.storage.lineage import broken_link, out_of_date
 from gsl.storage.manifest import Manifest, Parent
 from gsl.storage.read_files import read_files
 from gsl.storage.versions import commit, versions
@@ -35,6 +37,7 @@ class Stage(Protocol):
     """What `build` needs of a stage.
 
     One that can be resumed sets `progress`, the file that it goes on from, and in `kept` what else it needs for that.
+    One that builds parts itself sets `makes`: settings below which names of such parts (`identity.MADE`) mean nothing.
     """
 
     kind: ClassVar[str]
@@ -102,24 +105,39 @@ def build(
     """
     if out.name in ("", ".."):
         raise ArtifactError(out, "is no folder for an artifact, which is replaced as a whole; choose another out=")
-    identity = identify(stage.kind, config, _sources(stage), package_of(type(stage)))
+    sources = _sources(stage)
+    package, made = package_of(type(stage)), getattr(stage, "makes", ())
+    identity = identify(stage.kind, config, sources, package, made=made)
+    for stale in filter(None, map(out_of_date, sources.values())):
+        console.status(f"warning: {stale}; the same commands again bring it up to date")
     with locked(out), stoppable(), explained_work(out.parent):
         forced = getattr(stage, "forced", "rebuilds it")
         if (existing := _existing(out, identity, config, force=force, forced=forced)) is not None:
             os.utime(out / manifest.NAME)
             if (replaced := complete(out)) is not None:
                 shutil.rmtree(replaced)
+            _note(existing)
             return existing
         if (left := complete(out)) is not None and (same := _intact(left, identity.key)) is not None:
             install(left, out)
-            return Artifact(out, same)
+            return _note(Artifact(out, same))
         progress, kept = getattr(stage, "progress", ""), getattr(stage, "kept", ())
         with workplace(out, identity.key, progress=progress, kept=kept) as folder:
             made = _work(stage, identity, config, folder, command, console)
             manifest.write(folder, made)
             flush_tree(folder)
             install(folder, out)
-    return Artifact(out, made)
+    return _note(Artifact(out, made))
+
+
+_built: ContextVar[dict[Path, Artifact] | None] = ContextVar("built", default=None)
+"""What the stage that is at work has built beside itself, by absolute path."""
+
+
+def _note(artifact: Artifact) -> Artifact:
+    if (built := _built.get()) is not None:
+        built[artifact.folder.absolute()] = artifact
+    return artifact
 
 
 def _intact(folder: Path, key: str) -> Manifest | None:
@@ -144,12 +162,14 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
             raise
         raise ArtifactError(out, "exists and is no artifact of gsl; move it away or choose another out=") from error
     damaged = manifest.damaged_file(out, found.manifest)
-    if found.manifest.key == identity.key and damaged is None:
+    wrong = f"changed since: {damaged}" if damaged else broken_link(out, found.manifest)
+    if found.manifest.key == identity.key and wrong is None:
         return found
     if force:
         return None
-    reason = f"changed since: {damaged}" if damaged else changes(found.manifest, found.config, identity, config)
-    raise ArtifactError(out, f"was built otherwise ({reason}); force=true {forced}, another name= keeps both")
+    if damaged is None and found.manifest.key != identity.key:
+        wrong = changes(found.manifest, found.config, identity, config)
+    raise ArtifactError(out, f"was built otherwise ({wrong}); force=true {forced}, another name= keeps both")
 
 
 def _work(
@@ -161,7 +181,12 @@ def _work(
     (folder / CONFIG).write_text(settings, encoding="utf-8")
     with logged(folder) as logger:
         logger.info("%s begins: %s", identity.kind, command)
-        metrics = stage.run(folder, console)
+        links: dict[Path, Artifact] = {}
+        token = _built.set(links)
+        try:
+            metrics = stage.run(folder, console)
+        finally:
+            _built.reset(token)
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
     documents.write_json(folder / METRICS, metrics)
@@ -173,6 +198,9 @@ def _work(
         command=command,
         files={name: file for name, file in manifest.inventory(folder).items() if name != KEY},
         parents=parents,
+        links=tuple(
+            Parent(one.manifest.kind, _relative(path, folder), one.manifest.contents) for path, one in links.items()
+        ),
         seeds=identity.seeds,
         sources=identity.sources,
         versions=versions(),
@@ -204,10 +232,11 @@ def _parents(stage: Stage, identity: Identity, folder: Path) -> tuple[Parent, ..
         if not same:
             what = f"{role} ({path or 'gone'})"
             raise GslError(f"{what}: was changed while {identity.kind} was at work; run the command again")
-    return tuple(
-        Parent(role, Path(os.path.relpath(path, folder)).as_posix(), identity.parents[role])
-        for role, path in sources.items()
-    )
+    return tuple(Parent(role, _relative(path, folder), identity.parents[role]) for role, path in sources.items())
+
+
+def _relative(path: Path, folder: Path) -> str:
+    return Path(os.path.relpath(path, folder)).as_posix()
 
 
 def _sources(stage: Stage) -> dict[str, Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -97,6 +98,18 @@ def damaged_file(folder: Path, manifest: Manifest) -> str | None:
         path = folder / name
         if not path.is_file() or path.stat().st_size != file.bytes or file_hash(path) != file.sha256:
             return name
+    return None
+
+
+def strange_file(folder: Path, manifest: Manifest) -> str | None:
+    """Return the first file of the folder that the manifest does not name; hidden ones and other artifacts are none."""
+    for place, folders, files in os.walk(folder):
+        here = Path(place)
+        folders[:] = sorted(name for name in folders if name[0] != "." and not (here / name / NAME).is_file())
+        for name in sorted(files):
+            path = (here / name).relative_to(folder).as_posix()
+            if name[0] != "." and path != NAME and path not in manifest.files:
+                return path
     return None
 
 
