@@ -5,6 +5,7 @@ import fcntl
 import json
 import logging
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -496,3 +497,54 @@ def test_a_full_disk_ends_the_log_without_a_traceback(out: Path, capfd: pytest.C
     with pytest.raises(GslError, match="cannot be written: No space left"):
         built(Doubling(ending=ending), out)
     assert capfd.readouterr().err == ""
+
+
+@dataclass
+class Chaining(Doubling):
+    """A stage that builds two others beside itself."""
+
+    kind: ClassVar[str] = "chaining"
+    makes: ClassVar[tuple[str, ...]] = ("grounding",)
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        first = built(Doubling(1), folder.parent / "first", force=True).folder
+        built(Doubling(2, data=first), folder.parent / "second", force=True)
+        return super().run(folder, console)
+
+
+LINKS: dict[str, tuple[Callable[[Path], object], str]] = {
+    "deleted": (lambda home: shutil.rmtree(home / "first"), "gone or damaged: .*first"),
+    "damaged": (lambda home: (home / "second/sub/payload.txt").write_text("12"), "changed since: .*second/sub/payload"),
+    "without manifest": (lambda home: (home / "second/manifest.json").unlink(), "gone or damaged: .*second"),
+    "built anew": (lambda home: built(Doubling(3), home / "first", force=True), "built anew since: .*first"),
+}
+
+
+@pytest.mark.parametrize("how", LINKS)
+def test_a_chain_is_unchanged_only_with_its_links(out: Path, how: str) -> None:
+    act, words = LINKS[how]
+    home = out.parent
+    made = built(Chaining(), out)
+    assert [(link.role, link.path) for link in made.manifest.links] == [
+        ("doubling", "../first"),
+        ("doubling", "../second"),
+    ]
+    assert built(Chaining(), out).unchanged
+    act(home)
+    if how == "without manifest":
+        shutil.rmtree(home / "second")  # what is no artifact is not built over
+    with pytest.raises(ArtifactError, match=words):
+        built(Chaining(), out)
+    assert not built(Chaining(), out, force=True).unchanged
+    assert built(Chaining(), out).unchanged
+
+
+def test_a_moved_chain_is_unchanged_whatever_its_parts_would_be_called(out: Path) -> None:
+    names = {"_target_": "Gat", "forward_model": "quick/train_forward", "inner": {"servo": "quick/train_servo"}}
+    built(Chaining(), out, grounding=names)
+    moved = out.parent.rename(out.parent.with_name("moved")) / out.name
+    names = {"_target_": "Gat", "forward_model": "moved/train_forward", "inner": {"servo": "moved/train_servo"}}
+    assert built(Chaining(), moved, grounding=names).unchanged
+    with pytest.raises(ArtifactError, match="world.servo a -> b"):
+        built(Chaining(), moved.with_name("b"), world={"servo": "a"})
+        built(Chaining(), moved.with_name("b"), world={"servo": "b"})

@@ -38,9 +38,9 @@ class Ancestor:
         yield self
 
 
-def lineage(folder: Path) -> Ancestor:
-    """Return an artifact with all that is above it, every file hashed again."""
-    return _traced("", folder, None, set())
+def lineage(folder: Path, seen: set[Path]) -> Ancestor:
+    """Return an artifact with all that is above it, every file hashed again; what is in `seen` is not followed."""
+    return _traced("", folder, None, seen)
 
 
 def _traced(role: str, place: Path, expected: str | None, seen: set[Path]) -> Ancestor:
