@@ -33,7 +33,7 @@ def compiled(function: F) -> F:
     return dispatcher  # type: ignore[return-value]
 
 
-class _CheckedFiles(IndexDataCacheFile):  # type: ignore[misc]
+class _CheckedFiles(IndexDataCacheFile):
     """Numba's files of a function; what is not as it was written counts as missing, so that it is compiled again."""
 
     def _load_index(self) -> dict[Any, str]:
