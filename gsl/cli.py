@@ -109,18 +109,19 @@ def lineage(reference: Reference, json: Json = False) -> None:
     draw_lineage(reference, Console(json=json))
 
 
+_RERUN = "A new place, RUN_rerun by default; whether its settings may name classes that are not gsl's."
+
+
 @app.command()
 def rerun(
     reference: Reference,
-    out: Annotated[str, typer.Argument(metavar="[out=DIR]", help="New place; RUN_rerun by default.")] = "",
-    trust: Annotated[bool, typer.Option("--trust", help="Let its settings name classes that are not gsl's.")] = False,
+    settings: Annotated[list[str] | None, typer.Argument(metavar="[out=DIR] [trust=true]", help=_RERUN)] = None,
     json: Json = False,
 ) -> None:
     """Repeat a run from its manifest into a new place and compare the payloads."""
     from gsl.commandline.rerun import rerun
 
-    place = Path(out.removeprefix("out=")) if out else None
-    raise typer.Exit(rerun(reference, place, Console(json=json), trust=trust))
+    raise typer.Exit(rerun(reference, settings or [], Console(json=json)))
 
 
 @app.command()

@@ -3,51 +3,53 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from gsl.core.described import rebuilt
-from gsl.errors import ArtifactError
+from gsl.errors import ArtifactError, ConfigError
 from gsl.report.console import Console
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact, build
-from gsl.storage.hashing import CIRCUMSTANCES, SHORT, sources_hash
+from gsl.storage.hashing import CIRCUMSTANCES, SHORT
 from gsl.storage.identity import content_hash
 from gsl.storage.references import resolve
-from gsl.storage.versions import versions
 
 AGAIN = "_rerun"
 """What is added to the name of a run."""
 
 
-def rerun(reference: str, out: Path | None, console: Console, *, trust: bool) -> int:
+def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
     """Build an artifact again and compare; return 1 if another payload comes out.
 
     Args:
         reference: A path, or the name of a run.
-        out: Where it is built; beside the run by default.
+        settings: `out=` where it is built, beside the run by default, and `trust=true` if its settings may name classes
+            that are not gsl's.
         console: Where both are set against each other.
-        trust: Whether its settings may name classes that are not gsl's.
 
     Raises:
         ArtifactError: There is no such artifact, what it was made from is no longer the same, or the place is taken.
         ConfigError: Its settings do not fit this version of gsl.
     """
+    words = dict(word.partition("=")[::2] for word in settings)
+    if unknown := sorted(words.keys() - {"out", "trust"}):
+        raise ConfigError(unknown[0], "is no setting of gsl rerun, which takes out= and trust=true")
     folder = resolve(reference)
     old = Artifact(folder, manifest.read(folder))
-    place = out or _beside(folder)
+    place = Path(words["out"]) if words.get("out") else _beside(folder)
     if place.exists():
         raise ArtifactError(place, "exists; take it away or choose another out=")
-    settings = dict(old.config)
+    config = old.config
     for parent in old.manifest.parents:
         source = Path(os.path.relpath(folder / parent.path))
         if content_hash(source) != parent.hash:
             raise ArtifactError(source, f"is no longer what {folder.as_posix()} was made from")
-        _move(settings, parent.role.split("."), source)
-    stage = rebuilt(settings, trust=trust)
+        _move(config, parent.role.split("."), source)
+    stage = rebuilt(config, trust=words.get("trust") == "true")
     command = f"gsl rerun {folder.as_posix()}"
-    new = build(stage, config=settings, out=place, command=command, force=False, console=console)
+    new = build(stage, config=config, out=place, command=command, force=False, console=console)
     rows = list(_compared(old, new))
     other = [name for name, _, same in rows if not same]
     document = {"folder": place, "differs": other, "compared": [name for name, _, _ in rows]}
@@ -62,7 +64,7 @@ def rerun(reference: str, out: Path | None, console: Console, *, trust: bool) ->
     if console.json:
         console.result({**document, "exit_code": 1})
         return 1
-    message = f"{place.as_posix()}: another payload than {folder.as_posix()}: {', '.join(other)}{_why(old)}"
+    message = f"{place.as_posix()}: another payload than {folder.as_posix()}: {', '.join(other)}{_why(old, new)}"
     return console.error(message, 1, command="gsl rerun")
 
 
@@ -100,10 +102,10 @@ def _compared(old: Artifact, new: Artifact) -> Iterator[tuple[str, str, bool]]:
         yield name, after.get(name, "none"), before.get(name) == after.get(name)
 
 
-def _why(old: Artifact) -> str:
+def _why(old: Artifact, new: Artifact) -> str:
     """Return what of the software has changed since."""
-    now, before = versions(), old.manifest.versions
+    now, before = new.manifest.versions, old.manifest.versions
     changed = [f"{name} {was} -> {now.get(name)}" for name, was in before.items() if now.get(name) != was]
-    if old.manifest.sources != sources_hash():
+    if old.manifest.sources != new.manifest.sources:
         changed.append("gsl's sources")
     return f" (since then: {', '.join(changed)})" if changed else ""
