@@ -26,6 +26,8 @@ from gsl.core.interruption import ignore, listen
 from gsl.report.console import Console
 from gsl.version import __version__
 
+Reference = Annotated[str, typer.Argument(metavar="REF", help="Path, or name of a run.")]
+
 app = typer.Typer(
     cls=Commands,
     help="Grounded simulation learning: from a few real trajectories to a policy that works on the robot.",
@@ -81,13 +83,45 @@ def runs(json: Json = False) -> None:
 
 
 @app.command()
-def show(
-    reference: Annotated[str, typer.Argument(metavar="REF", help="Path, or name of a run.")], json: Json = False
-) -> None:
+def show(reference: Reference, json: Json = False) -> None:
     """Show how an artifact came about and what it holds."""
     from gsl.commandline.listing import show_artifact
 
-    show_artifact(reference, Console(json=json))
+    raise typer.Exit(show_artifact(reference, Console(json=json)))
+
+
+@app.command()
+def verify(
+    reference: Annotated[str | None, typer.Argument(metavar="[REF]", help="Path, or name of a run; or all.")] = None,
+    json: Json = False,
+) -> None:
+    """Hash artifacts and all that they were made from again; exit 1 with the first thing that is wrong."""
+    from gsl.commandline.lineage import verify
+
+    raise typer.Exit(verify(reference, Console(json=json)))
+
+
+@app.command()
+def lineage(reference: Reference, json: Json = False) -> None:
+    """Draw what an artifact was made from."""
+    from gsl.commandline.lineage import draw_lineage
+
+    draw_lineage(reference, Console(json=json))
+
+
+_RERUN = "A new place, RUN_rerun by default; whether its settings may name classes that are not gsl's."
+
+
+@app.command()
+def rerun(
+    reference: Reference,
+    settings: Annotated[list[str] | None, typer.Argument(metavar="[out=DIR] [trust=true]", help=_RERUN)] = None,
+    json: Json = False,
+) -> None:
+    """Repeat a run from its manifest into a new place and compare the payloads."""
+    from gsl.commandline.rerun import rerun
+
+    raise typer.Exit(rerun(reference, settings or [], Console(json=json)))
 
 
 @app.command()

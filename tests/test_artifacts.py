@@ -5,6 +5,7 @@ import fcntl
 import json
 import logging
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from typing import Any, ClassVar
 
 import pytest
 
+from gsl.commandline.failure import describe_failure
 from gsl.errors import ArtifactError, GslError
 from gsl.storage import hashing, manifest
 from gsl.storage.artifact import Artifact, build
@@ -323,7 +325,7 @@ def test_the_hash_of_the_sources_is_cheap() -> None:
 def test_a_manifest_of_another_version_or_damaged_is_refused(out: Path) -> None:
     built(Doubling(), out)
     stored = json.loads((out / "manifest.json").read_text())
-    for contents in ("{", "[]", json.dumps({**stored, "schema_version": 2}), json.dumps({"schema_version": 1})):
+    for contents in ("{", "[]", json.dumps({**stored, "schema_version": 3}), json.dumps({"schema_version": 2})):
         (out / "manifest.json").write_text(contents)
         with pytest.raises(ArtifactError):
             manifest.read(out)
@@ -341,3 +343,208 @@ def test_a_json_file_has_numbers_of_a_list_on_one_line_and_is_read_as_it_was(tmp
     lines = [line.strip() for line in written.splitlines()]
     assert "[1, -2.5e-07, null]," in lines
     assert '"c": [1.0]' in lines
+
+
+def test_a_parent_that_is_exchanged_while_a_stage_works_is_refused(out: Path, tmp_path: Path) -> None:
+    log, parent = tmp_path / "log", built(Doubling(), tmp_path / "parent").folder
+    log.write_text("a")
+
+    def damaging(folder: Path) -> None:
+        (parent / "sub/payload.txt").write_text("12")
+
+    for data, ending in (
+        (log, lambda folder: log.write_text("b")),
+        (log, lambda folder: log.unlink()),
+        (parent, damaging),
+    ):
+        with pytest.raises(GslError, match=f"data .*{data}.* was changed while doubling was at work") as caught:
+            built(Doubling(data=data, ending=ending), out)
+        assert caught.value.exit_code == 1
+        assert not out.parent.exists()
+
+
+def test_what_a_kill_left_beside_the_progress_is_no_part_of_the_artifact(out: Path) -> None:
+    """Half a payload, the temporary name of another one, a file of a stage that would write it only sometimes."""
+
+    def dying(folder: Path) -> None:
+        (folder / "progress").write_text("half")
+        (folder / ".progress.tmp-1").write_text("ha")
+        (folder / "sub/.payload.txt.tmp-77").write_text("1")
+        (folder / "grounding.json").write_text("{}")
+        raise KeyboardInterrupt
+
+    def with_dead_worker(folder: Path) -> None:
+        (folder / "sub/.payload.txt.tmp-78").write_text("1")
+
+    with pytest.raises(KeyboardInterrupt):
+        built(Resumable(ending=dying), out)
+    made = built(Resumable(ending=with_dead_worker), out)
+    assert set(made.manifest.files) == {"config.yaml", "log.txt", "metrics.json", "progress", "sub/payload.txt"}
+    assert {path.name for path in out.rglob("*.tmp-*")} == set()
+
+
+def test_a_kill_in_the_middle_of_the_renaming_loses_neither_the_old_nor_the_new(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ending(folder: Path) -> None:
+        (folder / "progress").write_text("whole")
+
+    def dying(*_: Any) -> None:
+        raise SystemExit  # as far as the folders go, the end of the process
+
+    for moment in ("exchange", "flush"):
+        built(Resumable(1, ending=ending), out, force=True)
+        with monkeypatch.context() as patch:
+            patch.setattr(f"gsl.storage.workplace.{moment}", dying)
+            with pytest.raises(SystemExit):
+                built(Resumable(2, ending=ending), out, force=True)
+        assert (out / "sub/payload.txt").read_text() == "11"
+        stage = Resumable(2)
+        built(stage, out, force=True)
+        assert not stage.calls, "the complete work is taken over"
+        assert (out / "sub/payload.txt").read_text() == "22"
+        assert not hidden(out.parent)
+        assert built(Resumable(2), out).unchanged
+
+
+@pytest.mark.parametrize("swap", [True, False], ids=["exchange", "two renames"])
+def test_the_key_is_in_no_complete_artifact_and_the_old_one_goes(
+    out: Path, swap: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not swap:
+        monkeypatch.setattr("gsl.storage.workplace.exchange", lambda one, other: False)
+    for number in (1, 2):
+        built(Doubling(number), out, force=True)
+        assert (out / "sub/payload.txt").read_text() == 2 * str(number)
+        assert not hidden(out)
+        assert not hidden(out.parent)
+
+
+@pytest.mark.parametrize("name", ["*", "[ab]", "a?", "a.tmp-1"])
+def test_an_odd_name_touches_nobody_elses_work(tmp_path: Path, name: str) -> None:
+    others = [tmp_path / ".a.tmp-1", tmp_path / ".ab.tmp-12", tmp_path / ".a.tmp-1.tmp-12x"]
+    for other in others:
+        other.mkdir()
+    built(Doubling(), tmp_path / name)
+    assert all(other.is_dir() for other in others)
+    built(Doubling(), tmp_path / "a")
+    assert [other.is_dir() for other in others] == [False, True, True]
+
+
+@pytest.mark.parametrize("place", [".", "/", "..", "a/.."])
+def test_a_place_without_a_name_is_refused(place: str) -> None:
+    with pytest.raises(ArtifactError, match="out="):
+        built(Doubling(), Path(place))
+
+
+def test_every_flipped_bit_of_a_manifest_is_seen_and_force_mends_it(out: Path) -> None:
+    built(Doubling(), out)
+    path = out / "manifest.json"
+    whole, same = path.read_bytes(), manifest.read(out)
+    for index in range(0, len(whole)):
+        flipped = bytearray(whole)
+        flipped[index] ^= 1 << index % 8
+        path.write_bytes(flipped)
+        try:
+            assert manifest.read(out) == same
+        except ArtifactError:
+            continue
+    with pytest.raises(ArtifactError, match=r"manifest\.json: is damaged.*force=true"):
+        built(Doubling(), out)
+    built(Doubling(), out, force=True)
+    assert manifest.damaged_file(out, manifest.read(out)) is None
+
+
+def test_a_manifest_without_files_hides_no_damage(out: Path) -> None:
+    built(Doubling(), out)
+    path = out / "manifest.json"
+    whole = json.loads(path.read_text())
+    older = {key: value for key, value in whole.items() if key not in ("sha256", "links")} | {"schema_version": 1}
+    path.write_text(json.dumps(older))
+    assert manifest.read(out).files == manifest.read(out).files
+    for stored in (whole, older):
+        path.write_text(json.dumps({**stored, "files": {}}))
+        with pytest.raises(ArtifactError, match="is damaged"):
+            manifest.read(out)
+    path.write_text(json.dumps({key: value for key, value in whole.items() if key != "sha256"}))
+    with pytest.raises(ArtifactError, match="is damaged"):
+        manifest.read(out)
+
+
+def test_a_refusal_of_the_system_is_said_as_what_it_is(out: Path, tmp_path: Path) -> None:
+    """Only what concerns the folder that is being written is called so."""
+    for error in (
+        OSError(errno.EIO, os.strerror(errno.EIO), str(tmp_path / "log.csv")),
+        PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(out.parent / "collect" / "a.parquet")),
+        OSError(errno.EMFILE, os.strerror(errno.EMFILE)),
+    ):
+        with pytest.raises(OSError) as caught:
+            built(Doubling(ending=raising(error)), out)
+        assert caught.value is error
+        message, code = describe_failure(error)
+        assert str(error.strerror) in message
+        assert "internal" not in message
+        assert code == 1
+
+
+def test_a_full_disk_ends_the_log_without_a_traceback(out: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    def ending(folder: Path) -> None:
+        handler = logging.getLogger("gsl").handlers[-1]
+        assert isinstance(handler, logging.FileHandler)
+        handler.setStream(Path("/dev/full").open("w"))  # noqa: SIM115  the handler closes it
+        logging.getLogger("gsl").info("one line more")
+
+    with pytest.raises(GslError, match="cannot be written: No space left"):
+        built(Doubling(ending=ending), out)
+    assert capfd.readouterr().err == ""
+
+
+@dataclass
+class Chaining(Doubling):
+    """A stage that builds two others beside itself."""
+
+    kind: ClassVar[str] = "chaining"
+    makes: ClassVar[tuple[str, ...]] = ("grounding",)
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        first = built(Doubling(1), folder.parent / "first", force=True).folder
+        built(Doubling(2, data=first), folder.parent / "second", force=True)
+        return super().run(folder, console)
+
+
+LINKS: dict[str, tuple[Callable[[Path], object], str]] = {
+    "deleted": (lambda home: shutil.rmtree(home / "first"), "gone or damaged: .*first"),
+    "damaged": (lambda home: (home / "second/sub/payload.txt").write_text("12"), "changed since: .*second/sub/payload"),
+    "without manifest": (lambda home: (home / "second/manifest.json").unlink(), "gone or damaged: .*second"),
+    "built anew": (lambda home: built(Doubling(3), home / "first", force=True), "built anew since: .*first"),
+}
+
+
+@pytest.mark.parametrize("how", LINKS)
+def test_a_chain_is_unchanged_only_with_its_links(out: Path, how: str) -> None:
+    act, words = LINKS[how]
+    home = out.parent
+    made = built(Chaining(), out)
+    assert [(link.role, link.path) for link in made.manifest.links] == [
+        ("doubling", "../first"),
+        ("doubling", "../second"),
+    ]
+    assert built(Chaining(), out).unchanged
+    act(home)
+    if how == "without manifest":
+        shutil.rmtree(home / "second")  # what is no artifact is not built over
+    with pytest.raises(ArtifactError, match=words):
+        built(Chaining(), out)
+    assert not built(Chaining(), out, force=True).unchanged
+    assert built(Chaining(), out).unchanged
+
+
+def test_a_moved_chain_is_unchanged_whatever_its_parts_would_be_called(out: Path) -> None:
+    names = {"_target_": "Gat", "forward_model": "quick/train_forward", "inner": {"servo": "quick/train_servo"}}
+    built(Chaining(), out, grounding=names)
+    moved = out.parent.rename(out.parent.with_name("moved")) / out.name
+    names = {"_target_": "Gat", "forward_model": "moved/train_forward", "inner": {"servo": "moved/train_servo"}}
+    assert built(Chaining(), moved, grounding=names).unchanged
+    with pytest.raises(ArtifactError, match="world.servo a -> b"):
+        built(Chaining(), moved.with_name("b"), world={"servo": "a"})
+        built(Chaining(), moved.with_name("b"), world={"servo": "b"})

@@ -95,12 +95,12 @@ def test_an_artifact_that_is_missing_or_foreign(arguments: tuple[str, ...], line
 def test_an_artifact_of_another_version_is_named(chain: Path) -> None:
     manifest = chain / "runs/chain/optimize/manifest.json"
     whole = manifest.read_text()
-    manifest.write_text(whole.replace('"schema_version": 1', '"schema_version": 9'))
+    manifest.write_text(whole.replace('"schema_version": 2', '"schema_version": 9'))
     try:
         line = refused("evaluate", "policies=chain/optimize", "out=runs/refused", folder=chain)
     finally:
         manifest.write_text(whole)
-    assert line == "runs/chain/optimize/manifest.json: schema_version 9 is unknown; this gsl reads 1"
+    assert line == "runs/chain/optimize/manifest.json: schema_version 9 is unknown; this gsl reads 2"
 
 
 @pytest.fixture

@@ -58,7 +58,7 @@ def searched(objective: str, folder: Path, quantile: float = 0.25) -> tuple[dict
 def test_a_search_maximises_it_and_tells_the_mean(tmp_path: Path) -> None:
     metrics, generations = searched("cvar", tmp_path / "cvar")
     _, by_mean = searched("mean", tmp_path / "mean")
-    assert set(by_mean[0]) == {"number", "values", "falls"}
+    assert set(by_mean[0]) == {"number", "values", "falls", "chain"}
     assert generations[0]["means"] == by_mean[0]["values"]  # the same candidates, seeds and episodes
     assert all(worst < mean for worst, mean in zip(generations[0]["values"], by_mean[0]["values"], strict=True))
     winners = [int(np.argmax(one["values"])) for one in generations]

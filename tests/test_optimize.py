@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scenarios import AIR, QUIET, REACH
 
+from gsl.core.console import Silent
 from gsl.core.interfaces import Step
 from gsl.core.layout import Layout
 from gsl.grounding.none import NoGrounding
@@ -58,6 +59,71 @@ def test_generations_read_from_the_log_are_not_run_again(tmp_path: Path) -> None
     _search(2).run(tmp_path, QUIET)
     assert (tmp_path / "policies.json").read_bytes() == whole
     assert log.read_text() == first + second
+
+
+@pytest.mark.parametrize("index", [0.03, 0.3, 0.6, 0.97])
+def test_a_flipped_bit_in_the_log_changes_nothing_of_the_search(tmp_path: Path, index: float) -> None:
+    _search(2).run(tmp_path, QUIET)
+    files = {name: (tmp_path / name).read_bytes() for name in ("policies.json", BEST, "generations.jsonl")}
+    log = bytearray(files["generations.jsonl"])
+    log[int(index * len(log))] ^= 1
+    (tmp_path / "generations.jsonl").write_bytes(log)
+    console = Recording()
+    _search(2).run(tmp_path, console)
+    assert {name: (tmp_path / name).read_bytes() for name in files} == files
+    [line] = [text for text in console.said if "generations.jsonl" in text]
+    assert f"damaged or incomplete and cut off; the work goes on after record {int(index > 0.5)}" in line
+
+
+class Recording(Silent):
+    """A console that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def status(self, text: str) -> None:
+        self.said.append(text)
+
+
+def test_whatever_bit_is_flipped_the_log_returns_only_what_was_written(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    log = GenerationLog(tmp_path)
+    written = [Generation(n, rng.normal(size=3).tolist(), [0, 1, 2]) for n in range(3)]
+    for generation in written:
+        log.append(generation)
+    path = tmp_path / "generations.jsonl"
+    whole = path.read_bytes()
+    ends = [0, *np.flatnonzero(np.frombuffer(whole, np.uint8) == ord("\n")) + 1]
+    for bit in range(8 * len(whole)):
+        damaged = bytearray(whole)
+        damaged[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(damaged)
+        said: list[str] = []
+        found = GenerationLog(tmp_path, said.append)
+        intact = int(np.searchsorted(ends, bit // 8, side="right")) - 1
+        assert [found.read(n) for n in range(3)] == [*written[:intact], *[None] * (3 - intact)]
+        assert len(said) == 1
+        assert path.read_bytes() == whole[: ends[intact]]
+
+
+def test_a_line_that_is_missing_repeated_or_moved_ends_the_log(tmp_path: Path) -> None:
+    log = GenerationLog(tmp_path)
+    for n in range(3):
+        log.append(Generation(n, [float(n)], [0]))
+    path = tmp_path / "generations.jsonl"
+    a, b, c = path.read_bytes().splitlines(keepends=True)
+    cases: dict[tuple[bytes, ...], int] = {
+        (a, c): 1,
+        (b, c): 0,
+        (a, b, b): 2,
+        (a, c, b): 1,
+        (a, b, b"[]\n"): 2,
+        (a, b"\xff"): 1,
+    }
+    for lines, kept in cases.items():
+        path.write_bytes(b"".join(lines))
+        found = GenerationLog(tmp_path)
+        assert [found.read(n) is not None for n in range(3)] == [n < kept for n in range(3)]
 
 
 @dataclass(frozen=True)

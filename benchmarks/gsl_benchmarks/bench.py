@@ -6,7 +6,6 @@ import os
 import resource
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -16,6 +15,7 @@ import numpy as np
 
 from gsl.core.described import described
 from gsl.core.interfaces import SIM
+from gsl.core.scratch import Scratch
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.grounding.none import NoGrounding
 from gsl.policies.walk_engine import WalkEngine
@@ -136,7 +136,7 @@ def _writing(scenario: Scenario, made: Sequence[Trajectory]) -> float:
         "policy": described(scenario.policy),
     }
     batch = Batch(episodes, layout.joints, layout.control_period, about)
-    with tempfile.TemporaryDirectory(prefix="gsl-") as folder:
+    with Scratch() as folder:
         return _median(lambda: write(Path(folder, "trajectories.parquet"), batch), time.process_time, 5)
 
 

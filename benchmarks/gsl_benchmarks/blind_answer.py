@@ -16,9 +16,10 @@ from gsl.core.setting import component, setting
 from gsl.core.validation import make
 from gsl.diagnosis.log.files import check_log, on_ground
 from gsl.diagnosis.options import Options
-from gsl.rollout.parallel import Workers, in_parallel
+from gsl.rollout.parallel import Workers, arriving
 from gsl.storage import documents
 from gsl.storage.hashing import file_hash
+from gsl.storage.records import Records
 from gsl.storage.trajectories import read
 from gsl.worlds.bullet import BulletWorld
 from gsl_benchmarks.blind.answer import Question, answered, answered_by_baselines
@@ -38,7 +39,8 @@ from gsl_benchmarks.blind.files import (
 )
 from gsl_benchmarks.blind.seals import VERSION, files_below, total
 
-BEGUN = "data.json"
+ANSWERED = "answered.jsonl"
+"""What a run that was stopped goes on from: the cases that have an answer, with the hashes of its files."""
 
 
 class _Task(NamedTuple):
@@ -57,7 +59,8 @@ class BlindAnswer:
     """
 
     kind: ClassVar[str] = "blind_answer"
-    progress: ClassVar[str] = BEGUN
+    progress: ClassVar[str] = ANSWERED
+    kept: ClassVar[tuple[str, ...]] = (ANSWERS, BASELINES)
 
     data: Annotated[str, setting("folder of the cases, of gsl blind make or of one's own", min_length=1)]
     baselines: Annotated[bool, setting("answer with four simpler methods as well")] = False
@@ -74,18 +77,20 @@ class BlindAnswer:
         """Write an answer for each case, and the hash of all."""
         seals = self.parents()["data"]
         cases = [seals.parent / CASES / name for name in seals_of(seals)]
-        documents.write_json(folder / BEGUN, {"schema_version": VERSION, "seals": file_hash(seals)})
+        answered = Records(folder / ANSWERED, console.status)
+        _drop_unrecorded(folder, answered, console)
         (folder / ANSWERS).mkdir(exist_ok=True)
         leaders = _leaders(cases) if self.nulls else {case: case for case in cases}
         with console.progress(len(cases), "answering") as progress:
-            self._all(set(leaders.values()), {}, folder, progress)
-            self._all(set(cases), leaders, folder, progress)
+            self._all(set(leaders.values()), {}, folder, answered, progress)
+            self._all(set(cases), leaders, folder, answered, progress)
         answers = [document(_file(folder, case)) for case in cases]
         hashes = files_below(folder / ANSWERS)
         for place in sorted((folder / BASELINES).glob("*")):
             hashes |= {f"{place.name}/{name}": sha for name, sha in files_below(place).items()}
         sealed = {"schema_version": VERSION, "data": file_hash(seals), "answers": hashes, "total": total(hashes)}
         documents.write_json(folder / SEAL, sealed)
+        (folder / ANSWERED).unlink()  # its order is that in which the answers came
         seconds = [one["seconds"] for one in answers]
         words = [one["verdict"] for one in answers]
         return {
@@ -96,12 +101,30 @@ class BlindAnswer:
             "seal": sealed["total"],
         }
 
-    def _all(self, cases: Iterable[Path], leaders: Mapping[Path, Path], folder: Path, progress: Progress) -> None:
+    def _all(
+        self, cases: Iterable[Path], leaders: Mapping[Path, Path], folder: Path, answered: Records, progress: Progress
+    ) -> None:
         """Answer the cases that have no answer yet; those with a leader use what chance gained there."""
         missing = [case for case in sorted(cases) if not _file(folder, case).exists()]
         tasks = [_Task(case, folder, _nulls(folder, leaders.get(case))) for case in missing]
         options = Options(most=self.most, duels=self.duels, nulls=self.nulls, threads=1)
-        in_parallel(_answer, (options, self.baselines), tasks, self.workers, progress)
+        for _, hashes in arriving(_answer, (options, self.baselines), tasks, self.workers, progress):
+            answered.append(hashes)
+
+
+def _drop_unrecorded(folder: Path, answered: Records, console: Console) -> None:
+    """Remove answers that nobody wrote down, as of a worker that was killed, or that are no longer what was."""
+    hashes = {name: sha for record in answered.records for name, sha in record.items()}
+    wrong = [
+        path
+        for place in (ANSWERS, BASELINES)
+        for path in sorted((folder / place).rglob("*.json"))
+        if hashes.get(path.relative_to(folder).as_posix()) != file_hash(path)
+    ]
+    for path in wrong:
+        path.unlink()
+    if wrong:
+        console.status(f"{len(wrong)} answers are not as they were written down; they are given again")
 
 
 def _leaders(cases: Sequence[Path]) -> dict[Path, Path]:
@@ -131,16 +154,20 @@ def _file(folder: Path, case: Path) -> Path:
     return folder / ANSWERS / f"{case.name}.json"
 
 
-def _answer(frozen: bytes, task: _Task) -> None:
-    """Answer one case; its own answer is written last, for it says that the case is done."""
+def _answer(frozen: bytes, task: _Task) -> dict[str, str]:
+    """Answer one case and return the hashes of the files by name; its own answer says that the case is done."""
     options, baselines = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
     question, without = _question(task.case)
     asked = replace(options, without=tuple(without))
+    files = []
     for name, told in (answered_by_baselines(question, asked, _quiet) if baselines else {}).items():
         (task.folder / BASELINES / name).mkdir(parents=True, exist_ok=True)
-        documents.write_json(task.folder / BASELINES / name / f"{task.case.name}.json", told)
+        files.append(task.folder / BASELINES / name / f"{task.case.name}.json")
+        documents.write_json(files[-1], told)
     told = answered(question, asked, known_nulls=task.nulls, tick=_quiet)
-    documents.write_json(_file(task.folder, task.case), told)
+    files.append(_file(task.folder, task.case))
+    documents.write_json(files[-1], told)
+    return {path.relative_to(task.folder).as_posix(): file_hash(path) for path in files}
 
 
 def _question(folder: Path) -> tuple[Question, list[str]]:

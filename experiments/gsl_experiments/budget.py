@@ -67,6 +67,7 @@ class Budget:
 
     kind: ClassVar[str] = "reproduce"
     forced: ClassVar[str] = GOES_ON
+    makes: ClassVar[tuple[str, ...]] = ("methods", "iterate.grounding")
 
     iterate: Annotated[Iterate, setting("what a trial is; its grounding and real budget are replaced")]
     methods: Annotated[Mapping[str, Grounding], setting("transformations of actions, by name", min_length=1)]

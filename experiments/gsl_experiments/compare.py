@@ -51,6 +51,7 @@ class Compare:
 
     kind: ClassVar[str] = "compare"
     forced: ClassVar[str] = GOES_ON
+    makes: ClassVar[tuple[str, ...]] = ("methods", "iterate.grounding")
 
     iterate: Annotated[Iterate, setting("what a trial is; its worlds and grounding are replaced")]
     worlds: Annotated[Mapping[str, World], setting("the real worlds, by name", min_length=1)]

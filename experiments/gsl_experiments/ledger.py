@@ -20,7 +20,7 @@ from gsl.storage.read_files import read_files
 from gsl.storage.references import resolve
 from gsl.storage.versions import commit
 from gsl_experiments.duration import duration_told
-from gsl_experiments.ledger_file import MADE_BY, RECIPE, Figures, read
+from gsl_experiments.ledger_file import MADE_BY, RECIPE, Figures, check, read, write
 
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's
 MADE = (
@@ -193,7 +193,10 @@ class Ledger:
         return next((file for file, keys in self._from.items() if key in keys), self._path)
 
     def _here(self) -> dict[str, list[dict[str, Any]]]:
-        return read(self._path, self._kind) if self._path.is_file() else {}
+        if not self._path.is_file():
+            return {}
+        check(self._path)
+        return read(self._path, self._kind)
 
     def _rows_of(self, key: str) -> list[dict[str, Any]]:
         """Return the rows of a trial that is known, or that this version of gsl has made here."""
@@ -206,7 +209,7 @@ class Ledger:
         """Write this study's trials beside all others, and those that another study of this name wrote meanwhile."""
         self._kept = self._here()
         others = {other: made for other, made in {**self._known, **self._kept}.items() if other not in self._done}
-        write_json(self._path, [*self._rows(), *(row for made in others.values() for row in made)])
+        write(self._path, [*self._rows(), *(row for made in others.values() for row in made)])
 
 
 def _figures(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Mapping, Set
+import os
+from collections.abc import Mapping, Sequence, Set
 from inspect import signature
 from pathlib import Path
 from typing import Any, Protocol
@@ -11,6 +13,9 @@ from typing import Any, Protocol
 from pydantic import TypeAdapter, ValidationError
 
 from gsl.errors import ArtifactError
+from gsl.storage import documents
+from gsl.storage.hashing import file_hash
+from gsl.storage.whole import explained, replacing
 
 RECIPE, MADE_BY = "recipe", "made_by"
 SHOWN = 3  # of names that are wrong
@@ -42,6 +47,32 @@ def read(path: Path, kind: type[Figures]) -> dict[str, list[dict[str, Any]]]:
         last = row[RECIPE]
         found.setdefault(last, []).append(row)
     return found
+
+
+def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write the rows; before that their hash is added to a hidden file beside them, so that a kill harms neither."""
+    text = documents.pretty(rows)
+    with explained(path.parent), _seal(path).open("a") as seal:
+        seal.write(f"{hashlib.sha256(text.encode()).hexdigest()}\n")
+        seal.flush()
+        os.fsync(seal.fileno())
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def check(path: Path) -> None:
+    """Refuse a growing file that is not as a study wrote it; one without a hash, as a copy is, passes.
+
+    Raises:
+        ArtifactError: It was changed.
+    """
+    if _seal(path).is_file() and file_hash(path) not in _seal(path).read_text(errors="replace").split():
+        advice = "take it away, or give it as known= if it was you who changed it"
+        raise ArtifactError(path, f"is not as the study wrote it; {advice}")
+
+
+def _seal(path: Path) -> Path:
+    return path.with_name(f".{path.name}.sha256")
 
 
 def _parsed(path: Path) -> list[dict[str, Any]]:

@@ -47,6 +47,7 @@ class NoiseStudy:
 
     kind: ClassVar[str] = "reproduce"
     forced: ClassVar[str] = GOES_ON
+    makes: ClassVar[tuple[str, ...]] = ("methods", "iterate.grounding")
 
     iterate: Annotated[Iterate, setting("what a trial is; its real world and grounding are replaced")]
     worlds: Annotated[

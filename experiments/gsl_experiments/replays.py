@@ -48,6 +48,7 @@ class Replays:
 
     kind: ClassVar[str] = "reproduce"
     forced: ClassVar[str] = GOES_ON
+    makes: ClassVar[tuple[str, ...]] = ("methods", "iterate.grounding")
 
     iterate: Annotated[Iterate, setting("what a trial is; its worlds and grounding are replaced")]
     worlds: Annotated[Mapping[str, World], setting("the real worlds, by name", min_length=1)]

@@ -109,7 +109,7 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
         words = _with_choices(command, arguments, vocabulary)
         raise unfit(command, arguments, unknown_key(error)) or translated(error, words) from error
     except ValueError as error:
-        raise misshapen(arguments, error) from error
+        raise misshapen(arguments, error, vocabulary) from error
     _check_effects(composition)
     _check_referred(command, composition)
     _check_made(command, composition)
@@ -124,7 +124,7 @@ def _with_choices(command: str, arguments: Sequence[str], words: Vocabulary) -> 
     """Return the words of a command with what is typed of choices, the same ones if these are what is wrong."""
     try:
         chosen = _composed(command, _of_choices(_first_values(rewrite(arguments, words.chosen))[0]))
-    except (ConfigError, CompactHydraException, OmegaConfBaseException, YAMLError):
+    except (ConfigError, CompactHydraException, OmegaConfBaseException, YAMLError, ValueError):
         return words
     return replace(words, keys=known_keys(_without_hydra(chosen)))
 

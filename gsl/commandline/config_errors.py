@@ -79,11 +79,13 @@ def translated(error: Exception, words: Vocabulary) -> Exception:
     return InputError(f"configuration: {' '.join(text.split())}")
 
 
-def misshapen(arguments: Sequence[str], error: ValueError) -> ConfigError:
+def misshapen(arguments: Sequence[str], error: ValueError, words: Vocabulary) -> ConfigError:
     """Return the error for an argument that hydra stumbles over: a group without a name, or a key in a list."""
-    nameless = [one for one in arguments if one.endswith("=null") and "group" in str(error)]
-    if nameless:
-        return ConfigError(nameless[0].partition("=")[0].lstrip("+"), "takes the name of a file", given="null")
+    if "group" in str(error):
+        for key, _, value in (one.partition("=") for one in arguments):
+            group = key.lstrip("+")
+            if (group in words.chosen or words.options(group)) and (not value[:1].isalpha() or value == "null"):
+                return ConfigError(group, "takes the name of a file", given=value)
     last = str(error).rpartition(" ")[2].strip("'")
     keys = [key for one in arguments if last in (key := one.partition("=")[0].lstrip("+~")).split(".")]
     where = keys[0].rpartition(".")[0] if keys else "configuration"

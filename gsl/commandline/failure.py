@@ -31,11 +31,13 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
     """Return one line about a failure, and the exit code."""
     if isinstance(failure, GslError):
         return str(failure), failure.exit_code
+    text = " ".join(str(failure).split())
     if isinstance(failure, OSError) and failure.filename is not None:
-        return f"{failure.filename}: {failure.strerror}", 1
+        return f"{failure.filename}: {failure.strerror or text}", 1
     if (line := describe_own(failure)) is not None:
         return f"{line}; GSL_TRACEBACK=1 shows more", 1
-    text = " ".join(str(failure).split())
+    if isinstance(failure, OSError):
+        return failure.strerror or text, 1
     return f"internal error: {type(failure).__name__}: {text}; GSL_TRACEBACK=1 shows where", 1
 
 

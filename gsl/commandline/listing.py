@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -14,17 +15,18 @@ from gsl.report.account import account, flat, plain
 from gsl.report.console import Console
 from gsl.report.headline import headline
 from gsl.storage.artifact import Artifact
+from gsl.storage.hashing import SHORT
 from gsl.storage.identity import content_hash
+from gsl.storage.lineage import out_of_date
 from gsl.storage.manifest import Manifest, Parent, damaged_file, read
-from gsl.storage.references import RUNS, find_all, resolve
-
-SHORT = 12
-"""Characters of a hash that are shown."""
+from gsl.storage.references import RUNS, damaged_folders, find_all, resolve
 
 
 def list_runs(console: Console) -> None:
     """List the complete artifacts below runs/."""
     found = find_all()
+    for folder in damaged_folders():
+        console.status(f"{folder.as_posix()}: its manifest cannot be read; gsl verify says why")
     rows = [
         (_named(one.folder), one.manifest.kind, _local(one.manifest.created), _span(one.manifest), headline(one))
         for one in found
@@ -48,8 +50,8 @@ def _named(folder: Path) -> str:
     return (folder.relative_to(RUNS) if folder.is_relative_to(RUNS) else folder).as_posix()
 
 
-def show_artifact(reference: str, console: Console) -> None:
-    """Show how an artifact came about, its results, settings and files.
+def show_artifact(reference: str, console: Console) -> int:
+    """Show how an artifact came about, its results, settings and files; return 1 if it is not as it was made.
 
     Raises:
         ArtifactError: There is no such artifact.
@@ -57,19 +59,24 @@ def show_artifact(reference: str, console: Console) -> None:
     folder = resolve(reference)
     artifact = Artifact(folder, read(folder))
     made = dataclasses.asdict(artifact.manifest)
-    console.result({"folder": folder, "manifest": made, "config": artifact.config, "metrics": artifact.metrics})
+    damaged = damaged_file(folder, artifact.manifest)
+    if damaged is None:
+        console.result({"folder": folder, "manifest": made, "config": artifact.config, "metrics": artifact.metrics})
     title = f"{folder.as_posix()}: {artifact.manifest.kind}"
     console.table(title, ["", ""], list(_origin(artifact.manifest)), headline(artifact) or None)
     if artifact.manifest.parents:
         parents = [_parent(folder, parent) for parent in artifact.manifest.parents]
         console.table("made from", ["role", "what", "contents", "now"], parents)
-    for told in account(artifact):
-        console.table(*told)
-    console.table("settings", ["setting", "value"], _settings(artifact.config))
-    damaged = damaged_file(folder, artifact.manifest)
+    with suppress(*[ArtifactError] * bool(damaged)):
+        for told in account(artifact):
+            console.table(*told)
+        console.table("settings", ["setting", "value"], _settings(artifact.config))
     files = [(name, _size(file.bytes), file.sha256[:SHORT]) for name, file in artifact.manifest.files.items()]
     state = f"changed since it was made: {damaged}" if damaged else "all files are as they were made"
     console.table("files", ["file", "size", "sha256"], files, state)
+    if damaged is None:
+        return 0
+    return console.error(f"{folder / damaged}: is not as the manifest says", 1, command="gsl show")
 
 
 def _origin(manifest: Manifest) -> Iterator[tuple[str, str]]:
@@ -92,7 +99,8 @@ def _parent(folder: Path, parent: Parent) -> tuple[str, str, str, str]:
 
 def _state(place: Path, expected: str) -> str:
     try:
-        return "the same" if content_hash(place) == expected else "built anew since"
+        same = "the same" if content_hash(place) == expected else "built anew since"
+        return f"{same}, but {stale}" if (stale := out_of_date(place)) else same
     except ArtifactError:
         return "gone or damaged"
 

@@ -1,19 +1,24 @@
 """`compiled`: numba's njit with a cache on disk that is thrown away whenever gsl's sources change.
 
 Numba looks only at the file of a compiled function itself, so an edit of another one that it calls would go unseen.
+Nor does it look whether the machine code on the disk is what it wrote, so every file begins with a hash of the rest.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import pickle
+import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
+from numba.core.caching import IndexDataCacheFile
 
+_HASH = hashlib.sha256().digest_size  # [bytes]
 F = TypeVar("F", bound=Callable[..., object])
 
 
@@ -21,7 +26,48 @@ def compiled(function: F) -> F:
     """Compile a function when it is first called, or take it from the cache; threads may run it side by side."""
     if "NUMBA_CACHE_DIR" not in os.environ:
         numba.config.CACHE_DIR = _folder()  # type: ignore[attr-defined]
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[return-value]
+    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    if (kept := getattr(dispatcher, "_cache", None)) is not None:  # none with NUMBA_DISABLE_JIT
+        place = kept._impl
+        kept._cache_file = _CheckedFiles(kept.cache_path, place.filename_base, place.locator.get_source_stamp())
+    return dispatcher  # type: ignore[return-value]
+
+
+class _CheckedFiles(IndexDataCacheFile):
+    """Numba's files of a function; what is not as it was written counts as missing, so that it is compiled again."""
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            version, stamp, overloads = pickle.loads(self._checked(self._index_path))
+        except OSError:
+            return {}
+        return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        self._write(self._index_path, (self._version, self._source_stamp, overloads))
+
+    def _load_data(self, name: str) -> Any:
+        return pickle.loads(self._checked(self._data_path(name)))
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._write(self._data_path(name), data)
+
+    def _write(self, path: str, thing: Any) -> None:
+        contents = self._dump(thing)
+        with self._open_for_write(path) as file:
+            file.write(hashlib.sha256(contents).digest() + contents)
+
+    def _checked(self, path: str) -> bytes:
+        stored = Path(path).read_bytes()
+        if hashlib.sha256(stored[_HASH:]).digest() != stored[:_HASH]:
+            _say_once(self._cache_path)
+            raise OSError(f"{path} is damaged")
+        return stored[_HASH:]
+
+
+@cache
+def _say_once(folder: str) -> None:
+    sys.stderr.write(f"{folder}: compiled code is damaged there; it is compiled again\n")
 
 
 @cache

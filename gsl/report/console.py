@@ -69,6 +69,11 @@ class Console:
         if below := "\n".join(filter(None, [more, caption])):
             place.print(below + "\n", markup=False, highlight=False, soft_wrap=True)
 
+    def draw(self, thing: rich.console.RenderableType) -> None:
+        """Print what rich can draw on stdout; with JSON it is left to `result`."""
+        if not self.json:
+            self._stdout.print(thing, soft_wrap=True)
+
     def result(self, document: Mapping[str, Any], *, text: str = "") -> None:
         """Print the outcome: the document as JSON, or `text` for a person."""
         if self.json:

@@ -7,6 +7,7 @@ from typing import Any
 
 from gsl.core.unit import Unit, gained
 from gsl.core.words import falls, several
+from gsl.errors import ArtifactError
 from gsl.grounding.diagnosis_file import named
 from gsl.storage.artifact import Artifact
 
@@ -23,7 +24,7 @@ def headline(artifact: Artifact) -> str:
     tell = _TELLERS.get(artifact.manifest.kind)
     try:
         return tell(artifact.metrics, unit_of(artifact)) if tell else str(artifact.metrics.get("headline", ""))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (ArtifactError, ValueError, KeyError, TypeError, AttributeError, IndexError):
         return ""
 
 

@@ -52,6 +52,7 @@ class Iterate:
     """
 
     kind: ClassVar[str] = "iterate"
+    makes: ClassVar[tuple[str, ...]] = ("grounding",)
 
     sim: Annotated[World, setting("the simulator")]
     real: Annotated[World, setting("the real world, or what plays its part")]

@@ -15,17 +15,21 @@ COMMAND = "gsl iterate"
 
 
 def built(stage: Stage, out: Path, console: Console) -> Artifact:
-    """Build one link; what an earlier chain built otherwise in its place is replaced, what anyone else built is not."""
-    command, ours = f"{COMMAND} ({stage.kind})", _ours(out)
-    made = build(stage, config=described(stage), out=out, command=command, force=ours, console=console)
-    if ours and not made.unchanged:
-        console.status(f"{out.as_posix()}: in the place of what a chain with other settings had built")
+    """Build one link; what a chain built otherwise in its place, or is damaged, is replaced, nobody else's work is."""
+    command, before = f"{COMMAND} ({stage.kind})", _before(out)
+    made = build(stage, config=described(stage), out=out, command=command, force=bool(before), console=console)
+    if before and not made.unchanged:
+        console.status(f"{out.as_posix()}: in the place of {before}")
     console.status(f"{out.as_posix()}: {headline(made)}{' (unchanged)' if made.unchanged else ''}")
     return made
 
 
-def _ours(out: Path) -> bool:
+def _before(out: Path) -> str:
+    """Return what may be replaced, in words; nothing where there is none."""
     try:
-        return manifest.read(out).command.startswith(COMMAND)
+        there = manifest.read(out)
     except ArtifactError:
-        return False
+        return "a damaged artifact" if manifest.resembles(out) else ""
+    if not there.command.startswith(COMMAND):
+        return ""
+    return "a damaged artifact" if manifest.damaged_file(out, there) else "what a chain with other settings had built"

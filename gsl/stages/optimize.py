@@ -92,7 +92,7 @@ class Optimize:
         )
         found = [record(self.policy, "pi0" if self.initial is None else "start", first)]
         if isinstance(self.optimizer, Search):
-            winners = [*self._searched(self.optimizer, scenario, first, GenerationLog(folder), console)]
+            winners = [*self._searched(self.optimizer, scenario, first, GenerationLog(folder, console.status), console)]
         else:
             winners = [*self._learned(self.optimizer, scenario, first, console)]
         searched = len(winners)

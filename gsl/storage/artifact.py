@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,21 +19,26 @@ from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
 from gsl.core.own_code import package_of
 from gsl.core.unit import Unit
-from gsl.errors import ArtifactError
+from gsl.errors import ArtifactError, GslError
 from gsl.storage import documents, manifest
-from gsl.storage.identity import Identity, changes, identify
+from gsl.storage.identity import Identity, changes, content_hash, identify
+from gsl.storage.lineage import broken_link, out_of_date
 from gsl.storage.manifest import Manifest, Parent
 from gsl.storage.read_files import own_effects, read_files
 from gsl.storage.versions import commit, versions
-from gsl.storage.whole import explained, flush_tree
-from gsl.storage.workplace import KEY, install, locked, logged, stoppable, workplace
+from gsl.storage.whole import explained_work, flush_tree, remove_temporary
+from gsl.storage.workplace import KEY, complete, install, locked, logged, stoppable, workplace
 
 CONFIG = "config.yaml"
 METRICS = "metrics.json"
 
 
 class Stage(Protocol):
-    """What `build` needs of a stage; one that can be resumed sets `progress`, the file that it goes on from."""
+    """What `build` needs of a stage.
+
+    One that can be resumed sets `progress`, the file that it goes on from, and in `kept` what else it needs for that.
+    One that builds parts itself sets `makes`: settings below which names of such parts (`identity.MADE`) mean nothing.
+    """
 
     kind: ClassVar[str]
 
@@ -61,14 +68,22 @@ class Artifact:
     @property
     def config(self) -> dict[str, Any]:
         """The resolved settings it was built with."""
-        config: dict[str, Any] = yaml.safe_load((self.folder / CONFIG).read_text(encoding="utf-8"))
-        return config
+        return self._read(CONFIG, yaml.safe_load)
 
     @property
     def metrics(self) -> dict[str, Any]:
         """The figures its stage reported; null where a number was not finite."""
-        metrics: dict[str, Any] = json.loads((self.folder / self.manifest.metrics).read_text(encoding="utf-8"))
-        return metrics
+        return self._read(self.manifest.metrics, json.loads)
+
+    def _read(self, name: str, parse: Callable[[str], Any]) -> dict[str, Any]:
+        path = self.folder / name
+        try:
+            stored = parse(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
+            raise ArtifactError(path, "is missing or damaged; build the artifact again with force=true") from error
+        if not isinstance(stored, dict):
+            raise ArtifactError(path, "is damaged: it holds no mapping; build the artifact again with force=true")
+        return stored
 
 
 def build(
@@ -86,20 +101,52 @@ def build(
 
     Raises:
         ArtifactError: `out` is something else, or was built otherwise and `force` is not set, or is being built.
-        GslError: The folder is full or cannot be written.
+        GslError: The folder is full or cannot be written, or what the stage read was changed meanwhile.
     """
-    identity = identify(stage.kind, config, _sources(stage), package_of(type(stage)))
-    with locked(out), stoppable(), explained(out.parent):
+    if out.name in ("", ".."):
+        raise ArtifactError(out, "is no folder for an artifact, which is replaced as a whole; choose another out=")
+    sources = _sources(stage)
+    package, made = package_of(type(stage)), getattr(stage, "makes", ())
+    identity = identify(stage.kind, config, sources, package, made=made)
+    for stale in filter(None, map(out_of_date, sources.values())):
+        console.status(f"warning: {stale}; the same commands again bring it up to date")
+    with locked(out), stoppable(), explained_work(out.parent):
         forced = getattr(stage, "forced", "rebuilds it")
         if (existing := _existing(out, identity, config, force=force, forced=forced)) is not None:
             os.utime(out / manifest.NAME)
+            if (replaced := complete(out)) is not None:
+                shutil.rmtree(replaced)
+            _note(existing)
             return existing
-        with workplace(out, identity.key, progress=getattr(stage, "progress", "")) as folder:
+        if (left := complete(out)) is not None and (same := _intact(left, identity.key)) is not None:
+            install(left, out)
+            return _note(Artifact(out, same))
+        progress, kept = getattr(stage, "progress", ""), getattr(stage, "kept", ())
+        with workplace(out, identity.key, progress=progress, kept=kept) as folder:
             made = _work(stage, identity, config, folder, command, console)
             manifest.write(folder, made)
             flush_tree(folder)
             install(folder, out)
-    return Artifact(out, made)
+    return _note(Artifact(out, made))
+
+
+_built: ContextVar[dict[Path, Artifact] | None] = ContextVar("built", default=None)
+"""What the stage that is at work has built beside itself, by absolute path."""
+
+
+def _note(artifact: Artifact) -> Artifact:
+    if (built := _built.get()) is not None:
+        built[artifact.folder.absolute()] = artifact
+    return artifact
+
+
+def _intact(folder: Path, key: str) -> Manifest | None:
+    """Return the manifest of a folder that is the artifact of this key and as it was written."""
+    try:
+        found = manifest.read(folder)
+    except ArtifactError:
+        return None
+    return found if found.key == key and manifest.damaged_file(folder, found) is None else None
 
 
 def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force: bool, forced: str) -> Artifact | None:
@@ -109,14 +156,20 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
     try:
         found = Artifact(out, manifest.read(out), unchanged=True)
     except ArtifactError as error:
+        if manifest.resembles(out):
+            if force:
+                return None
+            raise
         raise ArtifactError(out, "exists and is no artifact of gsl; move it away or choose another out=") from error
     damaged = manifest.damaged_file(out, found.manifest)
-    if found.manifest.key == identity.key and damaged is None:
+    wrong = f"changed since: {damaged}" if damaged else broken_link(out, found.manifest)
+    if found.manifest.key == identity.key and wrong is None:
         return found
     if force:
         return None
-    reason = f"changed since: {damaged}" if damaged else changes(found.manifest, found.config, identity, config)
-    raise ArtifactError(out, f"was built otherwise ({reason}); force=true {forced}, another name= keeps both")
+    if damaged is None and found.manifest.key != identity.key:
+        wrong = changes(found.manifest, found.config, identity, config)
+    raise ArtifactError(out, f"was built otherwise ({wrong}); force=true {forced}, another name= keeps both")
 
 
 def _work(
@@ -128,16 +181,26 @@ def _work(
     (folder / CONFIG).write_text(settings, encoding="utf-8")
     with logged(folder) as logger:
         logger.info("%s begins: %s", identity.kind, command)
-        metrics = stage.run(folder, console)
+        links: dict[Path, Artifact] = {}
+        token = _built.set(links)
+        try:
+            metrics = stage.run(folder, console)
+        finally:
+            _built.reset(token)
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
     documents.write_json(folder / METRICS, metrics)
+    parents = _parents(stage, identity, folder)
+    remove_temporary(folder)  # of a worker that was killed
     return Manifest(
         kind=identity.kind,
         key=identity.key,
         command=command,
         files={name: file for name, file in manifest.inventory(folder).items() if name != KEY},
-        parents=_parents(stage, identity, folder),
+        parents=parents,
+        links=tuple(
+            Parent(one.manifest.kind, _relative(path, folder), one.manifest.contents) for path, one in links.items()
+        ),
         seeds=identity.seeds,
         sources=identity.sources,
         versions=versions(),
@@ -154,10 +217,26 @@ def _unit(stage: Stage) -> dict[str, Any] | None:
 
 
 def _parents(stage: Stage, identity: Identity, folder: Path) -> tuple[Parent, ...]:
-    return tuple(
-        Parent(role, Path(os.path.relpath(path, folder)).as_posix(), identity.parents[role])
-        for role, path in _sources(stage).items()
-    )
+    """Return what the stage was made from; refuse what is no longer as it was when the work began: it may be of either.
+
+    Raises:
+        GslError: A parent was changed meanwhile.
+    """
+    sources = _sources(stage)
+    for role in sorted(identity.parents.keys() | sources.keys()):
+        path = sources.get(role)
+        try:
+            same = path is not None and content_hash(path) == identity.parents.get(role)
+        except (ArtifactError, OSError):
+            same = False
+        if not same:
+            what = f"{role} ({path or 'gone'})"
+            raise GslError(f"{what}: was changed while {identity.kind} was at work; run the command again")
+    return tuple(Parent(role, _relative(path, folder), identity.parents[role]) for role, path in sources.items())
+
+
+def _relative(path: Path, folder: Path) -> str:
+    return Path(os.path.relpath(path, folder)).as_posix()
 
 
 def _sources(stage: Stage) -> dict[str, Path]:

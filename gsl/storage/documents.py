@@ -52,7 +52,12 @@ def text(value: Any, *, indent: int | None = None) -> str:
 def write_json(path: Path, value: Any) -> None:
     """Write `value` as a JSON file a person can read, numbers of a list on one line, whole or not at all."""
     with replacing(path) as temporary:
-        temporary.write_text(_NUMBERS.sub(_on_one_line, text(value, indent=2)) + "\n", encoding="utf-8")
+        temporary.write_text(pretty(value), encoding="utf-8")
+
+
+def pretty(value: Any) -> str:
+    """Return `value` as JSON a person can read, numbers of a list on one line."""
+    return _NUMBERS.sub(_on_one_line, text(value, indent=2)) + "\n"
 
 
 def _on_one_line(numbers: re.Match[str]) -> str:

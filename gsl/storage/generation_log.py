@@ -1,11 +1,12 @@
-"""The log of a search: one line a generation, written when it is complete; a search resumes by reading it again."""
+"""The log of a search: one record a generation, written when it is complete; a search resumes by reading it again."""
 
 from __future__ import annotations
 
-import json
-import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
+
+from gsl.storage.records import Records
 
 FILE = "generations.jsonl"
 
@@ -27,24 +28,22 @@ class Generation(NamedTuple):
 
 
 class GenerationLog:
-    """The generations done so far in a folder; a line that a kill cut short does not count."""
+    """The generations done so far in a folder; what is damaged, or was cut short by a kill, does not count.
 
-    def __init__(self, folder: Path) -> None:
-        self._path = folder / FILE
-        lines = self._path.read_text(encoding="utf-8").split("\n")[:-1] if self._path.exists() else []
-        self._done = [Generation(**json.loads(line)) for line in lines]
-        if self._path.exists():
-            os.truncate(self._path, sum(len(line.encode()) + 1 for line in lines))
+    Args:
+        folder: Of the search.
+        say: Is told in a line what does not count.
+    """
+
+    def __init__(self, folder: Path, say: Callable[[str], None] = lambda text: None) -> None:
+        self._records = Records(folder / FILE, say)
 
     def read(self, index: int) -> Generation | None:
         """Return a generation that is done, to the bit as it was."""
-        return self._done[index] if index < len(self._done) else None
+        done = self._records.records
+        return Generation(**done[index]) if index < len(done) else None
 
     def append(self, generation: Generation) -> None:
         """Add the next generation, on disk before anything goes on."""
-        assert generation.number == len(self._done), "generations come in order"
-        with self._path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({k: v for k, v in generation._asdict().items() if v is not None}) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
-        self._done.append(generation)
+        assert generation.number == len(self._records.records), "generations come in order"
+        self._records.append({name: value for name, value in generation._asdict().items() if value is not None})

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
+SHORT = 12
+"""Characters of a hash that are shown."""
 CIRCUMSTANCES = ("manifest.json", "config.yaml", "log.txt")
 
 

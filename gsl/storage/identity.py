@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,25 +47,36 @@ class Identity:
         return {name: value for name, value in named.items() if isinstance(value, int)}
 
 
+MADE = ("forward_model", "inverse_model", "diagnosis", "servo", "model")
+"""Settings that name a part of a grounding; a chain puts what it makes itself in their place."""
 WITHOUT_EFFECT = ("workers", "requests")  # settings of components on which no result depends
 
 
 def identify(
-    kind: str, config: Mapping[str, Any], parents: Mapping[str, Path], package: Path | None = None
+    kind: str,
+    config: Mapping[str, Any],
+    parents: Mapping[str, Path],
+    package: Path | None = None,
+    made: Sequence[str] = (),
 ) -> Identity:
     """Return the identity of a stage; parents enter by role and contents, so that folders can move.
 
     A setting says where a parent lies when its dotted name is the parent's role, or when its text is the parent's path.
+    One below a name of `made` says where a part lies that the stage makes itself.
     The sources are gsl's, and those of the `package` that the stage comes from if that is another one.
     """
     places = {os.path.abspath(path) for path in parents.values()}
     settings = {
         name: value
         for name, value in flat(without(documents.plain(config), lambda name, _: name in WITHOUT_EFFECT)).items()
-        if not (isinstance(value, str) and (name in parents or os.path.abspath(value) in places))
+        if not (isinstance(value, str) and (name in parents or os.path.abspath(value) in places or _made(name, made)))
     }
     hashes = {role: content_hash(path) for role, path in parents.items()}
     return Identity(kind, settings, hashes, sources_hash(package))
+
+
+def _made(name: str, below: Sequence[str]) -> bool:
+    return name.rpartition(".")[2] in MADE and any(name.startswith(f"{part}.") for part in below)
 
 
 def without(told: Any, idle: Callable[[str, Any], bool]) -> Any:

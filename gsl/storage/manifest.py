@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +15,14 @@ from gsl.errors import ArtifactError
 from gsl.storage import documents
 from gsl.storage.hashing import contents_hash, file_hash
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+WITHOUT_HASH = 1  # the version before, which is still read
 NAME = "manifest.json"
+HASH = "sha256"
+"""Key of the hash of all other entries."""
+
+_ALWAYS = frozenset({"config.yaml", "log.txt", "metrics.json"})  # files that no artifact lacks
+_DAMAGED = "build the artifact again with force=true"
 
 
 @dataclass(frozen=True)
@@ -50,6 +58,7 @@ class Manifest:
         git: Commit and dirty flag, None outside a repository.
         created: Coordinated universal time, ISO 8601.
         duration: Time the work took [s].
+        links: The artifacts that it built beside itself, as an iteration does; their roles are their paths.
         metrics: Name of the file that holds the metrics.
         unit: How values of its task are shown (`gsl.core.unit.Unit`), None where there is no task.
         schema_version: Version of this contract.
@@ -66,6 +75,7 @@ class Manifest:
     git: Mapping[str, Any] | None
     created: str
     duration: float
+    links: tuple[Parent, ...] = ()
     metrics: str = "metrics.json"
     unit: Mapping[str, Any] | None = None
     schema_version: int = SCHEMA_VERSION
@@ -83,7 +93,7 @@ def inventory(folder: Path) -> dict[str, File]:
 
 
 def damaged_file(folder: Path, manifest: Manifest) -> str | None:
-    """Return the first file that is missing or not what the manifest says, None when the artifact is intact."""
+    """Return the first file that is missing or not what the manifest says, None when the artifact's own are intact."""
     for name, file in manifest.files.items():
         path = folder / name
         if not path.is_file() or path.stat().st_size != file.bytes or file_hash(path) != file.sha256:
@@ -91,16 +101,33 @@ def damaged_file(folder: Path, manifest: Manifest) -> str | None:
     return None
 
 
+def strange_file(folder: Path, manifest: Manifest) -> str | None:
+    """Return the first file of the folder that the manifest does not name; hidden ones and other artifacts are none."""
+    for place, folders, files in os.walk(folder):
+        here = Path(place)
+        folders[:] = sorted(name for name in folders if name[0] != "." and not (here / name / NAME).is_file())
+        for name in sorted(files):
+            path = (here / name).relative_to(folder).as_posix()
+            if name[0] != "." and path != NAME and path not in manifest.files:
+                return path
+    return None
+
+
 def write(folder: Path, manifest: Manifest) -> None:
     """Write the manifest, which declares the artifact complete."""
-    documents.write_json(folder / NAME, dataclasses.asdict(manifest))
+    stored = dataclasses.asdict(manifest)
+    documents.write_json(folder / NAME, {**stored, HASH: _hash(stored)})
+
+
+def _hash(stored: Mapping[str, Any]) -> str:
+    return hashlib.sha256(documents.text(stored).encode()).hexdigest()
 
 
 def read(folder: Path) -> Manifest:
     """Read the manifest of the artifact in `folder`.
 
     Raises:
-        ArtifactError: There is none, or it is foreign or of another version.
+        ArtifactError: There is none, or it is foreign, damaged or of another version.
     """
     if not folder.exists():
         raise ArtifactError(folder, "does not exist")
@@ -108,18 +135,31 @@ def read(folder: Path) -> Manifest:
         stored = json.loads((folder / NAME).read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError) as error:
         raise ArtifactError(folder, f"is no complete artifact: it holds no {NAME}") from error
-    except ValueError as error:
-        raise ArtifactError(folder / NAME, "is damaged: it is not JSON; build the artifact again") from error
+    except OSError as error:
+        raise ArtifactError(folder / NAME, f"cannot be read: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:
+        raise ArtifactError(folder / NAME, f"is damaged: it is not JSON; {_DAMAGED}") from error
     version = stored.get("schema_version") if isinstance(stored, dict) else None
-    if version != SCHEMA_VERSION:
+    if version not in (SCHEMA_VERSION, WITHOUT_HASH):
         raise ArtifactError(folder / NAME, f"schema_version {version!r} is unknown; this gsl reads {SCHEMA_VERSION}")
     try:
-        return _parsed(stored)
-    except (TypeError, AttributeError, KeyError) as error:
-        raise ArtifactError(folder / NAME, "is damaged: its entries do not fit; build the artifact again") from error
+        if version == SCHEMA_VERSION and stored.pop(HASH) != _hash(stored):
+            raise ArtifactError(folder / NAME, f"is damaged: it is not as it was written; {_DAMAGED}")
+        parsed = _parsed(stored)
+    except (TypeError, AttributeError, KeyError, ValueError, RecursionError) as error:
+        raise ArtifactError(folder / NAME, f"is damaged: its entries do not fit; {_DAMAGED}") from error
+    if missing := sorted({*_ALWAYS, parsed.metrics} - parsed.files.keys()):
+        raise ArtifactError(folder / NAME, f"is damaged: it does not name {missing[0]}; {_DAMAGED}")
+    return parsed
+
+
+def resembles(folder: Path) -> bool:
+    """Whether a folder whose manifest cannot be read was an artifact: it has the files that none lacks."""
+    return all((folder / name).is_file() for name in (NAME, *_ALWAYS))
 
 
 def _parsed(stored: dict[str, Any]) -> Manifest:
     files = {name: File(**file) for name, file in stored.pop("files").items()}
     parents = tuple(Parent(**parent) for parent in stored.pop("parents"))
-    return Manifest(**stored, files=files, parents=parents)
+    links = tuple(Parent(**link) for link in stored.pop("links", ()))
+    return Manifest(**stored, files=files, parents=parents, links=links)

@@ -76,6 +76,26 @@ def find_all(runs: Path = RUNS) -> list[Artifact]:
     return sorted(_artifacts(runs), key=lambda one: (one.manifest.created, one.folder))
 
 
+def artifact_folders(reference: str | None = None, *, runs: Path = RUNS) -> list[Path]:
+    """Return the folders of all artifacts that `reference` names, below runs/ without one, damaged ones as well.
+
+    Raises:
+        ArtifactError: There is none.
+    """
+    place = runs if reference is None else _place(reference, runs)
+    if (place / manifest.NAME).is_file():
+        return [place]
+    folders = [folder for folder, _ in _walk(place)]
+    if reference is not None and not folders:
+        raise ArtifactError(place, "holds no complete artifact; build one in it first")
+    return folders
+
+
+def damaged_folders(runs: Path = RUNS) -> list[Path]:
+    """Return the folders below `runs` that were artifacts, but whose manifest cannot be read."""
+    return [folder for folder, found in _walk(runs) if found is None and manifest.resembles(folder)]
+
+
 def _place(reference: str, runs: Path) -> Path:
     if not reference:
         raise ArtifactError("''", "is empty; give a path or the name of a run")
@@ -98,14 +118,15 @@ def _alternatives(reference: str, runs: Path) -> str:
 
 
 def _artifacts(folder: Path) -> list[Artifact]:
-    return list(_walk(folder))
+    return [Artifact(place, found) for place, found in _walk(folder) if found is not None]
 
 
-def _walk(folder: Path) -> Iterator[Artifact]:
+def _walk(folder: Path) -> Iterator[tuple[Path, manifest.Manifest | None]]:
+    """Yield every folder with a manifest, and that, None where it cannot be read."""
     for place, folders, files in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        if manifest.NAME in files and (found := _readable(Path(place))) is not None:
-            yield Artifact(Path(place), found)
+        if manifest.NAME in files:
+            yield Path(place), _readable(Path(place))
 
 
 def _readable(folder: Path) -> manifest.Manifest | None:

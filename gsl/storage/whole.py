@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +18,11 @@ _REMEDIES = {
     errno.EACCES: "give yourself the right to write or choose another folder with out=",
     errno.EPERM: "give yourself the right to write or choose another folder with out=",
 }
+
+
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG}
+_TEMPORARY = re.compile(r"\..+\.tmp-\d+")
+_HERE, _EXCHANGE = -100, 2  # AT_FDCWD, RENAME_EXCHANGE: linux/fcntl.h, linux/fs.h
 
 
 @contextmanager
@@ -34,6 +41,27 @@ def explained(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
+def explained_work(folder: Path) -> Iterator[None]:
+    """Do so with a refusal to write in `folder`, its subfolders of other work left out; any other stays what it is."""
+    try:
+        yield
+    except OSError as error:
+        refused = error.errno in (errno.EACCES, errno.EPERM) and error.filename is None
+        if not (refused or error.errno in _FULL or _is_hidden_in(folder, error.filename)):
+            raise
+        with explained(folder):
+            raise
+
+
+def _is_hidden_in(folder: Path, path: object) -> bool:
+    """Whether a path is below a hidden entry of `folder`, as work that is not finished is."""
+    if not isinstance(path, str | os.PathLike):
+        return False
+    place, home = Path(os.path.abspath(path)), Path(os.path.abspath(folder))
+    return place.is_relative_to(home) and place != home and place.relative_to(home).parts[0].startswith(".")
+
+
+@contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary name beside `path` that takes its place when the block ends well and vanishes when not."""
     temporary = path.with_name(f".{path.name}.tmp-{os.getpid()}")
@@ -42,9 +70,25 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
             flush(temporary)
             os.replace(temporary, path)
+            flush(path.parent)
         finally:
             if temporary.is_file():
                 temporary.unlink()
+
+
+def remove_temporary(folder: Path) -> None:
+    """Remove the files below `folder` that a killed `replacing` left."""
+    for path in [path for path in folder.rglob(".*") if _TEMPORARY.fullmatch(path.name) and path.is_file()]:
+        path.unlink()
+
+
+def exchange(one: Path, other: Path) -> bool:
+    """Let two folders swap their names in one step; False where the system cannot (not Linux, or NFS)."""
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except AttributeError:
+        return False
+    return bool(rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0)
 
 
 def flush(path: Path) -> None:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import fcntl
 import logging
 import os
+import re
 import shutil
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from gsl.errors import ArtifactError
-from gsl.storage.whole import explained
+from gsl.storage.whole import exchange, explained, flush, remove_temporary
 
 KEY = ".key"
 LOG = "log.txt"
@@ -61,21 +62,31 @@ def _taken(out: Path, lock: Path) -> int:
 def recover(out: Path) -> None:
     """Put right what a killed or stopped process left: an artifact moved aside comes back, temporary folders go."""
     aside = _aside(out)
+    temporary = re.compile(rf"\.{re.escape(out.name)}\.tmp-\d+")  # the name may hold a star
     with explained(out.parent):
         if aside.exists() and not out.exists():
             os.rename(aside, out)
-        for leftover in [aside, *out.parent.glob(f".{out.name}.tmp-*")]:
+        for leftover in [aside, *(path for path in out.parent.iterdir() if temporary.fullmatch(path.name))]:
             shutil.rmtree(leftover, ignore_errors=True)
 
 
 @contextmanager
-def workplace(out: Path, key: str, *, progress: str) -> Iterator[Path]:
-    """Yield the folder to build `out` in; it goes when the block fails, unless the file `progress` holds something."""
-    folder = out.with_name(f".{out.name}.partial" if progress else f".{out.name}.tmp-{os.getpid()}")
-    if folder.exists() and not _belongs(folder, key):
-        shutil.rmtree(folder)
-    folder.mkdir(exist_ok=True)
-    (folder / KEY).write_text(key)
+def workplace(out: Path, key: str, *, progress: str, kept: Collection[str] = ()) -> Iterator[Path]:
+    """Yield the folder to build `out` in; it goes when the block fails, unless the file `progress` holds something.
+
+    Args:
+        out: Folder of the artifact.
+        key: Of the work; what other work has left goes.
+        progress: File that the work goes on from; none if it cannot.
+        kept: Files and folders that it goes on from as well; whatever else a kill left goes.
+    """
+    folder = _partial(out) if progress else out.with_name(f".{out.name}.tmp-{os.getpid()}")
+    with explained(out.parent):
+        if folder.exists() and not _belongs(folder, key):
+            shutil.rmtree(folder)
+        folder.mkdir(exist_ok=True)
+        _clear(folder, {progress, KEY, LOG, *kept})
+        (folder / KEY).write_text(key)
     try:
         yield folder
     finally:
@@ -96,28 +107,57 @@ def _begun(progress: Path) -> bool:
 
 
 def _belongs(folder: Path, key: str) -> bool:
-    return (folder / KEY).is_file() and (folder / KEY).read_text() == key
+    return (folder / KEY).is_file() and (folder / KEY).read_bytes() == key.encode()
+
+
+def _clear(folder: Path, kept: Collection[str]) -> None:
+    """Remove what a kill left but the work does not go on from, so that it does not become part of the artifact."""
+    for path in folder.iterdir():
+        if path.name not in kept:
+            shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+    remove_temporary(folder)
 
 
 def install(folder: Path, out: Path) -> None:
     """Give the finished `folder` the name `out`; an artifact of that name stays until this moment."""
-    aside = _aside(out)
-    if out.exists():
-        os.rename(out, aside)
-    os.rename(folder, out)
-    (out / KEY).unlink()
-    shutil.rmtree(aside, ignore_errors=True)
+    (folder / KEY).unlink(missing_ok=True)
+    flush(folder)
+    old = folder if out.exists() and exchange(folder, out) else _aside(out)
+    if old != folder:
+        if out.exists():
+            os.rename(out, old)
+        os.rename(folder, out)
+    flush(out.parent)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def complete(out: Path) -> Path | None:
+    """Return the folder that a kill left in the middle of `install`: the new artifact, or the one it has replaced."""
+    folder = _partial(out)
+    return folder if folder.is_dir() and not (folder / KEY).exists() else None
+
+
+def _partial(out: Path) -> Path:
+    return out.with_name(f".{out.name}.partial")
 
 
 def _aside(out: Path) -> Path:
     return out.with_name(f".{out.name}.replaced")
 
 
+class _LogFile(logging.FileHandler):
+    """One whose disk may be full: that ends the work like any other file that cannot be written."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Let the error go on: logging's own way is a traceback on stderr."""
+        raise
+
+
 @contextmanager
 def logged(folder: Path) -> Iterator[logging.Logger]:
     """Write what gsl logs to the folder's log file, too; resumed work goes on in the same file."""
     logger = logging.getLogger("gsl")
-    handler = logging.FileHandler(folder / LOG, encoding="utf-8")
+    handler = _LogFile(folder / LOG, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     level = logger.level
     logger.addHandler(handler)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from gsl.core.body import Robot
+from gsl.core.scratch import Scratch
 from gsl.robots.urdf import urdf
 from gsl.worlds.engine import quiet
 
@@ -47,7 +47,7 @@ class Camera:
     """
 
     def __init__(self, robot: Robot) -> None:
-        with quiet(), tempfile.TemporaryDirectory(prefix="gsl-") as folder:
+        with quiet(), Scratch() as folder:
             import pybullet
 
             self._bullet, self._client = pybullet, pybullet.connect(pybullet.DIRECT)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Robot, lumped
 from gsl.core.plant import Plant
+from gsl.core.scratch import Scratch
 from gsl.robots.urdf import principal_axes, urdf
 from gsl.worlds.base_frame import base_motion
 from gsl.worlds.bullet_c import NO_HANDLE, client_handle
@@ -74,7 +74,7 @@ class Engine:
         self._drive, self._base_com = Drive.of(servo, rotor, axes), base.com
         self._pushes = aimed(plant, self._loaded)
         self._link_from_inertial = Rotation.from_matrix(axes.T).as_quat().tolist()
-        self._folder = tempfile.TemporaryDirectory(prefix="gsl-")
+        self._folder = Scratch()
         for name, text in (("robot", urdf(self._loaded, visuals=False)), ("ground", PLANE)):
             Path(self._folder.name, f"{name}.urdf").write_text(text)
 

@@ -208,6 +208,21 @@ def test_a_ledger_only_grows(tmp_path: Path) -> None:
         Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent())
 
 
+def test_a_growing_file_that_was_damaged_is_not_believed(tmp_path: Path) -> None:
+    path, copy = tmp_path / "trials.json", tmp_path / "copy.json"
+    ledger = Ledger(path, {}, Figure, Silent())
+    ledger.add("a", [{"number": 1, "value": 1.0}])
+    before = path.read_bytes()
+    ledger.add("b", [{"number": 2, "value": 2.0}])
+    path.write_bytes(before)  # a kill between hash and file leaves what was there
+    Ledger(path, {}, Figure, Silent()).add("b", [{"number": 2, "value": 2.0}])
+    copy.write_bytes(path.read_bytes().replace(b"2.0", b"3.0"))
+    Ledger(tmp_path / "new.json", {"known": copy}, Figure, Silent())
+    path.write_bytes(copy.read_bytes())
+    with pytest.raises(ArtifactError, match="trials.json: is not as the study wrote it; take it away"):
+        Ledger(path, {}, Figure, Silent())
+
+
 def test_two_studies_may_write_one_ledger(tmp_path: Path) -> None:
     path = tmp_path / "trials.json"
     one, other = (Ledger(path, {}, Figure, Silent()) for _ in range(2))

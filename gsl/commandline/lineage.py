@@ -1,0 +1,84 @@
+"""The lineage of an artifact for `gsl verify`, which checks it, and `gsl lineage`, which draws it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gsl.report.console import Console
+from gsl.storage.hashing import SHORT
+from gsl.storage.lineage import Ancestor, lineage
+from gsl.storage.references import artifact_folders, resolve
+
+if TYPE_CHECKING:
+    from rich.tree import Tree
+
+
+def verify(reference: str | None, console: Console) -> int:
+    """Hash artifacts and all that they were made from again; return 1 if something is not as it was.
+
+    Args:
+        reference: A path, or the name of a run; None for all below runs/.
+        console: Where the first thing that is wrong is said last.
+
+    Raises:
+        ArtifactError: There is no such artifact.
+    """
+    wrong: dict[Path, str] = {}
+    seen: set[Path] = set()
+    folders = artifact_folders(reference)
+    for folder in folders:
+        for one in lineage(folder, seen).all():
+            if one.problem and one.place not in wrong:
+                wrong[one.place] = one.problem
+    document = {"artifacts": len(folders), "problems": {place.as_posix(): why for place, why in wrong.items()}}
+    if not wrong:
+        console.result(document, text=f"{len(folders)} of {len(folders)} artifacts are as they were made")
+        return 0
+    if console.json:
+        console.result({**document, "exit_code": 1})
+        return 1
+    (place, problem), *others = wrong.items()
+    for other, why in others:
+        console.status(f"{other.as_posix()}: {why}")
+    return console.error(f"{place.as_posix()}: {problem}", 1, command="gsl verify")
+
+
+def draw_lineage(reference: str, console: Console) -> None:
+    """Draw what an artifact was made from, and what is wrong with it.
+
+    Raises:
+        ArtifactError: There is no such artifact.
+    """
+    root = lineage(resolve(reference), set())
+    console.draw(_tree(root))
+    console.result(_document(root))
+
+
+def _tree(ancestor: Ancestor, tree: Tree | None = None) -> Tree:
+    from rich.text import Text
+    from rich.tree import Tree
+
+    stored = ancestor.manifest
+    label = Text(f"{ancestor.role}: " if ancestor.role else "")
+    label.append(ancestor.place.as_posix(), style="bold")
+    if stored is not None:
+        label.append(f"  {stored.kind} {stored.contents[:SHORT]}", style="dim")
+    if ancestor.problem:
+        label.append(f"  {ancestor.problem}", style="red")
+    branch = Tree(label) if tree is None else tree.add(label)
+    for parent in ancestor.parents:
+        _tree(parent, branch)
+    return branch
+
+
+def _document(ancestor: Ancestor) -> dict[str, Any]:
+    stored = ancestor.manifest
+    return {
+        "role": ancestor.role,
+        "place": ancestor.place,
+        "kind": None if stored is None else stored.kind,
+        "contents": None if stored is None else stored.contents,
+        "problem": ancestor.problem or None,
+        "parents": [_document(parent) for parent in ancestor.parents],
+    }

@@ -1,0 +1,111 @@
+"""`gsl rerun`: a run once more, from what its folder says of it, into a new place; and whether the same came out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gsl.core.described import rebuilt
+from gsl.errors import ArtifactError, ConfigError
+from gsl.report.console import Console
+from gsl.storage import manifest
+from gsl.storage.artifact import Artifact, build
+from gsl.storage.hashing import CIRCUMSTANCES, SHORT
+from gsl.storage.identity import content_hash
+from gsl.storage.references import resolve
+
+AGAIN = "_rerun"
+"""What is added to the name of a run."""
+
+
+def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
+    """Build an artifact again and compare; return 1 if another payload comes out.
+
+    Args:
+        reference: A path, or the name of a run.
+        settings: `out=` where it is built, beside the run by default, and `trust=true` if its settings may name classes
+            that are not gsl's.
+        console: Where both are set against each other.
+
+    Raises:
+        ArtifactError: There is no such artifact, what it was made from is no longer the same, or the place is taken.
+        ConfigError: Its settings do not fit this version of gsl.
+    """
+    words = dict(word.partition("=")[::2] for word in settings)
+    if unknown := sorted(words.keys() - {"out", "trust"}):
+        raise ConfigError(unknown[0], "is no setting of gsl rerun, which takes out= and trust=true")
+    folder = resolve(reference)
+    old = Artifact(folder, manifest.read(folder))
+    place = Path(words["out"]) if words.get("out") else _beside(folder)
+    if place.exists():
+        raise ArtifactError(place, "exists; take it away or choose another out=")
+    config = old.config
+    for parent in old.manifest.parents:
+        source = Path(os.path.relpath(folder / parent.path))
+        if content_hash(source) != parent.hash:
+            raise ArtifactError(source, f"is no longer what {folder.as_posix()} was made from")
+        _move(config, parent.role.split("."), source)
+    stage = rebuilt(config, trust=words.get("trust") == "true")
+    command = f"gsl rerun {folder.as_posix()}"
+    new = build(stage, config=config, out=place, command=command, force=False, console=console)
+    rows = list(_compared(old, new))
+    other = [name for name, _, same in rows if not same]
+    document = {"folder": place, "differs": other, "compared": [name for name, _, _ in rows]}
+    console.table(
+        f"{folder.as_posix()} and {place.as_posix()}",
+        ["what", "sha256", ""],
+        [(name, sha[:SHORT], "the same" if same else "differs") for name, sha, same in rows],
+    )
+    if not other:
+        console.result(document, text=place.as_posix())
+        return 0
+    if console.json:
+        console.result({**document, "exit_code": 1})
+        return 1
+    message = f"{place.as_posix()}: another payload than {folder.as_posix()}: {', '.join(other)}{_why(old, new)}"
+    return console.error(message, 1, command="gsl rerun")
+
+
+def _beside(folder: Path) -> Path:
+    run = folder.absolute().parent
+    return Path(os.path.relpath(run.with_name(run.name + AGAIN) / folder.name))
+
+
+def _move(settings: Any, role: list[str], source: Path) -> None:
+    """Let a setting that says where a parent lies say where it lies now; a name, as of a robot, stays."""
+    *above, name = role
+    for part in above:
+        settings = _entry(settings, part)
+    before = _entry(settings, name)
+    if isinstance(before, str) and ("/" in before or Path(before).suffix):
+        settings[int(name) if isinstance(settings, list) else name] = source.as_posix()
+
+
+def _entry(settings: Any, name: str) -> Any:
+    if isinstance(settings, Mapping):
+        return settings.get(name)
+    if isinstance(settings, list) and name.isdigit() and int(name) < len(settings):
+        return settings[int(name)]
+    return None
+
+
+def _compared(old: Artifact, new: Artifact) -> Iterator[tuple[str, str, bool]]:
+    """Yield the name and new hash of each file of the payload and each artifact beside it, and if it is the same."""
+    before, after = (
+        {name: file.sha256 for name, file in one.manifest.files.items() if Path(name).name not in CIRCUMSTANCES}
+        | {link.path: link.hash for link in one.manifest.links}
+        for one in (old, new)
+    )
+    for name in sorted(before.keys() | after.keys()):
+        yield name, after.get(name, "none"), before.get(name) == after.get(name)
+
+
+def _why(old: Artifact, new: Artifact) -> str:
+    """Return what of the software has changed since."""
+    now, before = new.manifest.versions, old.manifest.versions
+    changed = [f"{name} {was} -> {now.get(name)}" for name, was in before.items() if now.get(name) != was]
+    if old.manifest.sources != new.manifest.sources:
+        changed.append("gsl's sources")
+    return f" (since then: {', '.join(changed)})" if changed else ""

@@ -1,0 +1,44 @@
+"""The cache of compiled code: what is damaged there is compiled again, and a command says so."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+DOUBLING = """
+from gsl.core.compiled import compiled
+
+@compiled
+def double(x):
+    return 2.0 * x
+
+print(double(3.0), double.stats.cache_hits)
+"""
+
+
+def doubled(folder: Path) -> tuple[str, str]:
+    (folder / "doubling.py").write_text(DOUBLING)
+    os.utime(folder / "doubling.py", (0, 0))  # what numba recognises a source by
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
+    command = [sys.executable, str(folder / "doubling.py")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return done.stdout.strip(), done.stderr
+
+
+def test_a_damaged_cache_is_compiled_again_and_said(tmp_path: Path) -> None:
+    assert doubled(tmp_path)[0].startswith("6.0 Counter()")
+    files = [path for path in (tmp_path / "cache").rglob("*") if path.is_file()]
+    assert {path.suffix for path in files} == {".nbi", ".nbc"}
+    for path in files:
+        whole = path.read_bytes()
+        for damaged in (b"", whole[:-1], whole[:40] + bytes([whole[40] ^ 1]) + whole[41:], os.urandom(len(whole))):
+            path.write_bytes(damaged)
+            said, warned = doubled(tmp_path)
+            assert said == "6.0 Counter()"
+            assert warned.endswith("compiled code is damaged there; it is compiled again\n")
+            assert warned.count("\n") == 1
+    said, warned = doubled(tmp_path)
+    assert said.startswith("6.0 Counter({")
+    assert warned == ""

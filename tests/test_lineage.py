@@ -1,0 +1,149 @@
+"""What an artifact says of itself and of all that it was made from is checked, drawn and done again."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from commands import done, gsl
+
+from gsl.commandline.rerun import AGAIN
+
+Damage = Callable[[Path], object]
+
+
+@pytest.fixture
+def run(chain: Path, tmp_path: Path) -> Path:
+    """A copy of the chain's folder, in which everything may be damaged."""
+    shutil.copytree(chain / "runs", tmp_path / "runs", ignore=shutil.ignore_patterns("refused"))
+    return tmp_path
+
+
+def flip(path: Path) -> None:
+    contents = bytearray(path.read_bytes())
+    contents[len(contents) // 2] ^= 4
+    path.write_bytes(contents)
+
+
+def without_hash(path: Path) -> None:
+    stored = json.loads(path.read_text())
+    path.write_text(json.dumps({**stored, "files": {}}))
+
+
+DAMAGE: dict[str, tuple[Damage, str, str]] = {
+    "its own payload": (lambda runs: flip(runs / "evaluate/policies.json"), "evaluate", "policies.json is not as"),
+    "its settings": (lambda runs: flip(runs / "evaluate/config.yaml"), "evaluate", "config.yaml is not as"),
+    "its parent": (lambda runs: flip(runs / "optimize/policies.json"), "optimize", "policies.json is not as"),
+    "the first log": (
+        lambda runs: flip(runs / "collect_real/trajectories.parquet"), "collect_real", "trajectories.parquet is not as",
+    ),
+    "a log that is gone": (lambda runs: shutil.rmtree(runs / "collect_sim"), "collect_sim", "does not exist"),
+    "a manifest": (
+        lambda runs: flip(runs / "train_inverse/manifest.json"), "train_inverse/manifest.json", "is damaged",
+    ),
+    "no files": (
+        lambda runs: without_hash(runs / "train_forward/manifest.json"), "train_forward/manifest.json", "is damaged",
+    ),
+    "a file too many": (
+        lambda runs: (runs / "collect_real/more.parquet").write_text(""), "collect_real", "more.parquet is no file",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_verify_names_what_is_wrong_however_far_back(damage: str, run: Path) -> None:
+    act, where, what = DAMAGE[damage]
+    act(run / "runs/chain")
+    said = gsl("verify", "chain/evaluate", folder=run)
+    assert (said.code, said.out) == (1, "")
+    [line] = said.lines
+    assert line.startswith("gsl verify: ")
+    assert where in line
+    assert what in line
+
+
+def test_verify_finds_nothing_wrong_where_nothing_is(chain: Path) -> None:
+    assert done("verify", "chain/evaluate", folder=chain).out == "1 of 1 artifacts are as they were made\n"
+    assert done("verify", "chain", folder=chain).out == "6 of 6 artifacts are as they were made\n"
+    assert json.loads(done("verify", "chain", "--json", folder=chain).out) == {"artifacts": 6, "problems": {}}
+
+
+def test_verify_of_all_runs_goes_on_after_the_first_problem(run: Path) -> None:
+    for stage in ("optimize", "collect_sim"):
+        flip(run / "runs/chain" / stage / "metrics.json")
+    said = gsl("verify", folder=run)
+    assert said.code == 1
+    assert len(said.lines) == 2
+    assert said.lines[-1].startswith("gsl verify: ")
+    assert all(any(stage in line for line in said.lines) for stage in ("optimize", "collect_sim"))
+    assert json.loads(gsl("verify", "--json", folder=run).out)["exit_code"] == 1
+
+
+def test_the_lineage_is_a_tree_down_to_the_logs(run: Path) -> None:
+    lines = done("lineage", "chain/evaluate", folder=run).out.splitlines()
+    order = ["evaluate", "optimize", "train_forward", "collect_real", "train_inverse", "collect_sim"]
+    assert [next(i for i, line in enumerate(lines) if f"runs/chain/{name} " in line) for name in order] == [*range(6)]
+    shutil.rmtree(run / "runs/chain/collect_sim")
+    assert "does not exist" in done("lineage", "chain/evaluate", folder=run).out
+    tree = json.loads(done("lineage", "chain/optimize", "--json", folder=run).out)
+    assert [parent["role"] for parent in tree["parents"]] == ["grounding.forward_model", "grounding.inverse_model"]
+
+
+@pytest.mark.parametrize("stage", ["collect_real", "train_forward", "optimize", "evaluate"])
+def test_a_rerun_comes_to_the_same_payload_in_another_place(stage: str, run: Path) -> None:
+    moved = run / "runs" / "moved"
+    (run / "runs/chain").rename(moved)
+    said = done("rerun", f"moved/{stage}", folder=run)
+    assert said.out.endswith(f"runs/moved{AGAIN}/{stage}\n")
+    assert "differs" not in said.out
+    again = gsl("rerun", f"moved/{stage}", folder=run)
+    assert (again.code, again.lines) == (
+        2,
+        [f"gsl rerun: runs/moved{AGAIN}/{stage}: exists; take it away or choose another out="],
+    )
+
+
+def test_a_rerun_of_other_parents_or_with_another_result_says_so(run: Path) -> None:
+    config = run / "runs/chain/collect_sim/config.yaml"
+    config.write_text(config.read_text().replace("\nseed: 1\n", "\nseed: 2\n"))
+    said = gsl("rerun", "chain/collect_sim", "out=again", folder=run)
+    assert said.code == 1
+    assert "another payload than runs/chain/collect_sim: " in said.lines[-1]
+    assert "trajectories.parquet" in said.lines[-1]
+    done("collect", "role=sim", "name=chain", "preset=toy", "task.duration=1.0", "workers=1", "force=true", folder=run)
+    said = gsl("rerun", "chain/train_inverse", folder=run)
+    assert said.code == 2
+    assert "is no longer what runs/chain/train_inverse was made from" in said.lines[-1]
+
+
+def test_who_uses_what_was_made_from_other_data_is_warned(run: Path) -> None:
+    """The direct parent is as it was, but its own parent was built anew."""
+    small = ("preset=toy", "task.duration=1.6", "workers=1")
+    again = ("optimize", "name=chain", *small, "grounding=gat", "accept=true")
+    assert "warning" not in done(*again, folder=run).err
+    done("collect", "role=sim", "name=chain", "preset=toy", "task.duration=1.0", "workers=1", "force=true", folder=run)
+    said = done(*again, folder=run)
+    assert "(unchanged)" in said.out
+    [line] = [line for line in said.lines if "warning" in line]
+    assert "runs/chain/collect_sim was built anew since runs/chain/train_inverse was made from it" in line
+
+
+def test_a_damaged_artifact_is_shown_and_ends_in_1(run: Path) -> None:
+    for name in ("trajectories.parquet", "metrics.json", "config.yaml"):
+        folder = run / "runs/chain/collect_real"
+        whole = (folder / name).read_bytes()
+        (folder / name).write_bytes(b"\xff{")
+        said = gsl("show", "chain/collect_real", folder=run)
+        assert said.code == 1
+        assert said.lines == [f"gsl show: runs/chain/collect_real/{name}: is not as the manifest says"]
+        assert "gsl collect" in said.out
+        assert json.loads(gsl("show", "chain/collect_real", "--json", folder=run).out)["exit_code"] == 1
+        assert "chain/optimize" in done("runs", folder=run).out
+        (folder / name).write_bytes(whole)
+    (run / "runs/chain/collect_real/manifest.json").write_bytes(b"\xff")
+    said = done("runs", folder=run)
+    assert "chain/optimize" in said.out
+    assert said.lines == ["runs/chain/collect_real: its manifest cannot be read; gsl verify says why"]
