@@ -61,21 +61,21 @@ def from_description(
     known = {hinge.name: hinge for hinge in told.hinges}
     chosen = joints if joints is not None else {name: JointSettings() for name in drivable(told.hinges)}
     _check(chosen, held, known)
-    follows = {hinge.name: told_of for hinge in told.hinges if (told_of := leader_of(hinge, known))}
+    follows = {hinge.name: leader for hinge in told.hinges if (leader := leader_of(hinge, known))}
     coupled = {
-        name: one.leader
-        for name, one in follows.items()
-        if one.leader in chosen and abs(one.ratio) == 1.0 and known[name].kind in TURNING
+        name: way.leader
+        for name, way in follows.items()
+        if way.leader in chosen and abs(way.ratio) == 1.0 and known[name].kind in TURNING
     }
     driven = {name: _driven(known[name], settings) for name, settings in chosen.items()}
     mounts, remarks, soft = [], [*told.remarks], dict[str, tuple[float, float]]()
     for hinge in told.hinges:
         if hinge.name in coupled:
-            leader, one = coupled[hinge.name], follows[hinge.name]
-            own, missing = limits_like_leader(hinge, one, driven[leader])
-            remarks += [f"joint {hinge.name} follows {leader} and takes over its {missing}"] if missing else []
-            mounts.append(_coupled(own, one, chosen[leader]))
-            soft |= _soft(hinge, mounts[-1].joint, one)
+            way = follows[hinge.name]
+            own, missing = limits_like_leader(hinge, way, driven[way.leader])
+            remarks += [f"joint {hinge.name} follows {way.leader} and takes over its {missing}"] if missing else []
+            mounts.append(_coupled(own, way, chosen[way.leader]))
+            soft |= _soft(hinge, mounts[-1].joint, way)
         elif hinge.name in chosen:
             mounts.append(Mount(driven[hinge.name], hinge.turn))
             soft |= _soft(hinge, driven[hinge.name], Follows(hinge.name, 1.0, 0.0))
@@ -205,9 +205,9 @@ def _place(
     """
     if hinge.name in held:
         return held[hinge.name]
-    at, one = 0.0, follows.get(hinge.name)
-    if one is not None and one.leader in known:
-        at = one.ratio * _place(known[one.leader], held, {}, known) + one.offset
+    at, way = 0.0, follows.get(hinge.name)
+    if way is not None and way.leader in known:
+        at = way.ratio * _place(known[way.leader], held, {}, known) + way.offset
     lower, upper = hinge.limit.get("lower", -math.inf), hinge.limit.get("upper", math.inf)
     return min(max(at, lower), upper) if lower < upper else lower if math.isfinite(lower) else at
 

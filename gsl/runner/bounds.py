@@ -26,7 +26,7 @@ def limits_problem(limits: Mapping[str, Any], joints: Sequence[str], period: flo
         joints: Names.
         period: Control period [s].
     """
-    window = limits.get("window")
+    window: Any = limits.get("window")
     if not _is_number(window) or not 0.0 < window <= 1.0:
         return f"limits.window is {window!r}, not between 0 and 1 s"
     names = ("lower", "upper", "speed", "path", "step")

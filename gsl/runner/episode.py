@@ -161,13 +161,13 @@ class Player:
             raise
         self._called("end")
 
-    def after_a_hang(self, *, told: bool) -> str:
-        """Return what became of the robot after something hung, and what hung unless that is told; else nothing."""
+    def after_a_hang(self, *, named: bool) -> str:
+        """Return what became of the robot after something hung, and what hung unless that was `named`; else nothing."""
         if not self.watch.hung:
             return ""
         unseen = " unseen" if "read" in self.watch.hung else ""
         became = f"the robot was held, then ramped{unseen} to its start" if self.moving else "nothing was sent to it"
-        return became if told else f"{' and '.join(f'{name}()' for name in sorted(self.watch.hung))} hangs; {became}"
+        return became if named else f"{' and '.join(f'{name}()' for name in sorted(self.watch.hung))} hangs; {became}"
 
     def _at(self, seen: Seen) -> np.ndarray:
         return seen.observation[self._layout["position"]]

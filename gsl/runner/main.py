@@ -191,7 +191,7 @@ class Sitting:
         """
         try:
             self._player.leave(episode, hold=hold)
-            return self._player.after_a_hang(told=isinstance(fault, Hangs))
+            return self._player.after_a_hang(named=isinstance(fault, Hangs))
         except KeyboardInterrupt:
             return f"{episode['name']}: the way back was broken off; the robot is left where it is"
         except Lies as error:

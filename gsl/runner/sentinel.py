@@ -29,8 +29,8 @@ def watch(runner: int) -> None:
                 name, _, seconds = lines[-1].decode().rpartition(" ")
                 deadline = time.monotonic() + float(seconds) if seconds else float("inf")
         elif time.monotonic() >= deadline:
-            told = f"{name}() has not returned for {float(seconds):g} s and lets nothing else act"
-            sys.stdout.write(f"runner.py: {told}; the runner is ended, the robot is left at its last target\n")
+            problem = f"{name}() has not returned for {float(seconds):g} s and lets nothing else act"
+            sys.stdout.write(f"runner.py: {problem}; the runner is ended, the robot is left at its last target\n")
             sys.stdout.flush()
             os.kill(runner, signal.SIGKILL)
             return
