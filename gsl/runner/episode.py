@@ -15,7 +15,7 @@ from gsl.runner.following import Following
 from gsl.runner.guard import Guard, ramp
 from gsl.runner.request import layout_of
 from gsl.runner.senses import RobotError, Seen, Senses, names_of
-from gsl.runner.watch import FIRST, Hangs, Watch, limit_of
+from gsl.runner.watch import FIRST, Watch, limit_of
 
 HOLD = 1.0  # for which the last safe target is held before the ramp out of a stop [s]
 LATEST = 3.0  # that a tick may come before the episode is stopped, in periods
@@ -49,10 +49,10 @@ class Played(NamedTuple):
 class Player:
     """Plays the episodes of a request on a robot."""
 
-    def __init__(self, request: Mapping[str, Any], robot: Any, source: Time, *, guarded: bool = False) -> None:
+    def __init__(self, request: Mapping[str, Any], robot: Any, source: Time) -> None:
         limits = narrowest(request["limits"], request["joints"], robot)
         self.request, self.robot, self.period = {**request, "limits": limits}, robot, request["control_period"]
-        self.watch, self._reads, self.moving, self._down = Watch(limit_of(robot), guarded=guarded), False, False, False
+        self.watch, self._reads, self.moving, self._down = Watch(limit_of(robot)), False, False, False
         self.clock = Clock(self.period, source)
         self.guard = Guard(request["joints"], limits, self.period)
         self._following = Following(request["joints"], request["ramp"]["within"])
@@ -140,7 +140,7 @@ class Player:
         rows.append(self._row(episode, tick, now, seen, nothing, nothing, fell=fell, stopped=bool(stopped)))
         return Played(self._columns(), rows, fell, stopped, broken, self.clock.worst)
 
-    def leave(self, episode: Mapping[str, Any], *, hold: bool) -> None:
+    def leave(self, episode: Mapping[str, Any], hold: bool) -> None:
         """Bring the robot back to the start posture: hold the last safe target, long where it had to stop, and ramp.
 
         Where reading hangs it is brought back without, unless it lay down when it was last seen.
@@ -180,11 +180,7 @@ class Player:
     def _look(self, now: float) -> Seen | None:
         """Return what the robot measures on its way back, None where reading hangs."""
         if "read" not in self.watch.hung:
-            try:
-                return self._read(now)
-            except Hangs as error:
-                if error.name != "read":  # one from before: Ctrl-C had called us away from it
-                    return self._look(now)
+            return self._read(now)
         if self._down:
             raise RobotError("read() hangs and the robot lay down when it was last seen; nothing more is sent to it")
         return None
@@ -195,8 +191,6 @@ class Player:
         slow = name in ("begin", "end") or (name == "read" and not self._reads)
         try:
             return self.watch.call(name, function, *words, patience=FIRST if slow else 1.0)
-        except Hangs:
-            raise
         except Exception as error:
             raise RobotError(f"{name}() failed: {type(error).__name__}: {error}") from error
 

@@ -20,7 +20,7 @@ from gsl.runner.preflight import alone, check_writable, mended
 from gsl.runner.request import due, read_request
 from gsl.runner.robots import PerfectRobot, robot_of
 from gsl.runner.senses import RobotError
-from gsl.runner.watch import Hangs, is_stuck
+from gsl.runner.watch import SIGNALS, Hangs, is_stuck
 
 LATE = 0.002  # of a tick, that is worth telling [s]
 OFF = 0.5  # of a tick, from which on a log is refused, in periods
@@ -45,7 +45,7 @@ def main(folder: Path, words: Sequence[str]) -> int:
 
 def _run(folder: Path, asked: argparse.Namespace) -> int:
     """Do what is asked and return the exit code."""
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # hold, ramp out, keep what is complete; in a background job as well
+    for name in SIGNALS:  # hold, ramp out, keep what is complete; in a background job as well
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.default_int_handler)
     try:
@@ -115,7 +115,8 @@ class Sitting:
             raise RobotError(f"--unpaced is for a rehearsal; {asked.robot} does not say SIMULATED = True")
         if not (hasattr(robot, bounds.NAME) or asked.unpaced):
             say(f"{asked.robot} has no {bounds.NAME}: those of the request alone count")
-        self._player = Player(request, robot, Simulated() if asked.unpaced else Wall(), guarded=True)
+        self._player = Player(request, robot, Simulated() if asked.unpaced else Wall())
+        self._watched = self._player.watch.run
 
     def run(self) -> int:
         """Run the episodes that are missing, or those that were named."""
@@ -123,7 +124,7 @@ class Sitting:
         if told := mended(self._asked.log, self._request):
             say(told)
         log = self._asked.log
-        self._player.begin(log, journal.table(log)[0] if log.exists() else None)
+        self._watched(self._player.begin, log, journal.table(log)[0] if log.exists() else None)
         if not self._asked.episode:
             for episode in self._unmeasured():
                 say(f"{episode['name']} is logged, but nobody has said how far it came")
@@ -158,14 +159,16 @@ class Sitting:
         """Run an episode; what it came to is written before the robot moves on, as that may fail, too."""
         player, played, fault, hold = self._player, None, None, True
         try:
-            player.approach(episode)
-        except Hangs as error:
+            self._watched(player.approach, episode)
+        except (Hangs, KeyboardInterrupt) as error:
+            if not player.watch.hung:
+                raise
             raise _both(error, self._back(episode, error, down=False, hold=True)) from error
         try:
             if not self._ask("it stands at the start: Enter begins, q ends"):
                 hold = False
                 raise KeyboardInterrupt
-            played = player.play(episode)
+            played = self._watched(player.play, episode)
             hold = played.fell or played.broken or bool(played.stopped)
             if not played.broken:
                 self._keep(episode, played)
@@ -190,7 +193,12 @@ class Sitting:
         Where something hangs, what became of the robot is told in any case.
         """
         try:
-            self._player.leave(episode, hold=hold)
+            try:
+                self._watched(self._player.leave, episode, hold)
+            except Hangs as error:
+                if error.name != "read":
+                    raise
+                self._watched(self._player.leave, episode, hold)  # without reading
             return self._player.after_a_hang(named=isinstance(fault, Hangs))
         except KeyboardInterrupt:
             return f"{episode['name']}: the way back was broken off; the robot is left where it is"
@@ -221,8 +229,7 @@ class Sitting:
     def _broken(self, played: Played) -> Played:
         """Ask why a person broke an episode off: a fall is a result and must not be lost, anything else is none."""
         with suppress(NobodyToAsk):
-            sure = self._asked.yes or bool(self._player.watch.hung)  # what hangs is no fall
-            if len(played.rows) > 1 and not sure and self._yes("was it a fall? y keeps it, n runs it again"):
+            if len(played.rows) > 1 and not self._asked.yes and self._yes("was it a fall? y keeps it, n runs it again"):
                 return played.as_a_fall()
         raise KeyboardInterrupt
 

@@ -1,40 +1,35 @@
 """Ends a runner in which a function hangs that never gives the interpreter back: nothing else in there can act then.
 
-A program of its own, which the runner starts. Its input says what is called and how long that may take, then that it
-is over; at the end of its input it ends.
+A program of its own, which the runner starts. What is under way stands in memory that both share; so a control loop
+pays nothing for it. It ends with the runner, which holds the other end of its input.
 """
 
 from __future__ import annotations
 
+import mmap
 import os
 import select
 import signal
+import struct
 import sys
 import time
 
-LOOK = 1.0  # between two looks for whether the runner is still there [s]
+UNDER_WAY = struct.Struct("<dd32s")  # by when it has to be over, 0 for nothing; how long that is [s]; its name
+LOOK = 0.2  # between two looks [s]
 
 
-def watch(runner: int) -> None:
+def watch(runner: int, shared: mmap.mmap) -> None:
     """Watch over a process until it ends, or end it."""
-    name, seconds, deadline, text = "", "", float("inf"), b""
-    while os.getppid() == runner:
-        ready, _, _ = select.select([0], [], [], max(0.0, min(LOOK, deadline - time.monotonic())))
-        if ready:
-            new = os.read(0, 1 << 16)
-            if not new:
-                return
-            *lines, text = (text + new).split(b"\n")
-            if lines:
-                name, _, seconds = lines[-1].decode().rpartition(" ")
-                deadline = time.monotonic() + float(seconds) if seconds else float("inf")
-        elif time.monotonic() >= deadline:
-            problem = f"{name}() has not returned for {float(seconds):g} s and lets nothing else act"
-            sys.stdout.write(f"runner.py: {problem}; the runner is ended, the robot is left at its last target\n")
-            sys.stdout.flush()
-            os.kill(runner, signal.SIGKILL)
-            return
+    while os.getppid() == runner and not select.select([0], [], [], LOOK)[0]:
+        deadline, seconds, name = UNDER_WAY.unpack_from(shared)
+        if not 0.0 < deadline < time.monotonic():
+            continue
+        problem = f"{name.rstrip(bytes(1)).decode()}() has not returned for {seconds:g} s and lets nothing else act"
+        sys.stdout.write(f"runner.py: {problem}; the runner is ended, the robot is left at its last target\n")
+        sys.stdout.flush()
+        os.kill(runner, signal.SIGKILL)
+        return
 
 
 if __name__ == "__main__":
-    watch(int(sys.argv[1]))
+    watch(int(sys.argv[1]), mmap.mmap(int(sys.argv[2]), UNDER_WAY.size))
