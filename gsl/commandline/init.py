@@ -52,6 +52,8 @@ class Init:
     )
     effort: Annotated[float | None, setting("peak torque of all, over the URDF's", unit="N·m", gt=0)] = None
     velocity: Annotated[float | None, setting("speed without load of all, over the URDF's", unit="rad/s", gt=0)] = None
+    lower: Annotated[float | None, setting("least position of all, over the URDF's", unit="rad")] = None
+    upper: Annotated[float | None, setting("greatest position of all, over the URDF's", unit="rad")] = None
     period: Annotated[float, setting("control period of your logs", unit="s", gt=0)] = 0.02
 
 
@@ -77,7 +79,7 @@ def write_configuration(arguments: Sequence[str], worlds: Collection[str], conso
     if folder.exists():
         raise InputError(f"{folder}: exists; choose another folder with out=")
     description = read_description(urdf)
-    known = JointSettings(effort=told.effort, velocity=told.velocity)
+    known = JointSettings(effort=told.effort, velocity=told.velocity, lower=told.lower, upper=told.upper)
     try:
         robot = from_description(description, dict.fromkeys(told.joints or drivable(description.hinges), known), {}, {})
     except ConfigError as error:
@@ -103,7 +105,7 @@ def _write(folder: Path, told: Init, urdf: Path, robot: Robot) -> None:
     with explained(folder):
         try:
             world.parent.mkdir(parents=True)
-            (place / ROBOT).write_text(_robot_text(robot, Path(os.path.relpath(urdf, folder))), encoding="utf-8")
+            (place / ROBOT).write_text(_robot_text(robot, Path(os.path.relpath(urdf, folder)), told), encoding="utf-8")
             known = {"name": told.name, "robot": (folder / ROBOT).as_posix(), "period": told.period}
             world.write_text(_WORLD_TEXT.format(**known), encoding="utf-8")
             os.rename(place, folder)
@@ -111,8 +113,9 @@ def _write(folder: Path, told: Init, urdf: Path, robot: Robot) -> None:
             shutil.rmtree(place, ignore_errors=True)
 
 
-def _robot_text(robot: Robot, urdf: Path) -> str:
-    joints = "".join(f"  {_plain(name)}: {_flow(_servo(robot, name))}\n" for name in robot.controlled)
+def _robot_text(robot: Robot, urdf: Path, told: Init) -> str:
+    ends = {key: value for key, value in (("lower", told.lower), ("upper", told.upper)) if value is not None}
+    joints = "".join(f"  {_plain(name)}: {_flow({**_servo(robot, name), **ends})}\n" for name in robot.controlled)
     held = "".join(f"# {remark}\n" for remark in robot.remarks)
     units = "  # kp [N·m/rad], kd [N·m·s/rad], effort [N·m], velocity without load [rad/s], armature [kg·m²]\n"
     return (

@@ -89,6 +89,7 @@ class Robot:
         upright_height: Base height below which it lies on the ground [m].
         torque_unit: Size of its servos against the NAO's: by so much more or less their friction differs.
         ranges: Documented ranges that differ from those of a NAO's class, by effect and parameter: (lower, upper).
+        soft: Ranges that commands keep, within those that the motors can move in [rad], by motor: (lower, upper).
         remarks: What was left out or assumed when the robot was read from a file.
     """
 
@@ -109,6 +110,7 @@ class Robot:
     upright_height: float = 0.0
     torque_unit: float = 1.0
     ranges: Mapping[str, Mapping[str, tuple[float, float]]] = field(default_factory=dict)
+    soft: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
     @property
@@ -134,6 +136,12 @@ class Robot:
     def joint(self, name: str) -> Joint:
         """Return the joint called `name`."""
         return next(joint for joint in self.joints if joint.name == name)
+
+    def commanded(self, name: str) -> tuple[float, float]:
+        """Return the range that commands of a motor keep [rad]."""
+        joint = self.joint(name)
+        lower, upper = self.soft.get(name, (joint.lower, joint.upper))
+        return max(lower, joint.lower), min(upper, joint.upper)
 
 
 def rotation(axis: np.ndarray, angle: float) -> np.ndarray:

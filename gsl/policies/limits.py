@@ -62,8 +62,9 @@ class Limits:
 def limits(robot: Robot) -> Limits:
     """Return the limits of a robot; a joint that drives several motors has the narrowest of theirs."""
     motors = [robot.joint(name) for name in robot.motors]
-    lower = -narrowest(robot, [-joint.lower for joint in motors])
-    upper = narrowest(robot, [joint.upper for joint in motors])
+    ranges = [robot.commanded(name) for name in robot.motors]
+    lower = -narrowest(robot, [-lower for lower, _ in ranges])
+    upper = narrowest(robot, [upper for _, upper in ranges])
     usual = np.clip([robot.stance.get(name, 0.0) for name in robot.controlled], lower, upper)
     rest = usual + TO_THE_CENTRE * (0.5 * (lower + upper) - usual)
     down, up = _rooms(robot, lower, upper, usual, rest)

@@ -21,6 +21,7 @@ from gsl.rollout.rollout import Scenario
 from gsl.runner.guard import Guard
 from gsl.runner.request import GROUND, HELD, NAME, due, read_request
 from gsl.storage import manifest
+from gsl.storage.answer_checks import check_answers
 from gsl.storage.answers import Answered, answer_files, read_answers
 from gsl.storage.requests import restore, sealed, write_request
 from gsl.worlds.bullet import BulletWorld
@@ -80,6 +81,8 @@ def asked(
     elif restore(folder, request):
         console.status(f"{folder.as_posix()}: parts of its runner were missing; they are written anew")
     answers = read_answers(folder, request)
+    for line in check_answers(request, answers):
+        console.status(f"warning: {folder.as_posix()}: {line}")
     verdicts = {
         episode["name"]: judged(scenario, answers[episode["name"]], episode["steps"])
         for episode in request["episodes"]

@@ -12,8 +12,8 @@ from gsl.errors import ConfigError, InputError
 from gsl.robots.robot_file import SUFFIXES, files_of, from_file
 
 _NOT_ROBOTS = (
-    *("catalogue", "defaults", "frames", "hinges", "nao_legs", "nao_shapes", "robot_file", "so101_shapes"),
-    *("urdf", "urdf_remarks", "urdf_xml"),
+    *("catalogue", "defaults", "frames", "hinges", "joint_limits", "mimic", "nao_legs", "nao_shapes", "robot_file"),
+    *("so101_shapes", "urdf", "urdf_remarks", "urdf_xml"),
 )
 
 

@@ -15,6 +15,8 @@ from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
 from gsl.robots.defaults import armature_of, lone_servos, unknown_loads, with_gains
 from gsl.robots.frames import Mount, aligned
+from gsl.robots.joint_limits import is_range, limits_problem
+from gsl.robots.mimic import Follows, leader_of, limits_like_leader
 from gsl.robots.urdf_xml import TURNING, Description, Hinge
 
 ENDLESS = 2.0 * math.pi  # limit of a continuous joint, either way [rad]
@@ -59,24 +61,31 @@ def from_description(
     known = {hinge.name: hinge for hinge in told.hinges}
     chosen = joints if joints is not None else {name: JointSettings() for name in drivable(told.hinges)}
     _check(chosen, held, known)
+    follows = {hinge.name: leader for hinge in told.hinges if (leader := leader_of(hinge, known))}
     coupled = {
-        hinge.name: hinge.follows[0]
-        for hinge in told.hinges
-        if hinge.follows and hinge.follows[0] in chosen and abs(hinge.follows[1]) == 1.0 and hinge.kind in TURNING
+        name: way.leader
+        for name, way in follows.items()
+        if way.leader in chosen and abs(way.ratio) == 1.0 and known[name].kind in TURNING
     }
-    mounts, remarks = [], [*told.remarks]
+    driven = {name: _driven(known[name], settings) for name, settings in chosen.items()}
+    mounts, remarks, soft = [], [*told.remarks], dict[str, tuple[float, float]]()
     for hinge in told.hinges:
         if hinge.name in coupled:
-            mounts.append(_coupled(hinge, chosen[coupled[hinge.name]]))
+            way = follows[hinge.name]
+            own, missing = limits_like_leader(hinge, way, driven[way.leader])
+            remarks += [f"joint {hinge.name} follows {way.leader} and takes over its {missing}"] if missing else []
+            mounts.append(_coupled(own, way, chosen[way.leader]))
+            soft |= _soft(hinge, mounts[-1].joint, way)
         elif hinge.name in chosen:
-            mounts.append(Mount(_driven(hinge, chosen[hinge.name]), hinge.turn))
+            mounts.append(Mount(driven[hinge.name], hinge.turn))
+            soft |= _soft(hinge, driven[hinge.name], Follows(hinge.name, 1.0, 0.0))
         else:
-            mounts.append(_held(hinge, place := _place(hinge, held)))
+            mounts.append(_held(hinge, place := _place(hinge, held, follows, known)))
             if hinge.kind != "fixed" and hinge.name not in held:
-                remarks.append(_remark(hinge, place))
+                remarks.append(_remark(hinge, place, follows.get(hinge.name), known))
     links, placed = aligned(told.links, mounts)
     robot = Robot(
-        told.name, links, placed, tuple(chosen), coupled, stance=dict(stance), remarks=tuple(remarks),
+        told.name, links, placed, tuple(chosen), coupled, stance=dict(stance), remarks=tuple(remarks), soft=soft,
         torque_constant=_torque_constants(chosen, coupled),
     )  # fmt: skip
     _check_masses(robot)
@@ -94,7 +103,7 @@ def lone(name: str, joints: Mapping[str, JointSettings]) -> Robot:
         raise ConfigError("joints", "names no joint; without a urdf they have to be named")
     nowhere, endless = np.zeros(3), {"lower": -ENDLESS, "upper": ENDLESS}
     hinges = [
-        Hinge(one, "revolute", "base", one, nowhere, np.eye(3), np.array([0.0, 1.0, 0.0]), endless, None)
+        Hinge(one, "revolute", "base", one, nowhere, np.eye(3), np.array([0.0, 1.0, 0.0]), endless, {}, None)
         for one in joints
     ]
     driven = {hinge.name: _driven(hinge, joints[hinge.name]) for hinge in hinges}
@@ -137,30 +146,43 @@ def _check(chosen: Mapping[str, JointSettings], held: Mapping[str, float], known
 
 def _driven(hinge: Hinge, told: JointSettings) -> Joint:
     own = {"effort": told.effort, "velocity": told.velocity, "lower": told.lower, "upper": told.upper}
-    limit = {**hinge.limit, **{key: value for key, value in own.items() if value is not None}}
-    if hinge.kind == "continuous":
-        limit = {"lower": -ENDLESS, "upper": ENDLESS, **limit}
-    for key, what in (("effort", "peak torque [N·m]"), ("velocity", "speed without load [rad/s]")):
-        if not limit.get(key, 0.0) > 0.0:
-            has = f"has no {key}" if key not in limit else f"has {key} {limit[key]:g}, a placeholder"
-            raise ConfigError(f"joints.{hinge.name}", f"{has}; write its motor's {what} in <limit>, or in a robot file")
-    lower, upper = limit.get("lower", 0.0), limit.get("upper", 0.0)
-    if not lower < upper:
-        raise ConfigError(f"joints.{hinge.name}", f"its limits are {lower:g} and {upper:g} rad: it could not move")
+    limit = hinge.limit
+    if hinge.kind == "continuous" and not is_range(limit):  # a URDF need not say one then
+        limit = {**limit, "lower": -ENDLESS, "upper": ENDLESS}
+    limit = {**limit, **{key: value for key, value in own.items() if value is not None}}
+    if problem := limits_problem(limit):
+        raise ConfigError(f"joints.{hinge.name}", problem)
+    lower, upper = limit["lower"], limit["upper"]
     effort, velocity = limit["effort"], limit["velocity"]
     armature = armature_of(effort, velocity) if told.armature is None else told.armature
     origin, axis = hinge.origin, hinge.axis
     return Joint(hinge.name, hinge.parent, hinge.child, origin, axis, lower, upper, velocity, effort, armature)
 
 
-def _coupled(hinge: Hinge, leader: JointSettings) -> Mount:
+def _soft(hinge: Hinge, joint: Joint, follows: Follows) -> dict[str, tuple[float, float]]:
+    """Return the range that commands of a joint keep, by name; none where its <safety_controller> leaves it open.
+
+    Raises:
+        ConfigError: It leaves no range at all.
+    """
+    ends = hinge.soft
+    if not ends or (not ends.get("lower") and not ends.get("upper")):  # 0 and 0 are the defaults: nothing is said
+        return {}
+    own = (ends.get("lower", -math.inf), ends.get("upper", math.inf))
+    lower, upper = sorted(follows.ratio * (end - follows.offset) for end in own)
+    lower, upper = max(lower, joint.lower), min(upper, joint.upper)
+    if not lower < upper:
+        problem = f"its soft limits {own[0]:g} and {own[1]:g} rad leave no range; mend its <safety_controller>"
+        raise ConfigError(f"joints.{hinge.name}", problem)
+    return {hinge.name: (lower, upper)}
+
+
+def _coupled(hinge: Hinge, follows: Follows, leader: JointSettings) -> Mount:
     """Return a joint that follows another, turned and shifted such that its angle is that of the leader."""
-    assert hinge.follows is not None
-    _, ratio, offset = hinge.follows
     joint = _driven(hinge, replace(leader, lower=None, upper=None))
-    lower, upper = sorted(ratio * (end - offset) for end in (joint.lower, joint.upper))
-    shifted = hinge.turn @ rotation(hinge.axis, offset)
-    return Mount(replace(joint, axis=ratio * joint.axis, lower=lower, upper=upper), shifted)
+    lower, upper = sorted(follows.ratio * (end - follows.offset) for end in (joint.lower, joint.upper))
+    shifted = hinge.turn @ rotation(hinge.axis, follows.offset)
+    return Mount(replace(joint, axis=follows.ratio * joint.axis, lower=lower, upper=upper), shifted)
 
 
 def _held(hinge: Hinge, place: float) -> Mount:
@@ -174,16 +196,28 @@ def _held(hinge: Hinge, place: float) -> Mount:
     return Mount(joint, turn)
 
 
-def _place(hinge: Hinge, held: Mapping[str, float]) -> float:
-    """Return where a joint is held [rad], or [m] if it slides: where the user says, else as near to 0 as it goes."""
+def _place(
+    hinge: Hinge, held: Mapping[str, float], follows: Mapping[str, Follows], known: Mapping[str, Hinge]
+) -> float:
+    """Return where a joint is held [rad], or [m] if it slides.
+
+    That is where the user says, else where it follows its leader to, else as near to 0 as it goes.
+    """
+    if hinge.name in held:
+        return held[hinge.name]
+    at, way = 0.0, follows.get(hinge.name)
+    if way is not None and way.leader in known:
+        at = way.ratio * _place(known[way.leader], held, {}, known) + way.offset
     lower, upper = hinge.limit.get("lower", -math.inf), hinge.limit.get("upper", math.inf)
-    return held.get(hinge.name, min(max(0.0, lower), max(upper, lower)))
+    return min(max(at, lower), upper) if lower < upper else lower if math.isfinite(lower) else at
 
 
-def _remark(hinge: Hinge, place: float) -> str:
+def _remark(hinge: Hinge, place: float, follows: Follows | None, known: Mapping[str, Hinge]) -> str:
     why = f"{hinge.kind}, which cannot be driven" if hinge.kind not in TURNING else "not controlled"
-    if hinge.follows and abs(hinge.follows[1]) != 1.0:
-        why = f"follows {hinge.follows[0]} by a factor of {hinge.follows[1]:g}; only 1 and -1 can be driven"
+    if follows and follows.leader not in known:
+        why = f"follows {follows.leader}, which does not exist"
+    elif follows and abs(follows.ratio) != 1.0:
+        why = f"follows {follows.leader} by a factor of {follows.ratio:g}; only 1 and -1 can be driven"
     return f"joint {hinge.name} is held at {place:g} {'m' if hinge.kind == 'prismatic' else 'rad'} ({why})"
 
 

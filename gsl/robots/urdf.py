@@ -20,7 +20,7 @@ def urdf(robot: Robot, *, visuals: bool = True) -> str:
     for link in robot.links.values():
         _add_link(root, link, visuals)
     for joint in robot.joints:
-        _add_joint(root, joint)
+        _add_joint(root, joint, robot.soft.get(joint.name))
     xml.indent(root)  # Bullet reads lines of at most 8191 characters
     return xml.tostring(root, encoding="unicode") + "\n"
 
@@ -73,7 +73,7 @@ def _attitude(shape: Shape) -> Sequence[float] | np.ndarray:
     return rpy(euler(*shape.turn) @ euler(*_ALONG[shape.along]))
 
 
-def _add_joint(root: xml.Element, joint: Joint) -> None:
+def _add_joint(root: xml.Element, joint: Joint, soft: tuple[float, float] | None) -> None:
     fixed = joint.fixed_at is not None
     node = xml.SubElement(root, "joint", name=joint.name, type="fixed" if fixed else "revolute")
     xml.SubElement(node, "parent", link=joint.parent)
@@ -83,6 +83,9 @@ def _add_joint(root: xml.Element, joint: Joint) -> None:
     xml.SubElement(node, "axis", xyz=_text(*joint.axis))
     limit = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort, "velocity": joint.max_velocity}
     xml.SubElement(node, "limit", {name: _text(value) for name, value in limit.items()})
+    if soft is not None:
+        ends = {"soft_lower_limit": _text(soft[0]), "soft_upper_limit": _text(soft[1])}
+        xml.SubElement(node, "safety_controller", {**ends, "k_velocity": "0"})
 
 
 def _origin(

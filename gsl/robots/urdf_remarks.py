@@ -31,10 +31,14 @@ class Limited(Protocol):
     def limit(self) -> Mapping[str, float]:
         """Its limits."""
 
+    @property
+    def soft(self) -> Mapping[str, float]:
+        """Its soft limits."""
+
 
 def remarks(root: xml.Element, links: Iterable[Link], hinges: Iterable[Limited]) -> list[str]:
     """Return what there is to say of a file and what it holds."""
-    return [*_meshes(root), *_dynamics(root), *_limits(hinges), *_inertias(links)]
+    return [*_meshes(root), *_dynamics(root), *_limits(hinges), *_soft(hinges), *_inertias(links)]
 
 
 def _limits(hinges: Iterable[Limited]) -> Iterator[str]:
@@ -43,6 +47,15 @@ def _limits(hinges: Iterable[Limited]) -> Iterator[str]:
         if hinge.kind == "revolute" and ends and max(map(abs, ends)) > FAR:
             told = " and ".join(f"{end:g}" for end in ends)
             yield f"joint {hinge.name} has the limits {told} rad: are they in degrees? A URDF's are in radians"
+
+
+def _soft(hinges: Iterable[Limited]) -> Iterator[str]:
+    for hinge in hinges:
+        if any(hinge.soft.values()):
+            ends = " and ".join(f"{hinge.soft[key]:g}" for key in ("lower", "upper") if key in hinge.soft)
+            yield f"commands of joint {hinge.name} keep the soft limits of its <safety_controller>: {ends} rad"
+        elif hinge.soft:
+            yield f"joint {hinge.name} has soft limits of 0 in its <safety_controller>: taken as not set"
 
 
 def _inertias(links: Iterable[Link]) -> Iterator[str]:

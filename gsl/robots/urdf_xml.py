@@ -22,6 +22,8 @@ LARGEST = 20e6  # of a file that is read [bytes]
 PRIMITIVES = ("box", "sphere", "cylinder")
 TURNING = ("revolute", "continuous")
 _LIMITS = ("lower", "upper", "effort", "velocity")
+_SOFT = {"lower": "soft_lower_limit", "upper": "soft_upper_limit"}
+_LEFT = ("${", "$(")  # how an expression begins that xacro would have replaced
 _GREY = (0.75, 0.77, 0.8, 1.0)
 KINDS = (*TURNING, "fixed", "prismatic")
 
@@ -36,6 +38,7 @@ class Hinge:
         turn: From the child's axes to the parent's, shape (3, 3).
         axis: In the child's frame, of length 1, shape (3,).
         limit: What <limit> says: lower, upper, effort, velocity.
+        soft: What <safety_controller> says of the range that commands keep: lower, upper [rad].
         follows: Joint, multiplier and offset [rad] of <mimic>, if there is one.
     """
 
@@ -47,6 +50,7 @@ class Hinge:
     turn: np.ndarray
     axis: np.ndarray
     limit: dict[str, float]
+    soft: dict[str, float]
     follows: tuple[str, float, float] | None
 
 
@@ -94,11 +98,29 @@ def _root(path: Path) -> xml.Element:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except (xml.ParseError, ValueError, LookupError) as error:
         raise InputError(f"{path}: is not XML, or damaged: {error}") from error
-    if root.tag != "robot":
-        raise InputError(f"{path}: is no URDF: its root is <{root.tag}>, not <robot>")
     if "xacro" in path.suffix or any("xacro" in str(node.tag) for node in root.iter()):
         raise InputError(f"{path}: holds xacro macros; expand them first: xacro {path.name} > robot.urdf")
+    _strip_namespace(root)
+    if root.tag != "robot":
+        raise InputError(f"{path}: is no URDF: its root is <{root.tag}>, not <robot>")
+    if left := next((text for node in root.iter() for text in _expressions(node)), ""):
+        problem = f"holds an expression of xacro that was not replaced, {left[:40]}"
+        raise InputError(f"{path}: {problem}; expand it first: xacro {path.name} > robot.urdf")
     return root
+
+
+def _strip_namespace(root: xml.Element) -> None:
+    """Take the root's own namespace off all elements that have it: a default xmlns changes nothing of a URDF."""
+    space, brace, _ = root.tag.rpartition("}")
+    for node in root.iter() if brace else ():
+        if isinstance(node.tag, str):
+            node.tag = node.tag.removeprefix(f"{space}}}")
+
+
+def _expressions(node: xml.Element) -> list[str]:
+    """Return the attributes in which xacro has left something to replace; files of meshes are not read anyway."""
+    values = (value for name, value in node.attrib.items() if name != "filename")
+    return [value for value in values if any(mark in value for mark in _LEFT)]
 
 
 def _each(root: xml.Element, tag: str, read: Callable[[str, xml.Element], T]) -> list[T]:
@@ -168,14 +190,19 @@ def _hinge(name: str, node: xml.Element) -> Hinge:
         raise ValueError("its axis has no direction")
     limit, mimic = node.find("limit"), node.find("mimic")
     told = {key: _number(limit, key, "<limit>") for key in _LIMITS if limit is not None and limit.get(key) is not None}
-    follows = None
+    safety, follows = node.find("safety_controller"), None
+    soft = {
+        key: _number(safety, name, "<safety_controller>")
+        for key, name in _SOFT.items()
+        if safety is not None and safety.get(name) is not None
+    }
     if mimic is not None:
         ratio, offset = (
             _number(mimic, key, "<mimic>", missing) for key, missing in (("multiplier", 1.0), ("offset", 0.0))
         )
         follows = (mimic.get("joint", ""), ratio, offset)
     unit = way / np.linalg.norm(way) if way.any() else np.array([1.0, 0.0, 0.0])
-    return Hinge(name, kind, parent, child, *_origin(node), unit, told, follows)
+    return Hinge(name, kind, parent, child, *_origin(node), unit, told, soft, follows)
 
 
 def _tree(links: dict[str, Link], hinges: Sequence[Hinge]) -> tuple[str, tuple[Hinge, ...]]:

@@ -9,6 +9,7 @@ from typing import Any
 
 PIPES = "GSL_RUNNER_PIPES"
 SIMULATED = True
+TIME_LIMIT = 600.0  # of a call [s]: the surrogate may have to compile first
 
 
 def _opened() -> tuple[Any, Any]:

@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.runner.acting import Actor
+from gsl.runner.bounds import narrowest
 from gsl.runner.clock import Clock, Time
 from gsl.runner.following import Following
 from gsl.runner.guard import Guard, ramp
 from gsl.runner.request import layout_of
 from gsl.runner.senses import RobotError, Seen, Senses, names_of
+from gsl.runner.watch import FIRST, Watch, limit_of
 
 HOLD = 1.0  # for which the last safe target is held before the ramp out of a stop [s]
 LATEST = 3.0  # that a tick may come before the episode is stopped, in periods
@@ -48,9 +50,11 @@ class Player:
     """Plays the episodes of a request on a robot."""
 
     def __init__(self, request: Mapping[str, Any], robot: Any, source: Time) -> None:
-        self.request, self.robot, self.period = request, robot, request["control_period"]
+        limits = narrowest(request["limits"], request["joints"], robot)
+        self.request, self.robot, self.period = {**request, "limits": limits}, robot, request["control_period"]
+        self.watch, self._reads, self.moving, self._down = Watch(limit_of(robot)), False, False, False
         self.clock = Clock(self.period, source)
-        self.guard = Guard(request["joints"], request["limits"], self.period)
+        self.guard = Guard(request["joints"], limits, self.period)
         self._following = Following(request["joints"], request["ramp"]["within"])
         self._layout = layout_of(request)
         self._senses = Senses(self._layout)
@@ -81,6 +85,7 @@ class Player:
             RobotError: It lies down, is found where nothing should move it, the start is unsafe, or it does not get
                 there.
         """
+        self.moving = False
         seen = self._read(self.clock.now())
         if seen.fell:
             raise Lies(f"the robot lies down before {episode['name']} has begun; set it up, and start again")
@@ -106,7 +111,8 @@ class Player:
         Raises:
             RobotError: The robot or the policy fails, or a tick comes far too late.
         """
-        actor, rows, fell, stopped = Actor(self.request, episode), [], False, ""
+        rows, fell, stopped = [], False, ""
+        actor = self.watch.call("the policy's start", Actor, self.request, episode, patience=FIRST)
         self._senses = Senses(self._layout)
         self._called("begin", episode)
         self.clock.begin()
@@ -118,7 +124,7 @@ class Player:
         try:
             while not (fell := seen.fell) and tick < episode["steps"]:
                 self._check_late(episode, now)
-                action, sent = actor.act(seen.observation)
+                action, sent = self.watch.call("the policy's act", actor.act, seen.observation)
                 if stopped := self._following.problem(self._at(seen), now) or self._send(sent):
                     stopped = f"{stopped} (at {now:.2f} s)"
                     break
@@ -134,33 +140,57 @@ class Player:
         rows.append(self._row(episode, tick, now, seen, nothing, nothing, fell=fell, stopped=bool(stopped)))
         return Played(self._columns(), rows, fell, stopped, broken, self.clock.worst)
 
-    def leave(self, episode: Mapping[str, Any], *, hold: bool) -> None:
+    def leave(self, episode: Mapping[str, Any], hold: bool) -> None:
         """Bring the robot back to the start posture: hold the last safe target, long where it had to stop, and ramp.
+
+        Where reading hangs it is brought back without, unless it lay down when it was last seen.
 
         Raises:
             Lies: It lies down; nothing more is sent.
             RobotError: It fails, or does not follow; it is left where it is.
         """
+        if not self.moving:
+            return
         seconds = HOLD if hold else self.request["limits"]["window"]
         try:
-            self._follow([self.guard.last] * max(1, round(seconds / self.period)), held=True)
+            self._follow([self.guard.last] * max(1, round(seconds / self.period)), held=True, back=True)
             self.guard.start(self.guard.last)
-            self._ramp(np.array(episode["posture"], dtype=float))
+            self._ramp(np.array(episode["posture"], dtype=float), back=True)
         except Lies:
             self._called("end")
             raise
         self._called("end")
 
+    def after_a_hang(self, *, named: bool) -> str:
+        """Return what became of the robot after something hung, and what hung unless that was `named`; else nothing."""
+        if not self.watch.hung:
+            return ""
+        unseen = " unseen" if "read" in self.watch.hung else ""
+        became = f"the robot was held, then ramped{unseen} to its start" if self.moving else "nothing was sent to it"
+        return became if named else f"{' and '.join(f'{name}()' for name in sorted(self.watch.hung))} hangs; {became}"
+
     def _at(self, seen: Seen) -> np.ndarray:
         return seen.observation[self._layout["position"]]
 
     def _read(self, now: float) -> Seen:
-        return self._senses.seen(self._called("read"), now)
+        seen = self._senses.seen(self._called("read"), now)
+        self._reads, self._down = True, seen.fell
+        return seen
+
+    def _look(self, now: float) -> Seen | None:
+        """Return what the robot measures on its way back, None where reading hangs."""
+        if "read" not in self.watch.hung:
+            return self._read(now)
+        if self._down:
+            raise RobotError("read() hangs and the robot lay down when it was last seen; nothing more is sent to it")
+        return None
 
     def _called(self, name: str, *words: Any) -> Any:
-        """Call a function of the robot, none where it has none."""
+        """Call a function of the robot, none where it has none; the first reading may have to open a connection."""
+        function = getattr(self.robot, name, lambda *words: None)
+        slow = name in ("begin", "end") or (name == "read" and not self._reads)
         try:
-            return getattr(self.robot, name, lambda *words: None)(*words)
+            return self.watch.call(name, function, *words, patience=FIRST if slow else 1.0)
         except Exception as error:
             raise RobotError(f"{name}() failed: {type(error).__name__}: {error}") from error
 
@@ -171,6 +201,7 @@ class Player:
             return problem
         self.guard.take(target, now)  # first: if send() breaks off, the robot may have it
         self._following.sent(target, now)
+        self.moving = True
         self._called("send", target.copy())
         return ""
 
@@ -179,19 +210,22 @@ class Player:
             late = f"at {now:.2f} s a tick came {1e3 * self.clock.late:.0f} ms late"
             raise RobotError(f"{episode['name']}: {late}; stopped and not kept; run it again")
 
-    def _ramp(self, end: np.ndarray) -> None:
+    def _ramp(self, end: np.ndarray, *, back: bool = False) -> None:
         speed = np.minimum(self.request["ramp"]["speed"], CALM * np.array(self.request["limits"]["speed"]))
-        self._follow(list(ramp(self.guard.last, end, self.request["ramp"]["seconds"], speed, self.period)))
+        self._follow(list(ramp(self.guard.last, end, self.request["ramp"]["seconds"], speed, self.period)), back=back)
 
-    def _follow(self, targets: list[np.ndarray], *, held: bool = False) -> None:
-        """Send targets one by one while the robot stands and, unless one and the same is `held`, follows."""
+    def _follow(self, targets: list[np.ndarray], *, held: bool = False, back: bool = False) -> None:
+        """Send targets one by one while the robot stands and, unless one and the same is `held`, follows.
+
+        On the way `back` it is gone on where reading hangs.
+        """
         self._following.start(self.guard.last, self.clock.now())
         for target in targets:
             now = self.clock.wait()
-            seen = self._read(now)
-            if seen.fell:
+            seen = self._look(now) if back else self._read(now)
+            if seen and seen.fell:
                 raise Lies("the robot lies down; nothing more is sent to it")
-            if not held and (problem := self._following.problem(self._at(seen), now)):
+            if seen and not held and (problem := self._following.problem(self._at(seen), now)):
                 raise RobotError(f"{problem} in a ramp; it is left where it is")
             if problem := self._send(target):
                 raise RobotError(f"a ramp is refused: {problem}")

@@ -55,7 +55,7 @@ class Guard:
             (way, self.path, 1.0, "the target moves {:.4g} rad in " + seconds + ", more than the {:.4g} rad allowed"),
         )
         found = (
-            self._told(sign * (value - bound) > _ROUNDING, text, value, bound) for value, bound, sign, text in rules
+            self._told(~(sign * (value - bound) <= _ROUNDING), text, value, bound) for value, bound, sign, text in rules
         )
         return next(filter(None, found), "")
 
@@ -69,12 +69,12 @@ class Guard:
     def beyond(self, position: np.ndarray) -> str:
         """Return which joint was found so far outside of its range that nothing should move it, nothing if none."""
         outside = np.maximum(self.lower - position, position - self.upper)
-        return self._told(outside > BEYOND, "is at {:.4g} rad, {:.4g} rad outside of its range", position, outside)
+        return self._told(~(outside <= BEYOND), "is at {:.4g} rad, {:.4g} rad outside of its range", position, outside)
 
     def away(self, position: np.ndarray, within: float) -> str:
         """Return which joint is further from the last target than `within` [rad], nothing if none is."""
         off = np.abs(position - self.last)
-        return self._told(off > within, "is {:.4g} rad off", off)
+        return self._told(~(off <= within), "is {:.4g} rad off", off)
 
     def _told(self, wrong: np.ndarray, text: str, *values: np.ndarray) -> str:
         if not wrong.any():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 import time
@@ -12,13 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from gsl.errors import GslError
-from gsl.runner import journal
+from gsl.runner import bounds, journal
 from gsl.runner.clock import Simulated, Wall
 from gsl.runner.episode import Lies, Played, Player
 from gsl.runner.preflight import alone, check_writable, mended
 from gsl.runner.request import due, read_request
 from gsl.runner.robots import PerfectRobot, robot_of
 from gsl.runner.senses import RobotError
+from gsl.runner.watch import SIGNALS, Hangs, is_stuck
 
 LATE = 0.002  # of a tick, that is worth telling [s]
 OFF = 0.5  # of a tick, from which on a log is refused, in periods
@@ -35,7 +37,15 @@ def main(folder: Path, words: Sequence[str]) -> int:
     parser.add_argument("--yes", action="store_true", help="ask nothing")
     parser.add_argument("--unpaced", action="store_true", help="do not wait for the clock: for a simulated robot")
     asked = parser.parse_args(words)
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # hold, ramp out, keep what is complete; in a background job as well
+    code = _run(folder, asked)
+    if is_stuck():  # what hangs may keep the process from its end as well
+        os._exit(code)
+    return code
+
+
+def _run(folder: Path, asked: argparse.Namespace) -> int:
+    """Do what is asked and return the exit code."""
+    for name in SIGNALS:  # hold, ramp out, keep what is complete; in a background job as well
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.default_int_handler)
     try:
@@ -103,7 +113,10 @@ class Sitting:
         robot = robot_of(asked.robot)
         if asked.unpaced and not getattr(robot, "SIMULATED", False):
             raise RobotError(f"--unpaced is for a rehearsal; {asked.robot} does not say SIMULATED = True")
+        if not (hasattr(robot, bounds.NAME) or asked.unpaced):
+            say(f"{asked.robot} has no {bounds.NAME}: those of the request alone count")
         self._player = Player(request, robot, Simulated() if asked.unpaced else Wall())
+        self._watched = self._player.watch.run
 
     def run(self) -> int:
         """Run the episodes that are missing, or those that were named."""
@@ -111,7 +124,7 @@ class Sitting:
         if told := mended(self._asked.log, self._request):
             say(told)
         log = self._asked.log
-        self._player.begin(log, journal.table(log)[0] if log.exists() else None)
+        self._watched(self._player.begin, log, journal.table(log)[0] if log.exists() else None)
         if not self._asked.episode:
             for episode in self._unmeasured():
                 say(f"{episode['name']} is logged, but nobody has said how far it came")
@@ -145,18 +158,24 @@ class Sitting:
     def _one(self, episode: Mapping[str, Any]) -> None:
         """Run an episode; what it came to is written before the robot moves on, as that may fail, too."""
         player, played, fault, hold = self._player, None, None, True
-        player.approach(episode)
+        try:
+            self._watched(player.approach, episode)
+        except (Hangs, KeyboardInterrupt) as error:
+            if not player.watch.hung:
+                raise
+            raise _both(error, self._back(episode, error, down=False, hold=True)) from error
         try:
             if not self._ask("it stands at the start: Enter begins, q ends"):
                 hold = False
                 raise KeyboardInterrupt
-            played = player.play(episode)
+            played = self._watched(player.play, episode)
             hold = played.fell or played.broken or bool(played.stopped)
             if not played.broken:
                 self._keep(episode, played)
         except BaseException as error:  # whatever it is, the robot is brought back first
             fault = error
-        left = self._back(episode, down=played is not None and (played.fell or bool(played.stopped)), hold=hold)
+        down = played is not None and (played.fell or bool(played.stopped))
+        left = self._back(episode, fault, down=down, hold=hold)
         if played is not None and played.broken:
             try:
                 self._keep(episode, self._broken(played))
@@ -168,10 +187,19 @@ class Sitting:
         if self._request["distance"] and "base.position.x" not in played.columns:
             self._measure(episode, fell=played.fell or bool(played.stopped))
 
-    def _back(self, episode: Mapping[str, Any], *, down: bool, hold: bool) -> str:
-        """Hold and ramp out; return why the robot is not back, nothing if it is, or lies after what was a fall."""
+    def _back(self, episode: Mapping[str, Any], fault: BaseException | None, *, down: bool, hold: bool) -> str:
+        """Hold and ramp out; return why the robot is not back, nothing if it is, or lies after what was a fall.
+
+        Where something hangs, what became of the robot is told in any case.
+        """
         try:
-            self._player.leave(episode, hold=hold)
+            try:
+                self._watched(self._player.leave, episode, hold)
+            except Hangs as error:
+                if error.name != "read":
+                    raise
+                self._watched(self._player.leave, episode, hold)  # without reading
+            return self._player.after_a_hang(named=isinstance(fault, Hangs))
         except KeyboardInterrupt:
             return f"{episode['name']}: the way back was broken off; the robot is left where it is"
         except Lies as error:

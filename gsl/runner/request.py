@@ -10,6 +10,7 @@ from typing import Any
 
 from gsl.core.layout import Layout
 from gsl.errors import ArtifactError
+from gsl.runner.plausible import request_problem
 
 NAME = "request.json"
 SCHEMA_VERSION = 1
@@ -40,6 +41,8 @@ def read_request(folder: Path) -> dict[str, Any]:
         raise ArtifactError(path, f"schema_version {version!r} is unknown; {SCHEMA_VERSION} is known here")
     if request.get("hash") != hash_of(request):
         raise ArtifactError(path, "was changed after it was written; take it anew from where it was made")
+    if problem := request_problem(request):
+        raise ArtifactError(path, f"{problem}; take it anew from where it was made")
     return dict(request)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -11,14 +11,13 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from gsl.core.console import Console
-from gsl.core.observation import observations
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.errors import ArtifactError, InputError, TrajectoryError
-from gsl.runner.acting import Actor
+from gsl.errors import ArtifactError, TrajectoryError
 from gsl.runner.journal import RETURNS, marked
-from gsl.runner.request import NAME, layout_of, read_request
+from gsl.runner.request import NAME, read_request
 from gsl.storage import trajectories
+from gsl.storage.answer_checks import check_answers
 from gsl.storage.answers import (
     STOPPED,
     check_lengths,
@@ -32,7 +31,6 @@ from gsl.storage.answers import (
 from gsl.storage.references import resolve
 
 FILE = "answer.parquet"
-OFF = 0.05  # by which half of an episode's actions may differ from the policy's before it is told [rad]
 
 
 @component
@@ -68,21 +66,18 @@ class Answer:
             told = read_returns(files["returns"], request)
             shutil.copyfile(files["returns"], folder / RETURNS)
         if self.logs:
-            for name, off in self._logged(files["logs"], folder / FILE, request):
-                if off > OFF:
-                    console.status(
-                        f"warning: {name}: half of its actions are {off:.2g} rad or more off what the policy does on "
-                        "what was observed; is it the log of another episode, or late?"
-                    )
+            self._take_in(files["logs"], folder / FILE, request)
             logs = read_log(folder / FILE, request)
             check_lengths(files["logs"], request, logs, {name for name, one in told.items() if one.fell})
+            for line in check_answers(request, logs, files["logs"]):
+                console.status(f"warning: {line}")
             told = {**told, **logs}
         missing = [one["name"] for one in request["episodes"] if one["name"] not in told]
         falls = sum(one.fell for one in told.values())
         return {"episodes": len(told), "asked": len(request["episodes"]), "falls": falls, "missing": missing}
 
-    def _logged(self, source: Path, out: Path, request: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-        """Write the logged episodes by the names that the request has for them; yield how far off each one is."""
+    def _take_in(self, source: Path, out: Path, request: Mapping[str, Any]) -> None:
+        """Write the logged episodes by the names that the request has for them."""
         known, found = _csv(source, request) if source.suffix == ".csv" else _parquet(source, request)
         asked = {episode["name"]: episode for episode in request["episodes"]}
         names = self.episodes or known or tuple(asked)
@@ -92,8 +87,6 @@ class Answer:
         told = [{"name": name, "policy": asked[name]["policy"]} for name in names]
         joints, period = tuple(request["joints"]), request["control_period"]
         trajectories.write(out, Batch(tuple(found), joints, period, {**about, "episodes": told}))
-        for name, episode in zip(names, found, strict=True):
-            yield name, _off(source, request, asked[name], episode)
 
 
 def _csv(source: Path, request: Mapping[str, Any]) -> tuple[tuple[str, ...], list[Trajectory]]:
@@ -137,17 +130,3 @@ def _parquet(source: Path, request: Mapping[str, Any]) -> tuple[tuple[str, ...],
         )
         for one in batch.episodes
     ]
-
-
-def _off(source: Path, request: Mapping[str, Any], asked: Mapping[str, Any], episode: Trajectory) -> float:
-    """Return by how much the policy's actions, on what was observed, differ from the logged ones: the median [rad]."""
-    layout = layout_of(request)
-    try:
-        seen = observations(episode, layout)
-    except KeyError as error:
-        raise TrajectoryError(source, "is missing, but was asked for", column=str(error.args[0])) from error
-    actor = Actor(request, asked)
-    wanted = np.array([actor.act(observation)[0] for observation in seen[:-1]])
-    if wanted.shape != episode.action.shape:
-        raise InputError(f"{source}: {asked['name']}: its actions are of another number of joints")
-    return float(np.median(np.abs(wanted - episode.action).max(axis=1)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,12 @@ sys.exit(main(HERE, sys.argv[1:]))
 '''
 _TEMPLATE = '''"""Your robot: fill in read and send, or name another file of this kind with --robot."""
 
+# Of your robot: lower, upper [rad], speed [rad/s]. No target goes beyond, whatever a request allows; check them.
+LIMITS = {{
+{limits}
+}}
+# TIME_LIMIT = 2.0  # [s], after which read() or send() is given up
+
 
 def read():
     """Return what the robot measures now, SI units, joints in the order of request.json.
@@ -47,6 +53,7 @@ def send(targets):
     raise RuntimeError("it is still to be filled in, for your robot")
 
 
+# All of them are called in one thread, which is not the one that has loaded this file.
 # def begin(episode): called when the robot stands at the start, just before the first step
 # def end(): called when it is back there
 '''
@@ -139,10 +146,17 @@ def _write(folder: Path, request: Mapping[str, Any], files: Mapping[str, bytes],
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
     own = [f'"{name}" ({size})' for name, size in request["observes"].items() if name not in ("position", "velocity")]
-    (folder / ROBOT).write_text(_TEMPLATE.format(observes=", ".join(own) or "nothing else is needed"), encoding="utf-8")
+    observes, limits = ", ".join(own) or "nothing else is needed", "\n".join(_limits(request))
+    (folder / ROBOT).write_text(_TEMPLATE.format(observes=observes, limits=limits), encoding="utf-8")
     (folder / README).write_text(_readme(request, warnings), encoding="utf-8")
     text = json.dumps(request, indent=1, ensure_ascii=False, allow_nan=False)  # a policy may care for the order
     (folder / NAME).write_text(text + "\n", encoding="utf-8")
+
+
+def _limits(request: Mapping[str, Any]) -> Iterator[str]:
+    values = (request["limits"][name] for name in ("lower", "upper", "speed"))
+    for joint, *numbers in zip(request["joints"], *values, strict=True):
+        yield f"    {json.dumps(joint)}: ({', '.join(map(repr, numbers))}),"
 
 
 def _readme(request: Mapping[str, Any], warnings: Sequence[str]) -> str:

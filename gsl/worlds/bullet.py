@@ -119,8 +119,7 @@ class BulletEnv(gymnasium.Env):
         self._plant = plant or world.plant
         self._robot = lumped(self._plant.robot)
         self._drive, self._n = self._robot.drive, len(self._robot.controlled)
-        limits = [self._robot.joint(name) for name in self._robot.controlled]
-        low, high = np.array([(joint.lower, joint.upper) for joint in limits]).T
+        low, high = np.array([self._robot.commanded(name) for name in self._robot.controlled]).T
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self.layout.size,), dtype=np.float64)
         self._neutral = np.clip(np.zeros(self._n), low, high)

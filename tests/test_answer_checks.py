@@ -1,0 +1,179 @@
+"""An answer with the right mark is looked at as an import looks at a log, and against the commands asked for."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import SMALL, done, gsl, refused
+
+from gsl.core.trajectory import Trajectory
+from gsl.errors import InputError
+from gsl.runner.journal import ANSWER
+from gsl.runner.request import read_request
+from gsl.storage.answer_checks import check_answers
+from gsl.storage.answers import Answered, read_answers
+
+COLLECT = ("collect", *SMALL, "world=robot", "name=one", "recipe.spread=0.02")
+ASKED = "runs/one/collect_real.request"
+AIR = ("collect", "world=robot", "task=excite", "preset=toy", "policy.motions=[steps_large]", "name=one", "workers=1")
+KNEE, SHOULDER = 3, 4
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("walks")
+    gsl(*COLLECT, folder=folder)
+    done("rehearse", f"request={ASKED}", "world=nao_worn", "out=runs/elsewhere", folder=folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def air(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("air")
+    gsl(*AIR, folder=folder)
+    words = ("world=nao_worn", "world.floating=false", "out=runs/elsewhere")
+    done("rehearse", f"request={ASKED}", *words, folder=folder)
+    return folder
+
+
+def answers(folder: Path, place: Path) -> tuple[dict, dict[str, Answered]]:
+    """The request of a folder and a whole answer to it, beside the request as a robot would bring it."""
+    shutil.copytree(folder / ASKED, place / ASKED)
+    shutil.copy(folder / "runs/elsewhere" / ANSWER, place / ASKED)
+    request = read_request(place / ASKED)
+    return request, read_answers(place / ASKED, request)
+
+
+def spoilt(found: dict[str, Answered], name: str, how: Callable[[Trajectory], Trajectory]) -> dict[str, Answered]:
+    log = found[name].trajectory
+    assert log is not None
+    return {**found, name: replace(found[name], trajectory=how(log))}
+
+
+def test_a_rehearsal_raises_no_suspicion(walks: Path, air: Path, tmp_path: Path) -> None:
+    for number, folder in enumerate((walks, air)):
+        assert check_answers(*answers(folder, tmp_path / str(number))) == []
+
+
+def test_of_a_log_of_something_else_it_is_warned_alone(walks: Path, tmp_path: Path) -> None:
+    request, found = answers(walks, tmp_path)
+    foreign = {name: replace(one, path=Path("answer.parquet")) for name, one in found.items()}
+    off = spoilt(foreign, "pi0_01", lambda log: replace(log, action=log.action + 0.3))
+    assert any("pi0_01: half of its actions are 0.3 rad or more off" in line for line in check_answers(request, off))
+
+
+def beyond(part: str, value: float) -> Callable[[Trajectory], Trajectory]:
+    def spoil(log: Trajectory) -> Trajectory:
+        values = getattr(log, part).copy()
+        values[20, KNEE] = value
+        return replace(log, **{part: values})
+
+    return spoil
+
+
+def frozen(log: Trajectory) -> Trajectory:
+    return replace(log, position=np.tile(log.position[:1], (len(log.position), 1)))
+
+
+def stuck(log: Trajectory) -> Trajectory:
+    """The log of a joint that nobody reads any more from a row on, while it is sent far away and back."""
+    position = log.position.copy()
+    position[30:] = position[30]
+    return replace(log, position=position)
+
+
+def away(log: Trajectory) -> Trajectory:
+    return replace(log, position=log.position + 0.9 * (np.arange(log.position.shape[1]) == SHOULDER))
+
+
+def in_degrees(log: Trajectory) -> Trajectory:
+    return replace(log, position=np.rad2deg(log.position), velocity=np.rad2deg(log.velocity))
+
+
+CASES = [
+    (beyond("position", 1e300), "column position.LKneePitch, row 20: pi0_01: is 1e+300, which nothing measures"),
+    (beyond("velocity", 1e300), "column velocity.LKneePitch, row 20: pi0_01: is 1e+300, which nothing measures"),
+    (in_degrees, "rad, but goes from"),
+    (beyond("position", 3.0), "row 20: pi0_01: is at 3 rad, but goes from -0.09233 to 2.113 rad: is it in degrees"),
+    (lambda log: replace(log, action=log.action + 0.3), "pi0_01: 100 % of its actions are up to 0.3 rad off what was"),
+    (lambda log: replace(log, action=log.action[::-1]), "pi0_01: "),
+    (
+        lambda log: replace(log, sensors={**log.sensors, "gyro.x": log.sensors["gyro.x"] + 1e300}),
+        "column gyro.x, row 0",
+    ),
+]
+
+
+@pytest.mark.parametrize(("how", "problem"), CASES)
+def test_an_answer_that_cannot_be_one_is_refused(
+    walks: Path, tmp_path: Path, how: Callable[[Trajectory], Trajectory], problem: str
+) -> None:
+    request, found = answers(walks, tmp_path)
+    with pytest.raises(InputError) as error:
+        check_answers(request, spoilt(found, "pi0_01", how))
+    assert problem in str(error.value) and str(error.value).startswith(str(tmp_path)) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("how", [frozen, stuck])
+def test_a_joint_that_stands_still_under_commands_is_refused_unless_it_ended_the_episode(
+    air: Path, tmp_path: Path, how: Callable[[Trajectory], Trajectory]
+) -> None:
+    request, found = answers(air, tmp_path)
+    name = next(iter(found))
+    with pytest.raises(InputError, match=r"position\.\w+ stands still from row \d+ on for 1 s, though it was sent 0\."):
+        check_answers(request, spoilt(found, name, how))
+    ended = spoilt(found, name, how)
+    check_answers(request, {**ended, name: replace(ended[name], stopped=True)})
+
+
+def test_a_joint_far_from_all_it_was_sent_is_refused(air: Path, tmp_path: Path) -> None:
+    request, found = answers(air, tmp_path)
+    name = next(iter(found))
+    with pytest.raises(InputError, match=r"rad off all that it was sent in 0\.3 s; run it again, or take it in with"):
+        check_answers(request, spoilt(found, name, away))
+
+
+def test_commands_are_compared_with_those_that_were_asked_for(air: Path, tmp_path: Path) -> None:
+    request, found = answers(air, tmp_path)
+    name = next(iter(found))
+    with pytest.raises(InputError, match=rf"{name}: \d+ % of its actions are up to 0\.3 rad off what was asked for"):
+        late = np.r_[np.zeros(20), np.full(len(found[name].trajectory) - 20, 0.3)]
+        knee = late[:, None] * (np.arange(len(request["joints"])) == KNEE)
+        check_answers(request, spoilt(found, name, lambda log: replace(log, action=log.action + knee)))
+
+
+def test_one_log_for_two_episodes_is_refused_where_they_ask_for_different_things(walks: Path, tmp_path: Path) -> None:
+    request, found = answers(walks, tmp_path)
+    twin = {**found, "neighbour_01": replace(found["pi0_01"])}
+    foreign = {name: replace(one, path=Path("answer.parquet")) for name, one in twin.items()}
+    with pytest.raises(InputError, match="pi0_01 and neighbour_01 have the same log, number for number; each of them"):
+        check_answers(request, foreign)
+    alike = {**found, "pi0_02": found["pi0_01"]}
+    assert check_answers(request, alike) == [
+        "pi0_01 and pi0_02 have the same log, number for number: is it of a simulation without noise?"
+    ]
+    clocked = {name: replace(one, trajectory=replace(one.trajectory, time=one.trajectory.time + 1e-4 * (
+        np.arange(len(one.trajectory.time)) > 0))) for name, one in alike.items()}  # fmt: skip
+    with pytest.raises(InputError, match="pi0_01 and pi0_02 have the same log"):
+        check_answers(request, clocked)
+
+
+def test_the_stages_look_at_answers(walks: Path, tmp_path: Path) -> None:
+    answers(walks, tmp_path)
+    path = tmp_path / ASKED / ANSWER
+    lines = path.read_text().splitlines(keepends=True)
+    names = lines[1].strip().split(",")
+    at = [names.index(name) for name in names if name.startswith("action.")][KNEE]
+    cells = [line.rstrip("\n").split(",") for line in lines[2:]]
+    moved = [[*row[:at], row[at] and repr(float(row[at]) + 0.3), *row[at + 1 :]] for row in cells]
+    path.write_text("".join([*lines[:2], *(",".join(row) + "\n" for row in moved)]))
+    said = refused(*COLLECT, folder=tmp_path)
+    assert said.startswith(f"{ASKED}/{ANSWER}: pi0_01: 100 % of its actions are up to 0.3 rad off what was asked for")
+    path.rename(tmp_path / "mine.csv")
+    told = done("answer", f"request={ASKED}", "logs=mine.csv", folder=tmp_path).err
+    assert "warning: pi0_01: half of its actions are 0.3 rad or more off what the policy does" in told
