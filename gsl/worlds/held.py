@@ -206,7 +206,7 @@ def _step(
     servo: ServoParameters, state: ServoState, tree: Chain, pushes: np.ndarray, load: np.ndarray, motion: np.ndarray,
     step: float, substeps: int, scratch: Scratch,
 ) -> None:  # fmt: skip
-    """Move on by a control period as Bullet does: velocities by the forces at the beginning of a step, then positions."""
+    """Move on by a control period as Bullet does: velocities by the forces at the beginning of a step, then angles."""
     for k in range(substeps):
         _accelerate(servo, state, tree, pushes, load, motion, k * step, step, k, substeps * step, scratch)
         for i in range(motion.shape[1]):
