@@ -62,7 +62,7 @@ def _side_by_side(
     steps, loaded = periods * substeps, load(data, some)
     state = ServoState(
         side_by_side(loaded.commands), side_by_side(zeros_in_lanes(MEMORY, n)), side_by_side(cube(REMEMBERED, 2, n)),
-        side_by_side(zeros_in_lanes(1, 1))[0], np.zeros(1, dtype=np.int64),
+        side_by_side(zeros_in_lanes(1, 1))[0], np.array([0, 1]),
         side_by_side(zeros_in_lanes(LAYERS, HIDDEN)),
     )  # fmt: skip
     told, slopes, sums = cube(periods, 2, n), zeros_in_lanes(periods, m), sums_in_lanes(n, len(to.last_bias))

@@ -21,7 +21,7 @@ from gsl.worlds.chain import COLUMNS, Chain, Pushed, accelerate, chain
 from gsl.worlds.encoder import REMEMBERED
 from gsl.worlds.pushes import acting
 from gsl.worlds.servo import encoder_motion, servo_torque
-from gsl.worlds.servo_state import COMMANDS, MEMORY, ROTOR, ServoParameters, ServoState, packed, settle
+from gsl.worlds.servo_state import COMMANDS, MEMORY, ROTOR, SPEED, ServoParameters, ServoState, packed, settle
 
 RUNAWAY = 1e3  # speed at which a replay has no meaning any more [rad/s]
 
@@ -46,6 +46,24 @@ class Windows(NamedTuple):
         return self.commands.shape[1] - COMMANDS + 1
 
 
+class Scratch(NamedTuple):
+    """What a physics step writes into.
+
+    Attributes:
+        pushed: Forces on links.
+        torque: Torques [N·m], then the accelerations that they make [rad/s²], shape (n_motors,).
+        work: Of `accelerate`, as is the next.
+        matrix: Shape (n_motors, n_motors).
+        now: Positions [rad] and velocities [rad/s] at one time, shape (2, n_motors).
+    """
+
+    pushed: Pushed
+    torque: np.ndarray
+    work: np.ndarray
+    matrix: np.ndarray
+    now: np.ndarray
+
+
 @dataclass(frozen=True)
 class Held:
     """A plant in the air, ready for replays.
@@ -57,6 +75,7 @@ class Held:
         bias: Of the logged positions [rad], shape (n_motors,).
         step: Physics period [s].
         period: Control period [s].
+        accurate: Whether errors fall with the square of the step; if not, replays are those of Bullet at this step.
     """
 
     servo: ServoParameters
@@ -65,9 +84,10 @@ class Held:
     bias: np.ndarray
     step: float
     period: float
+    accurate: bool = False
 
     @classmethod
-    def of(cls, plant: Plant, step: float, period: float) -> Held:
+    def of(cls, plant: Plant, step: float, period: float, accurate: bool = False) -> Held:
         """Prepare a plant.
 
         Raises:
@@ -77,7 +97,7 @@ class Held:
         servo = packed(plant.servo, plant.robot.supply_voltage, plant.law)
         pushes = [row for push in plant.pushes for row in _aimed(push, plant.robot)]
         tree = chain(plant, plant.servo.armature - servo.rows[ROTOR])
-        return cls(servo, tree, np.array(pushes).reshape(-1, 9), plant.sensors.bias, step, period)
+        return cls(servo, tree, np.array(pushes).reshape(-1, 9), plant.sensors.bias, step, period, accurate)
 
     def replay(self, windows: Windows, load: np.ndarray | None = None) -> np.ndarray:
         """Return what the encoders tell after each control period [rad], shape (W, T, n_motors); NaN if it diverges.
@@ -88,7 +108,8 @@ class Held:
         """
         told = np.full((len(windows.clock), windows.length, len(self.bias)), np.nan)
         load = np.zeros((0, len(self.bias))) if load is None else load
-        _replay(self.servo, self.tree, self.pushes, load, windows, self.step, round(self.period / self.step), told)
+        substeps = round(self.period / self.step)
+        _replay(self.servo, self.tree, self.pushes, load, windows, self.step, substeps, self.accurate, told)
         return told + self.bias
 
     def play(self, paths: Sequence[np.ndarray], starts: Sequence[np.ndarray], settle: int) -> list[np.ndarray]:
@@ -140,16 +161,16 @@ def _aimed(push: Push, robot: Robot) -> list[tuple[float, ...]]:
 @compiled
 def _replay(
     servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, step: float,
-    substeps: int, told: np.ndarray,
+    substeps: int, accurate: bool, told: np.ndarray,
 ) -> None:  # fmt: skip
     for first in range(0, told.shape[0], LANES):
-        _side_by_side(servo, tree, pushes, load, windows, first, step, substeps, told)
+        _side_by_side(servo, tree, pushes, load, windows, first, step, substeps, accurate, told)
 
 
 @compiled
 def _side_by_side(
     servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, first: int,
-    step: float, substeps: int, told: np.ndarray,
+    step: float, substeps: int, accurate: bool, told: np.ndarray,
 ) -> None:  # fmt: skip
     """Replay as many windows as there are lanes, from the first one on."""
     periods, n = told.shape[1], told.shape[2]
@@ -157,31 +178,84 @@ def _side_by_side(
     motion, encoders = side_by_side(numbers), side_by_side(speaking)
     asked, since = zeros_in_lanes(periods + COMMANDS - 1, n), zeros_in_lanes(1, 1)
     _fill(windows, first, numbers, asked, since)
-    commands, clock, steps = side_by_side(asked), side_by_side(since)[0], np.zeros(1, dtype=np.int64)
+    commands, clock, steps = side_by_side(asked), side_by_side(since)[0], np.array([0, 1])
     memory, layers = side_by_side(zeros_in_lanes(MEMORY, n)), side_by_side(zeros_in_lanes(LAYERS, HIDDEN))
     history = side_by_side(zeros_in_lanes(REMEMBERED, 2 * n).reshape((REMEMBERED, 2, n, LANES)))
     settle(memory, history, motion, commands[periods], step)
     pushed = Pushed(pushes[:, 0].astype(np.int64), pushes[:, 6:].copy(), side_by_side(zeros_in_lanes(len(pushes), 3)))
     torque, work = side_by_side(zeros_in_lanes(1, n))[0], side_by_side(zeros_in_lanes(n, COLUMNS))
     matrix = side_by_side(zeros_in_lanes(n, n))
+    scratch = Scratch(pushed, torque, work, matrix, side_by_side(zeros_in_lanes(2, n)))
     for t in range(periods):
         state = ServoState(
             commands[periods - 1 - t : periods - 1 - t + COMMANDS], memory, history, clock, steps, layers
         )
-        for k in range(substeps):
-            servo_torque(servo, state, motion, k * step, step, substeps * step, torque)
-            if len(load) > 0:
-                for i in range(n):
-                    torque[i] += load[t * substeps + k, i]
-            _push(pushes, state.clock[0] + k * step, step, pushed.force)
-            accelerate(tree, motion, pushed, torque, work, matrix)
-            for i in range(n):
-                motion[1, i] += step * torque[i]
-                motion[0, i] += step * motion[1, i]
+        row = load[t * substeps : (t + 1) * substeps]
+        if accurate:
+            _leap(servo, state, tree, pushes, row, motion, step, substeps, scratch)
+        else:
+            _step(servo, state, tree, pushes, row, motion, step, substeps, scratch)
         encoder_motion(servo, state, motion, step, encoders)
         if not _note(numbers[1], speaking[0], told[first : first + LANES], t):
             break
         state.clock[0] += substeps * step
+
+
+@compiled
+def _step(
+    servo: ServoParameters, state: ServoState, tree: Chain, pushes: np.ndarray, load: np.ndarray, motion: np.ndarray,
+    step: float, substeps: int, scratch: Scratch,
+) -> None:  # fmt: skip
+    """Move on by a control period as Bullet does: velocities by the forces at the beginning of a step, then angles."""
+    for k in range(substeps):
+        _accelerate(servo, state, tree, pushes, load, motion, k * step, step, k, substeps * step, scratch)
+        for i in range(motion.shape[1]):
+            motion[1, i] += step * scratch.torque[i]
+            motion[0, i] += step * motion[1, i]
+
+
+@compiled
+def _leap(
+    servo: ServoParameters, state: ServoState, tree: Chain, pushes: np.ndarray, load: np.ndarray, motion: np.ndarray,
+    step: float, substeps: int, scratch: Scratch,
+) -> None:  # fmt: skip
+    """Move on by a control period with velocities half a step ahead of positions (leapfrog, second order).
+
+    Forces see the velocity of their own time, half a step on from the last one. Commands jump between two periods:
+    the first and the last half step of a period are of its own command.
+    """
+    now, torque, n = scratch.now, scratch.torque, motion.shape[1]
+    for k in range(substeps + 1):
+        inner = 0 < k < substeps
+        length, start, ahead = step if inner else 0.5 * step, max(0.0, k - 0.5) * step, 0.5 * step if k > 0 else 0.0
+        state.steps[1] = 1 if inner else 2
+        for i in range(n):
+            now[0, i], now[1, i] = motion[0, i], motion[1, i] + ahead * torque[i]
+            if not inner:  # what load friction takes for the speed one (half) step before
+                state.memory[SPEED, i] = now[1, i] - length * torque[i]
+        _accelerate(
+            servo, state, tree, pushes, load, now, start, length, min(k, substeps - 1), substeps * step, scratch
+        )
+        for i in range(n):
+            motion[1, i] += length * torque[i]
+            if k < substeps:
+                motion[0, i] += step * motion[1, i]
+    state.steps[0] -= 1  # the end of a period is the beginning of the next one
+    state.steps[1] = 1
+
+
+@compiled
+def _accelerate(
+    servo: ServoParameters, state: ServoState, tree: Chain, pushes: np.ndarray, load: np.ndarray, motion: np.ndarray,
+    start: float, length: float, row: int, period: float, scratch: Scratch,
+) -> None:  # fmt: skip
+    """Leave the joints' accelerations [rad/s²] in `scratch.torque`, their servos acting for a length of time [s]."""
+    servo_torque(servo, state, motion, start, length, period, scratch.torque)
+    if len(load) > 0:
+        for i in range(motion.shape[1]):
+            scratch.torque[i] += load[row, i]
+    _push(pushes, state.clock[0] + start, length, scratch.pushed.force)
+    accelerate(tree, motion, scratch.pushed, scratch.torque, scratch.work, scratch.matrix)
 
 
 @compiled

@@ -109,8 +109,8 @@ def sensed_error(
     target = shaped(parameters, state.memory, i, target, step)
     q, v = _measured(parameters, state.memory, i, motion)
     if parameters[ROW.sensor_delay, i] > 0.0:
-        delay, now = parameters[ROW.sensor_delay, i], (q, v)
-        q, v = seen(delay, state.history, count, q, 0, i, step), seen(delay, state.history, count, v, 1, i, step)
+        delay, now, whole = parameters[ROW.sensor_delay, i], (q, v), step * state.steps[1]
+        q, v = seen(delay, state.history, count, q, 0, i, whole), seen(delay, state.history, count, v, 1, i, whole)
         for row in range(2):
             state.history[count % REMEMBERED, row, i] = now[row]
     return target + parameters[ROW.offset, i] - q, q, v

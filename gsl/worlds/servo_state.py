@@ -43,7 +43,7 @@ class ServoState(NamedTuple):
             [N·m]; bristle of the learned law [rad]; shape (MEMORY, n_motors).
         history: What the encoders measured at the last physics steps, see `encoder.seen`.
         clock: Time of the newest command since the episode began [s], shape (1,).
-        steps: Number of physics steps so far, shape (1,).
+        steps: Number of physics steps so far, and of pieces that the next one is taken in, shape (2,).
         layers: Scratch of the learned law, shape (LAYERS, HIDDEN).
     """
 
@@ -90,7 +90,7 @@ def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: fl
         memory,
         history,
         np.array([clock]),
-        np.zeros(1, dtype=np.int64),
+        np.array([0, 1]),
         np.zeros((LAYERS, HIDDEN)),
     )
 

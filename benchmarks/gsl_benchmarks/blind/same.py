@@ -62,7 +62,7 @@ def _play(
 ) -> None:  # fmt: skip
     periods, n = told.shape
     torque, work, matrix, pushed = np.zeros(n), np.zeros((n, COLUMNS)), np.zeros((n, n)), nothing()
-    memory, encoders, steps = np.zeros((MEMORY, n)), np.zeros((2, n)), np.zeros(1, dtype=np.int64)
+    memory, encoders, steps = np.zeros((MEMORY, n)), np.zeros((2, n)), np.array([0, 1])
     clock = np.array([-settle * substeps * step])
     memory[1], memory[2], memory[SPEED], memory[SMOOTHED] = motion[0], motion[1], motion[1], commands[periods]
     history = first_history(motion, step)
