@@ -276,6 +276,19 @@ def test_the_order_of_files_changes_nothing(own_names: bool) -> None:
     np.testing.assert_array_equal(first.comparison.floor, second.comparison.floor)
 
 
+def test_of_motions_without_names_blocks_of_each_are_held_out() -> None:
+    """Every motion is in both parts, and repeats are held out at the same times."""
+    batch, files = log({}), [{"policy": f"{k}", "file": f"{k}"} for k in range(9)]
+    exp = cut_log(replace(batch, metadata={"episodes": files}), arm(), blocks=True)
+    assert set(exp.pieces.record[exp.held_out]) == set(exp.pieces.record[exp.train]) == set(range(9))
+    assert not exp.by_record and exp.motions == 8
+    first, again = exp.order.index(0), exp.order.index(8)  # the last motion repeats the first
+    held = [exp.pieces.tick[exp.held_out][exp.pieces.record[exp.held_out] == k] for k in (first, again)]
+    np.testing.assert_array_equal(*held)
+    named = cut_log(batch, arm(), blocks=True)
+    assert named.by_record and not set(named.pieces.record[named.held_out]) & set(named.pieces.record[named.train])
+
+
 def test_repeats_stay_on_one_side_of_the_split() -> None:
     exp = cut_log(log({}), arm())
     held = {exp.records[k].name for k in exp.pieces.record[exp.held_out]}

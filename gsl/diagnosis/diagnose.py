@@ -75,7 +75,7 @@ def diagnose(
 
 def prepare(batch: Batch, robot: Robot, options: Options) -> Log:
     """Return a batch as a log, with what does not matter of its joints counted as noise."""
-    log = cut_log(batch, robot, walking=on_ground(batch), held_out=options.held_out)
+    log = cut_log(batch, robot, walking=on_ground(batch), held_out=options.held_out, blocks=True)
     ours = np.arange(len(log.channels)) < len(log.joints)
     return log.with_model_error(np.where(ours, options.tolerance, 0.0)) if options.tolerance else log
 
@@ -149,7 +149,7 @@ def _judge(log: Log, rivals: Sequence[Hypothesis], trials: Sequence[Trial], opti
         _margins(rivals, own),
         how.walk_doubt if log.walking else how.shaking_doubt * log.shaking_share,
         log.walking,
-        not log.by_record,
+        not log.by_record and log.motions == 1,
         how,
         noise_cost,
     )

@@ -37,6 +37,7 @@ class LogSettings:
     walk_windows: int = 200  # of walks, spread over all: a replay in Bullet takes milliseconds
     fit_windows: int = 32  # that a fit uses, spread over the training records
     check_windows: int = 400  # that a check uses, spread over the others
+    block: int = 2  # windows side by side that are held out together, where motions have no names: 1.2 s
     base_floor: tuple[float, ...] = (1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 2e-3)  # of x, y, z [m], roll, pitch, yaw. Estimate
     floor: FloorSettings = field(default_factory=FloorSettings)
 

@@ -58,6 +58,11 @@ class Log:
         return self.records[0].base is not None
 
     @property
+    def motions(self) -> int:
+        """Number of different motions: repeats are one."""
+        return len({_command(record) for record in self.records})
+
+    @property
     def channels(self) -> tuple[str, ...]:
         """Names of what is compared: the joints, and the base if it moves."""
         return (*self.joints, *BASE) if self.walking else self.joints
@@ -101,6 +106,7 @@ def cut_log(
     *,
     walking: bool = False,
     held_out: Mapping[str, Any] | None = None,
+    blocks: bool = False,
     settings: LogSettings | None = None,
 ) -> Log:
     """Cut a batch into windows and part it; the order of its trajectories changes nothing.
@@ -110,6 +116,8 @@ def cut_log(
         robot: Whose motors follow.
         walking: Whether it is on the ground.
         held_out: Labels of the records that are for checking; without any, every second motion is.
+        blocks: Whether blocks of every motion are, where no name says which motions are variants of one: unlike
+            motions have regimes of their own, in which a fit to the others would be off.
         settings: How.
 
     Raises:
@@ -131,36 +139,44 @@ def cut_log(
     else:
         noise = noise_floor(records, robot.encoder_step, held=asked, settings=how.floor)
         comparison = compare(pieces, noise, len(robot.controlled), how.floor)
-    held, by_record = _hold_out(records, pieces, asked)
+    held, by_record = _hold_out(records, pieces, asked, how.block * scored if blocks else 0)
     train, check = np.flatnonzero(~held), np.flatnonzero(held)
     return Log(robot, records, pieces, noise, comparison, train, check, period, by_record, order, how)
 
 
 def _sort(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[int, ...]]:
-    """Return records in an order of their own, by name and content, and their places before.
-
-    A name that is only that of the file counts for nothing: files may be called anything.
-    """
+    """Return records in an order of their own, by name and content, and their places before."""
 
     def key(k: int) -> tuple[str, bytes, bytes]:
-        record = records[k]
-        name = "" if record.about.get("file") == record.name else record.name
-        return name, record.targets.tobytes(), record.position.tobytes()
+        return _name(records[k]), records[k].targets.tobytes(), records[k].position.tobytes()
 
     order = tuple(sorted(range(len(records)), key=key))
     return tuple(records[k] for k in order), order
 
 
-def _hold_out(records: Sequence[Record], pieces: Pieces, asked: Sequence[int]) -> tuple[np.ndarray, bool]:
-    """Hold out what is asked for, else every second motion in the records' order; repeats stay together."""
+def _name(record: Record) -> str:
+    """Return a motion's name, empty if it is only that of its file: files may be called anything."""
+    return "" if record.about.get("file") == record.name else record.name
+
+
+def _command(record: Record) -> bytes:
+    """Return what is the same for repeats of one motion."""
+    return np.round(record.targets, 6).tobytes()
+
+
+def _hold_out(records: Sequence[Record], pieces: Pieces, asked: Sequence[int], block: int) -> tuple[np.ndarray, bool]:
+    """Hold out what is asked for, else every second motion in the records' order; repeats stay together.
+
+    Of motions without names every second block is held out, if blocks have a length [ticks].
+    """
     if asked:
         return np.isin(pieces.record, asked), True
-    motions: dict[bytes, list[int]] = {}
-    for index, record in enumerate(records):
-        motions.setdefault(np.round(record.targets, 6).tobytes(), []).append(index)
+    motions: dict[bytes, int] = {}
+    motion = np.array([motions.setdefault(_command(record), len(motions)) for record in records])
+    if len(motions) > 1 and block and not any(_name(record) for record in records):
+        return (pieces.tick // block + motion[pieces.record]) % 2 == 1, False
     if len(motions) > 1:
-        held = [index for k, group in enumerate(motions.values()) if k % 2 for index in group]
-        return np.isin(pieces.record, held), True
+        return motion[pieces.record] % 2 == 1, True
     return np.arange(len(pieces)) % 2 == 1, False
 
 

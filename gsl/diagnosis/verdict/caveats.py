@@ -69,7 +69,12 @@ def _log(findings: Findings) -> Iterator[str]:
     if log.noise.unsteady.any():
         names = _names(log.channels, log.noise.unsteady)
         yield f"Repeats of the same commands differ here by far more than elsewhere, which counts as gap: {names}."
-    if not log.by_record:
+    if not log.by_record and log.motions > 1:
+        yield (
+            "Motions without names: blocks of 1.2 s of each were held out, and none as a whole. Labels, or held_out=, "
+            "say which motions are variants of one."
+        )
+    elif not log.by_record:
         yield "There is one motion only: every second part of it was held out, which is weak evidence."
     elif len(np.unique(log.pieces.record[log.held_out])) < FEW:
         yield "Few trajectories are held out: intervals are over parts of them and may be too narrow."

@@ -53,7 +53,7 @@ def limits(findings: Findings, shrunk: Mapping[str, Any], tick: Callable[[str], 
     """
     log, answer, verdict, how = findings.log, findings.answer, findings.verdict, findings.options.verdict
     strange = verdict.word == "unknown" or (verdict.in_part and verdict.remaining > how.foreign)
-    if strange or not log.by_record or log.walking or log.comparison.shaking.any():
+    if strange or (not log.by_record and log.motions == 1) or log.walking or log.comparison.shaking.any():
         return []
     if any(row["after"] > how.far for row in (*shrunk["by_joint"], *shrunk["by_regime"])):
         return []
