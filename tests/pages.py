@@ -17,9 +17,12 @@ ITEM = re.compile(r"\s*([-*]|\d+\.) ")
 LINK = re.compile(r"!?\[([^\]]*)\]\(([^)\s]+)\)")
 # A sentence ends before a capital letter, a code word, or a name of the paper's.
 END = re.compile(r"(?<=[.!?])[\"')*]*\s+(?=[A-Zπf*\"'(\[]|CODE)")
+SHELLS = ("bash", "console", "sh", "shell")
 PROGRAMS = ("gsl", "make", "pip", "python", "source", "jq")
 # The shell takes a line apart; its programs are functions that write their words down, each command on a line.
-RECORD = "\n".join(f"{name}() {{ {{ printf '%s\\x1f' {name} \"$@\"; echo; }} >&3; }}" for name in PROGRAMS)
+RECORD = "\n".join(
+    f'{name}() {{ local words; printf -v words \'%s\\x1f\' {name} "$@"; echo "$words" >&3; }}' for name in PROGRAMS
+)  # in one piece, for the programs of a pipe write side by side
 
 
 def without_code(text: str) -> str:
@@ -67,7 +70,7 @@ class Command(NamedTuple):
 def commands(page: Path) -> Iterator[Command]:
     """The commands of a page's shell blocks. What is no known program fails here, so that nothing is passed over."""
     for _, language, block in FENCE.findall(page.read_text("utf-8")):
-        if language not in ("bash", "console", "sh", "shell"):
+        if language not in SHELLS:
             continue
         for line in re.sub(r"\\\n\s*", "", block).splitlines():
             typed = line.strip().removeprefix("$ ")

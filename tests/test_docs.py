@@ -9,7 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from pages import FENCE, GUIDES, LINK, RESULTS, ROOT, anchors, sentences, words
+from pages import FENCE, GUIDES, LINK, RESULTS, ROOT, SHELLS, anchors, sentences, words
 
 LONGEST = 25  # words of a sentence
 FIGURES = 2  # numbers in a sentence; more belong in a table
@@ -78,6 +78,13 @@ def test_the_index_and_the_site_have_every_page() -> None:
         path = page.relative_to(ROOT / "docs").as_posix()
         assert path == "index.md" or path in linked
         assert f": {path}\n" in site
+
+
+def test_no_command_hides_in_a_block_that_is_not_tested() -> None:
+    for page in GUIDES:
+        for _, language, block in FENCE.findall(page.read_text("utf-8")):
+            typed = re.findall(r"^(?:\$ .*|(?:gsl|make) \S.*)$", block, re.MULTILINE)
+            assert language in SHELLS or typed == [], page.name
 
 
 def test_a_block_of_data_is_what_it_is_called() -> None:

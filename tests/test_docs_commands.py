@@ -21,7 +21,8 @@ from pages import FENCE, GUIDES, ROOT, Command, commands
 
 from gsl.commandline.composer import compose, opened
 from gsl.commandline.config import prepared, resolved
-from gsl.effects.effect import names
+from gsl.commandline.own_effects import load_own_effects
+from gsl.effects.effect import names, use_own
 from gsl.errors import ConfigError
 
 TYPED = [command for page in GUIDES for command in commands(page)]
@@ -29,6 +30,7 @@ ONCE = list({command.words: command for command in TYPED}.values())  # several p
 FLAGS = ("--json", "--multirun", "--check", "--help", "--cfg", "job")
 GROUPS = ("reproduce", "blind")  # whose commands have two words
 AT_ONCE = ("robot", "init")  # quick enough to be run as they are printed
+LOOKING = {"runs": 1, "bench": 1, "show": 2, "verify": 2, "lineage": 2, "rerun": 2}  # without settings; words at most
 LACKING = "there is no learned servo in this path or run"  # what a command finds whose artifact a page makes before it
 # What the README's chain is made smaller by; this table says all that is run otherwise than it is printed.
 FEW = {"command_latency", "servo_gain", "coulomb_friction"}  # effects that a toy diagnosis tries
@@ -56,7 +58,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         (folder / name).symlink_to(ROOT / name)
     for page in GUIDES:
         for _, language, block in FENCE.findall(page.read_text("utf-8")):
-            if written := re.match(r"# ([\w/]+\.(?:py|yaml))", block):
+            if written := re.match(r"# ([\w/]+\.(?:py|yaml|toml))", block):
                 path = folder / written[1]
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(block)
@@ -64,10 +66,23 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
                 (folder / f"arm.{language}").exists() or (folder / f"arm.{language}").write_text(block)
     (folder / "runs/t/diagnose/world").mkdir(parents=True)
     shutil.copy(ROOT / "conf/world/nao_worn.yaml", folder / "runs/t/diagnose/world/diagnosed.yaml")
+    install(folder)
     with contextlib.chdir(folder):
         sys.path.insert(0, str(folder))
         yield folder
         sys.path.remove(str(folder))
+        use_own({})
+
+
+def install(folder: Path) -> None:
+    """Leave the traces that pip leaves of the package whose pyproject.toml a page prints."""
+    project = tomllib.loads((folder / "pyproject.toml").read_text("utf-8"))["project"]
+    place = folder / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
+    place.mkdir()
+    (place / "METADATA").write_text(f"Name: {project['name']}\nVersion: {project['version']}\n")
+    for group, entries in project["entry-points"].items():
+        lines = "\n".join(f"{name} = {value}" for name, value in entries.items())
+        (place / "entry_points.txt").write_text(f"[{group}]\n{lines}\n")
 
 
 @pytest.mark.parametrize("command", ONCE, ids=lambda command: f"{command.page}: {command.line}"[:100])
@@ -81,8 +96,9 @@ def built(words: list[str], home: Path) -> None:
     if words[0] in AT_ONCE or words[0].startswith("--"):
         started(words, home)
         return
-    if words[0] in ("runs", "show", "bench"):
-        assert len(words) == {"runs": 1, "show": 2, "bench": 1}[words[0]]
+    if words[0] in LOOKING or words[1:] == ["--help"]:
+        assert words[0] not in LOOKING or len(words) <= LOOKING[words[0]]
+        started([words[0], "--help"], home)
         return
     count = 2 if words[0] in GROUPS else 1
     name, rest = " ".join(words[:count]), words[count:]
@@ -91,6 +107,7 @@ def built(words: list[str], home: Path) -> None:
     taken = [word for k, word in enumerate(rest) if word not in FLAGS and (place is None or k - place not in (0, 1))]
     assert all("=" in word or word.startswith("~") for word in taken), taken
     with opened(own):
+        load_own_effects(own)
         composed = resolved(compose(name, taken, multirun="--multirun" in rest))
         try:
             prepared(composed)
