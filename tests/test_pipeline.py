@@ -121,7 +121,9 @@ def test_show_notices_what_was_changed_since(chain: Path) -> None:
     whole = table.read_text()
     table.write_text(whole + " ")
     try:
-        assert "changed since it was made: evaluation.json" in done("show", "chain/evaluate", folder=chain).out
+        said = gsl("show", "chain/evaluate", folder=chain)
+        assert said.code == 1
+        assert "changed since it was made: evaluation.json" in said.out
     finally:
         table.write_text(whole)
 
