@@ -73,7 +73,7 @@ def log(effects: Mapping[str, Any], seed: int = 1, *, jitter: float = 1.0, noise
         tuple(_logged(held, played[name], noise, rng) for name in names),
         robot.controlled,
         PERIOD,
-        {"episodes": [{"policy": name} for name in names]},
+        {"episodes": [{"policy": name} for name in names], "world": {"step": 0.002}},
     )
 
 
