@@ -73,7 +73,7 @@ def log(effects: Mapping[str, Any], seed: int = 1, *, jitter: float = 1.0, noise
         tuple(_logged(held, played[name], noise, rng) for name in names),
         robot.controlled,
         PERIOD,
-        {"episodes": [{"policy": name} for name in names]},
+        {"episodes": [{"policy": name} for name in names], "world": {"step": 0.002}},
     )
 
 
@@ -313,3 +313,18 @@ def test_threads_do_not_change_the_answer() -> None:
     )
     assert one.selection.none.cost == other.selection.none.cost
     assert [h.cost for h in one.selection.tried] == [h.cost for h in other.selection.tried]
+
+
+@pytest.mark.parametrize("step", [0.002, 0.001])
+def test_a_robot_like_the_simulator_has_no_gap_whatever_the_step_of_who_logged_it(step: float) -> None:
+    held = Held.of(nominal(arm()), PERIOD / 160, PERIOD)
+    rng, played = np.random.default_rng(3), motions()
+    batch = Batch(
+        tuple(_logged(held, played[name], NOISE, rng) for name in played),
+        arm().controlled,
+        PERIOD,
+        {"episodes": [{"policy": name} for name in played]},
+    )
+    result = diagnose(batch, nominal(arm()), step, QUICK, lambda phase: None)
+    assert result.verdict.word == "no_gap"
+    assert result.log.comparison.floor.min() > 0.0 and result.simulator.step <= step

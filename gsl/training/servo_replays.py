@@ -61,6 +61,11 @@ class Replays:
             result[index] = np.concatenate(list(self.pool.map(held.replay, windows)))[..., : self.joints]
         return result
 
+    @property
+    def log_step(self) -> float:
+        """Physics period of logs that a self-test makes [s]."""
+        return self.step
+
     def simulate(self, effects: Effects, shifts: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return what the fixed servo replays, as a simulator without effects of its own does."""
         assert not effects and not shifts.any(), "effects lie below a learned servo"

@@ -119,7 +119,7 @@ class Rehearsal:
     def simulate(self, truth: Explanation) -> Pieces:
         """Return what would be logged, without noise."""
         log, how = self.log, self.log.settings
-        step = fitting_step(self.simulator.step, log.period)
+        step = fitting_step(self.simulator.log_step, log.period)
         plant = change(self.simulator.plant, truth.effects, truth.shifts)
         records = relog(log, plant, step, np.random.default_rng(0))
         warm_up, scored = (round(part / log.period) for part in (how.warm_up, how.scored))

@@ -32,6 +32,7 @@ class Log:
         period: Control period [s].
         by_record: Whether whole records are held out; else parts of one, which is weaker.
         order: Place in the batch of each record.
+        made_at: Physics period of the simulator of gsl's own that made it [s], None of any other log.
         settings: How it was cut.
     """
 
@@ -45,6 +46,7 @@ class Log:
     period: float
     by_record: bool
     order: tuple[int, ...] = ()
+    made_at: float | None = None
     settings: LogSettings = field(default_factory=LogSettings)
 
     @property
@@ -141,7 +143,14 @@ def cut_log(
         comparison = compare(pieces, noise, len(robot.controlled), how.floor)
     held, by_record = _hold_out(records, pieces, asked, how.block * scored if blocks else 0)
     train, check = np.flatnonzero(~held), np.flatnonzero(held)
-    return Log(robot, records, pieces, noise, comparison, train, check, period, by_record, order, how)
+    made_at = _made_at(batch)
+    return Log(robot, records, pieces, noise, comparison, train, check, period, by_record, order, made_at, how)
+
+
+def _made_at(batch: Batch) -> float | None:
+    world = batch.metadata.get("world")
+    step = world.get("step") if isinstance(world, Mapping) else None
+    return float(step) if isinstance(step, int | float) else None
 
 
 def _sort(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[int, ...]]:

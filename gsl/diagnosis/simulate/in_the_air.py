@@ -15,6 +15,7 @@ from gsl.diagnosis.log.records import Pieces, Record, group_alike
 from gsl.diagnosis.simulate.calibration import calibrate
 from gsl.effects.effect import applied, built
 from gsl.worlds.engine import Engine
+from gsl.worlds.fits import fitting_step
 from gsl.worlds.held import Held, Windows, shares
 from gsl.worlds.physics import Physics
 from gsl.worlds.servo_state import COMMANDS
@@ -40,6 +41,7 @@ class InTheAir:
         period: Control period [s].
         threads: That replay side by side.
         spread: Of the robot's calibration about this one, as a share of the usual spread of one make.
+        accurate: Whether errors fall with the square of the step; if not, replays are those of Bullet at this step.
     """
 
     plant: Plant
@@ -47,8 +49,14 @@ class InTheAir:
     period: float
     threads: int = 1
     spread: float = 1.0
+    accurate: bool = False
     calibrates = True
     _pool: ThreadPoolExecutor = field(default_factory=ThreadPoolExecutor, repr=False, compare=False)
+
+    @property
+    def log_step(self) -> float:
+        """Physics period of the logs of a self-test [s]: where replays are accurate another one, by another scheme."""
+        return fitting_step(0.5 * self.step, self.period) if self.accurate else self.step
 
     def simulate(self, effects: Effects, shifts: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return the replayed positions [rad], shape (W, T, n_joints); NaN where a replay diverges."""
@@ -62,7 +70,7 @@ class InTheAir:
         return result
 
     def _replay(self, plant: Plant, windows: Any) -> np.ndarray:
-        held = Held.of(plant, self.step, self.period)
+        held = Held.of(plant, self.step, self.period, self.accurate)
         slices = shares(len(windows.clock), self.threads)
         parts = [Windows(*(part[share] for part in windows)) for share in slices]
         result = np.empty((len(windows.clock), windows.length, len(plant.robot.motors)))

@@ -45,6 +45,11 @@ class Walking:
     calibrates = False
     spread = 1.0
 
+    @property
+    def log_step(self) -> float:
+        """Physics period of logs that a self-test makes [s]."""
+        return self.step
+
     def simulate(self, effects: Effects, shifts: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return replayed joints [rad] and base, shape (W, T, n_channels); of `shifts` only zeros play a part."""
         plant = change(self.plant, effects)

@@ -70,7 +70,7 @@ def repose(log: Log, problem: Problem, truth: Hypothesis, rng: np.random.Generat
     """Return the problem with a simulated log in the real one's place, made with a calibration drawn anew."""
     simulator = problem.simulator
     shifts = draw_shifts(rng, len(log.joints), simulator.spread)
-    made = relog(log, change(simulator.plant, truth.effects, shifts), simulator.step, rng)
+    made = relog(log, change(simulator.plant, truth.effects, shifts), simulator.log_step, rng)
     cut = cut_pieces(made, log.robot, log.period, warm_up=log.pieces.warm_up, scored=log.pieces.scored)
     index = {(int(r), int(t)): k for k, (r, t) in enumerate(zip(cut.record, cut.tick, strict=True))}
 
