@@ -91,9 +91,9 @@ def built(words: list[str], home: Path) -> None:
     taken = [word for k, word in enumerate(rest) if word not in FLAGS and (place is None or k - place not in (0, 1))]
     assert all("=" in word or word.startswith("~") for word in taken), taken
     with opened(own):
-        composed = resolved(compose(name, taken, multirun="--multirun" in rest))
+        composition = compose(name, taken, multirun="--multirun" in rest)
         try:
-            prepared(composed)
+            prepared(resolved(composition), composition.trust)
         except ConfigError as error:
             assert LACKING in str(error)
 
