@@ -160,7 +160,7 @@ def test_plugins_of_hydra_and_libraries_in_the_current_folder_are_not_imported(p
 def request(folder: Path, target: str) -> None:
     """Write the request that a stranger would: its hash is right."""
     settings = {"joints": ["a"], "control_period": 0.02, "observes": {"position": 1, "velocity": 1}}
-    limits = {"lower": [-1.0], "upper": [1.0], "step": [0.5], "path": [0.5], "window": 1.0}
+    limits = {"lower": [-1.0], "upper": [1.0], "speed": [2.0], "step": [0.05], "path": [0.2], "window": 0.1}
     episode = {"name": "x", "policy": "x", "parameters": [0.0], "seed": 1, "posture": [0.0], "steps": 5}
     asked = {
         **settings, "about": "", "robot": "r", "place": "held in the air", "limits": limits,
