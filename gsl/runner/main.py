@@ -38,8 +38,7 @@ def main(folder: Path, words: Sequence[str]) -> int:
     parser.add_argument("--yes", action="store_true", help="ask nothing")
     parser.add_argument("--unpaced", action="store_true", help="do not wait for the clock: for a simulated robot")
     parser.add_argument("--trust", action="append", default=[], metavar="MODULE", help="whose policy may be run")
-    asked = parser.parse_args(words)
-    code = _run(folder, asked)
+    code = _run(folder, parser.parse_args(words))
     if is_stuck():  # what hangs may keep the process from its end as well
         os._exit(code)
     return code
