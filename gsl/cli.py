@@ -24,7 +24,7 @@ from gsl.commandline.stage_command import (
 )
 from gsl.core.interruption import ignore, listen
 from gsl.report.console import Console
-from gsl.version import __version__
+from gsl.version import PACKAGE, __version__
 
 Reference = Annotated[str, typer.Argument(metavar="REF", help="Path, or name of a run.")]
 
@@ -109,13 +109,13 @@ def lineage(reference: Reference, json: Json = False) -> None:
     draw_lineage(reference, Console(json=json))
 
 
-_RERUN = "A new place, RUN_rerun by default; whether its settings may name classes that are not gsl's."
+_RERUN = "A new place, RUN_rerun by default; modules that are not gsl's and whose classes its settings may name."
 
 
 @app.command()
 def rerun(
     reference: Reference,
-    settings: Annotated[list[str] | None, typer.Argument(metavar="[out=DIR] [trust=true]", help=_RERUN)] = None,
+    settings: Annotated[list[str] | None, typer.Argument(metavar="[out=DIR] [trust=MODULE]", help=_RERUN)] = None,
     json: Json = False,
 ) -> None:
     """Repeat a run from its manifest into a new place and compare the payloads."""
@@ -168,16 +168,25 @@ def root(
 def main() -> None:
     """Run the command line of this process."""
     listen()
-    sys.path.append(os.getcwd())
+    _leave_current_folder()
     code = call(sys.argv[1:])
     ignore()
     exec("")  # else Python, if it was interrupted in a library's exec(), ends by the signal and not with our exit code
     sys.exit(code)
 
 
+def _leave_current_folder() -> None:
+    """Keep a file of the folder that a command is typed in from standing in for a library; own code needs trust."""
+    here = os.path.realpath(os.getcwd())
+    if here != os.path.realpath(PACKAGE.parent):  # gsl itself may be run from its repository
+        sys.path[:] = [place for place in sys.path if os.path.realpath(place or here) != here]
+
+
 def call(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code, with whatever went wrong told in a line."""
     console = Console(json="--json" in arguments)
+    if any("\0" in word for word in arguments):
+        return console.error("an argument holds a null character", 2)
     try:
         code = int(app(args=list(arguments), prog_name="gsl", standalone_mode=False) or 0)
         return report(KeyboardInterrupt(), console, command=_command(arguments)) if code == INTERRUPTED else code

@@ -68,11 +68,11 @@ class Compare:
     real: ExampleWorld
     subject: str
     episodes: Annotated[int, setting("episodes in each", gt=0)]
-    trust: Annotated[bool, setting("let files name foreign classes")] = False
+    trust: Annotated[tuple[str, ...], setting("modules whose classes files may name")] = ()
 
     def parents(self) -> Mapping[str, Path]:
         return {}
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
-        (folder / "trust.txt").write_text(str(self.trust))
-        return {"trust": self.trust}
+        (folder / "trust.txt").write_text(" ".join(self.trust))
+        return {"trust": list(self.trust)}

@@ -25,7 +25,7 @@ FLOORS = (  # from the ground up: a room imports from lower floors alone
     ("stages",),
 )
 BESIDE = ("experiments/gsl_experiments", "benchmarks/gsl_benchmarks")  # above all floors: each imports gsl and itself
-COMPOSING = ("config", "composer", "config_errors", "known_settings", "multirun")
+COMPOSING = ("composer", "multirun", "own_word", "yaml_files")
 ONLY = {
     "hydra": tuple(f"commandline/{name}.py" for name in COMPOSING),
     "pybullet": ("worlds/engine.py", "worlds/camera.py"),

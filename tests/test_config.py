@@ -24,6 +24,7 @@ CONF = Path(__file__).parent / "conf_example"
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("GSL_CONFIG_DIR", str(CONF))
+    monkeypatch.setenv("GSL_TRUST", "example_stage")
     return tmp_path
 
 
@@ -63,8 +64,8 @@ def test_an_experiment_is_a_whole_scenario(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) -> None:
-    assert call(["evaluate", "subject=s", "trust=true"]) == 0
-    assert (elsewhere / "runs/example/compared/trust.txt").read_text() == "True"
+    assert call(["evaluate", "subject=s", "trust=[lab,mine.robots]"]) == 0
+    assert (elsewhere / "runs/example/compared/trust.txt").read_text() == "example_stage lab mine.robots"
 
 
 @pytest.mark.parametrize(
@@ -310,30 +311,37 @@ def _typed(group: str, conf: Path, command: str) -> list[str]:
 def test_every_option_of_ours_composes_and_builds(line: tuple[str, ...]) -> None:
     command, *choices = line
     with opened(None):
-        stage, settings, _ = prepared(resolved(compose(command, choices)))
+        composition = compose(command, choices)
+        stage, settings, _ = prepared(resolved(composition), composition.trust)
     assert stage.kind in (command.replace("-", "_"), command.partition("-")[0])
-    assert rebuilt(described(stage), trust=True) == stage
+    assert rebuilt(described(stage), trust=composition.trust) == stage
     assert not {"preset", "recipe", "name", "out"} & settings.keys()
 
 
 def test_a_saved_component_is_built_again() -> None:
-    saved = {"_target_": "gsl.commandline.config.CommandSettings", "name": "mine"}
-    assert rebuilt(saved).name == "mine"
+    saved = {"_target_": "gsl.storage.importers.signal.Signal", "column": "mine"}
+    assert rebuilt(saved).column == "mine"
 
 
 def test_a_saved_text_is_no_reference() -> None:
     text = "${oc.create:'{_target_: os.getcwd}'}"
-    assert rebuilt({"_target_": "gsl.commandline.config.CommandSettings", "name": text}).name == text
+    assert rebuilt({"_target_": "gsl.storage.importers.signal.Signal", "column": text}).column == text
 
 
 @pytest.mark.parametrize(
     "saved",
     [
         {"_target_": "os.getcwd"},
-        {"_target_": "gsl.commandline.config.inspect.isclass", "object": 3},
-        {"_target_": "gsl.commandline.config.prepared", "config": {}},
-        {"_target_": "gsl.commandline.config.CommandSettings", "name": {"_target_": "os.getcwd"}},
-        {"_target_": "gsl.commandline.config.CommandSettings", "name": [{"_target_": "os.getcwd"}]},
+        {"_target_": "gsl.__main__.main"},
+        {"_target_": "gsl.runner.bridge.read"},
+        {"_target_": "gsl.worlds.environments.importlib.import_module", "name": "antigravity"},
+        {"_target_": "gsl.worlds.environments.Path"},
+        {"_target_": "gsl.worlds.environments.made", "name": "CartPole-v1", "kwargs": {}},
+        {"_target_": "gsl.commandline.config.CommandSettings", "name": "mine"},
+        {"_target_": "gsl.storage.importers.signal.Signal", "column": {"_target_": "os.getcwd"}},
+        {"_target_": "gsl.storage.importers.signal.Signal", "column": [{"_target_": "os.getcwd"}]},
+        {"_target_": "gsl.worlds.bullet.BulletWorld", "robot": "os.getcwd"},
+        {"_target_": "gsl.worlds.gymnasium.GymnasiumWorld", "env_id": "os:getcwd"},
         {"_target_": "${oc.env:HOME}"},
         {"_target_": "gsl.no_such.Thing"},
         {"_target_": 3},
@@ -346,6 +354,6 @@ def test_a_saved_component_names_classes_of_gsl_and_plain_values_only(saved: dic
 
 def test_a_saved_component_of_the_users_own_needs_trust() -> None:
     saved = {"_target_": "example_stage.ExampleWorld", "control_period": 0.02}
-    with pytest.raises(ConfigError, match="trust=true"):
+    with pytest.raises(ConfigError, match="trust=example_stage if you know"):
         rebuilt(saved)
-    assert rebuilt(saved, trust=True) == ExampleWorld(control_period=0.02)
+    assert rebuilt(saved, trust=["example_stage"]) == ExampleWorld(control_period=0.02)

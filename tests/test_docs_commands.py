@@ -22,6 +22,7 @@ from pages import FENCE, GUIDES, ROOT, Command, commands
 from gsl.commandline.composer import compose, opened
 from gsl.commandline.config import prepared, resolved
 from gsl.commandline.own_effects import load_own_effects
+from gsl.commandline.own_word import spoken
 from gsl.effects.effect import names, use_own
 from gsl.errors import ConfigError
 
@@ -107,10 +108,10 @@ def built(words: list[str], home: Path) -> None:
     taken = [word for k, word in enumerate(rest) if word not in FLAGS and (place is None or k - place not in (0, 1))]
     assert all("=" in word or word.startswith("~") for word in taken), taken
     with opened(own):
-        load_own_effects(own)
-        composed = resolved(compose(name, taken, multirun="--multirun" in rest))
+        load_own_effects(own, spoken(taken))
+        composition = compose(name, taken, multirun="--multirun" in rest)
         try:
-            prepared(composed)
+            prepared(resolved(composition), composition.trust)
         except ConfigError as error:
             assert LACKING in str(error)
 

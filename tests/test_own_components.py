@@ -144,9 +144,14 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def importable(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(home))
+    monkeypatch.setenv("GSL_TRUST", ",".join(TRUSTED))
 
 
 OWN = ("--config-dir", "mine")
+TRUSTED = (
+    *("own_grounding", "own_optimiser", "own_task", "own_plain", "own_sim", "own_edited", "own_fault"),
+    *(f"own_{kind}_{number}" for kind in ("lacking", "bad", "wrong") for number in range(9)),
+)
 
 
 @pytest.fixture(scope="module")
@@ -154,7 +159,7 @@ def iterated(home: Path) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(home))
         done("iterate", *OWN, *SMALL, "grounding=shrink", "optimizer=random_search", "accept=true",
-             "name=own", folder=home)  # fmt: skip
+             "trust=[own_grounding,own_optimiser]", "name=own", folder=home)  # fmt: skip
     return home / "runs/own"
 
 
@@ -167,6 +172,9 @@ def test_both_keep_the_contracts(home: Path) -> None:
 
 def test_an_iteration_trains_checks_and_searches_with_both(iterated: Path) -> None:
     first = iterated / "iteration_01"
+    for stage in ("iterate", "iteration_01/optimize"):
+        recorded = json.loads((iterated / stage / "manifest.json").read_text())["trust"]
+        assert sorted(recorded) == ["own_grounding", "own_optimiser"]
     arrays, about = read_checkpoint(first / "train_grounding" / MODEL, kind=KIND)
     assert about["class"] == "own_grounding.Shrink"
     assert arrays["ratio"].max() <= 1.0
@@ -293,7 +301,7 @@ def test_a_class_that_lacks_something_is_refused_before_anything_is_collected(
     ],
 )
 def test_what_is_no_array_is_refused(returned: str, said: str, iterated: Path, home: Path) -> None:
-    name = f"own_wrong_{abs(hash(returned))}"
+    name = f"own_wrong_{len(list(home.glob('own_wrong_*.py')))}"
     (home / f"{name}.py").write_text(f"from own_grounding import *\n\n@component\nclass Wrong(Shrink):\n"
                                      f"    def learn(self, evidence, seed):\n        return {returned}\n")  # fmt: skip
     (home / f"mine/grounding/{name}.yaml").write_text(f"_target_: {name}.Wrong\nmodel: ''\n")

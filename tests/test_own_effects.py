@@ -60,6 +60,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def apart(home: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Effects of one's own are forgotten after each test."""
     monkeypatch.syspath_prepend(str(home))
+    monkeypatch.setenv("GSL_TRUST", "cold_grease edited numpy rangeless magnet hooked")
     yield
     use_own({})
 
@@ -176,7 +177,7 @@ def test_a_worker_process_has_it_too(hooked: bool, home: Path) -> None:
         ("_target_: cold_grease.Grease\n", "effect/bad.yaml._target_ = cold_grease.Grease: cannot be loaded"),
         ("_target_: cold_grease.ColdGrease\nthickness: 1.0\n", "effect/bad.yaml: has one line, `_target_"),
         ("_target_: numpy.ndarray\n", "effects.bad = ndarray: is no effect; it needs @component"),
-        ("_target_: [\n", "effect/bad.yaml: cannot be read as yaml"),
+        ("_target_: [\n", "my_conf/effect/bad.yaml: is not YAML, or damaged"),
         ("_target_: rangeless.Rangeless\n", "effects.bad.thickness: needs a documented range"),
     ],
 )

@@ -250,7 +250,7 @@ def rewritten(folder: Path, name: str, change: tuple[str, str]) -> None:
         ),
         (
             ("gsl.policies.linear.Linear", "lab.Linear"),
-            "policies.policy._target_ = lab.Linear: is no class of gsl; trust=true",
+            "policies.policy._target_ = lab.Linear: is code that is not gsl's; say trust=lab if",
         ),
     ],
 )

@@ -11,9 +11,12 @@ from pydantic import ValidationError
 
 from gsl.api.overrides import overrides
 from gsl.commandline.composer import compose, opened
-from gsl.commandline.config import instantiate_settings, resolved
+from gsl.commandline.config import resolved
 from gsl.commandline.own_effects import load_own_effects
+from gsl.commandline.own_word import spoken
+from gsl.core.described import rebuilt
 from gsl.core.interfaces import Grounding, Policy, Task, World
+from gsl.core.trust import TRUST
 from gsl.core.validation import config_error
 from gsl.errors import ConfigError
 from gsl.grounding.effects import having_effects
@@ -27,7 +30,8 @@ def make_world(name: str, *, config_dir: Path | str | None = None, **settings: A
     Args:
         name: Such as `nao_worn`; `gsl collect --help` lists them.
         config_dir: A folder of yaml files of your own.
-        **settings: That differ from the file's, such as `step=0.001`, or `effects={"backlash": {"width": 0.02}}`: an
+        **settings: That differ from the file's, such as `step=0.001`; `trust="my_module"` lets the file name classes of
+            that module; or `effects={"backlash": {"width": 0.02}}`: an
             effect takes the place of the file's, or is added.
 
     Raises:
@@ -63,12 +67,14 @@ def make_grounding(name: str, *, config_dir: Path | str | None = None, **setting
 
 
 def _make(group: str, name: str, config_dir: Path | str | None, settings: Mapping[str, Any], kind: Any) -> Any:
-    folder = None if config_dir is None else Path(config_dir)
+    own = {key: value for key, value in settings.items() if key == TRUST}
+    below = {key: value for key, value in settings.items() if key not in own}
+    folder, arguments = None if config_dir is None else Path(config_dir), list(overrides(own))
     with opened(folder):
         if folder is not None:  # effects of a world that is there already stay
-            load_own_effects(folder)
-        config = resolved(compose(ROLES[group], [f"{group}={name}", *overrides(settings, f"{group}.")]))
-    made = instantiate_settings(config[group])
+            load_own_effects(folder, spoken(arguments))
+        composition = compose(ROLES[group], [f"{group}={name}", *overrides(below, f"{group}."), *arguments])
+    made = rebuilt(resolved(composition)[group], trust=composition.trust, where=group)
     if not isinstance(made, kind):
         raise ConfigError(group, f"is no {group}", given=name)
     return made

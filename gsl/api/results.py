@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from gsl.commandline.config import instantiate_settings
+from gsl.core.described import rebuilt
 from gsl.core.interfaces import World
 from gsl.grounding.diagnosis_file import read_diagnosis
 from gsl.grounding.effects import switched_on
@@ -25,9 +25,11 @@ class Result:
 
     Attributes:
         artifact: Its folder and manifest.
+        trust: Modules that are not gsl's and that its settings may name.
     """
 
     artifact: Artifact
+    trust: tuple[str, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -76,9 +78,8 @@ class Verdict(Result):
     @property
     def world(self) -> World:
         """The simulator with what it lacks."""
-        return switched_on(
-            instantiate_settings(self.artifact.config["sim"]), read_diagnosis(str(self.folder), "diagnose")
-        )
+        sim = rebuilt(self.artifact.config["sim"], trust=self.trust, where="sim")
+        return switched_on(sim, read_diagnosis(str(self.folder), "diagnose"))
 
     @property
     def summary(self) -> str:

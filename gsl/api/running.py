@@ -14,10 +14,12 @@ from gsl.commandline.composer import commands, compose, opened
 from gsl.commandline.config import CommandSettings, execute, resolved
 from gsl.commandline.overrides import file_of
 from gsl.commandline.own_effects import load_own_effects
+from gsl.commandline.own_word import spoken
 from gsl.core.console import Silent
 from gsl.core.described import described
 from gsl.core.interfaces import World
 from gsl.core.trajectory import Batch
+from gsl.core.trust import modules_in
 from gsl.core.validation import did_you_mean, make
 from gsl.errors import ConfigError
 from gsl.report.console import Console
@@ -48,20 +50,23 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
     for key in plain:
         if (whole := key.partition(".")[0]) in objects:
             raise ConfigError(key, f"is below {whole}, which goes as it is; set it there")
-    folder = None if config_dir is None else Path(config_dir)
+    folder, arguments = None if config_dir is None else Path(config_dir), list(overrides(plain))
     with opened(folder):
         if folder is not None:  # effects of a world that is there already stay
-            load_own_effects(folder)
-        config = resolved(compose(command, list(overrides(plain))))
+            load_own_effects(folder, spoken(arguments))
+        composition = compose(command, arguments)
+        config = resolved(composition)
+    trust = [*composition.trust]
     for key, value in objects.items():
         if key not in config:
             raise ConfigError(key, f"gsl {command} has no such setting")
         config[key] = described(value)
+        trust += modules_in({key: config[key]})  # of a class that is in the user's hands already
     named = ", ".join(f"{key}={value!r}" for key, value in settings.items())
-    document = execute(command, f"gsl.run({command!r}, {named})", config, Silent() if quiet else Console())
+    document = execute(command, f"gsl.run({command!r}, {named})", config, Silent() if quiet else Console(), trust=trust)
     place = Path(document["folder"])
     made = Artifact(place, manifest.read(place), unchanged=document["unchanged"])
-    return Verdict(made) if made.manifest.kind == "diagnose" else Result(made)
+    return (Verdict if made.manifest.kind == "diagnose" else Result)(made, tuple(trust))
 
 
 def diagnose(log: Batch | Path | str, world: World | str, *, name: str = "diagnosis", **settings: Any) -> Verdict:

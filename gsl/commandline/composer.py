@@ -13,7 +13,6 @@ from hydra import initialize_config_dir
 from hydra.core.config_search_path import ConfigSearchPath, SearchPathQuery
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.plugins import Plugins
 from hydra.errors import CompactHydraException, HydraException
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from hydra.types import RunMode
@@ -24,8 +23,11 @@ from yaml import YAMLError
 from gsl.commandline.config_errors import Vocabulary, misshapen, translated, unfit, unknown_key
 from gsl.commandline.known_settings import declared, known_keys, plain
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
-from gsl.commandline.plugins import folders
+from gsl.commandline.own_word import find_own_modules, spoken
+from gsl.commandline.plugins import folders, packages
+from gsl.commandline.yaml_files import USER, BudgetedFiles, installed_plugins
 from gsl.core.setting import Setting
+from gsl.core.trust import TARGET, check_code, is_ours
 from gsl.core.validation import did_you_mean
 from gsl.effects.effect import names
 from gsl.errors import ConfigError, InputError
@@ -44,12 +46,14 @@ class Composition:
         overrides: The arguments as hydra took them.
         chosen: The defaults list: group, or group@role, to the name of the chosen file.
         swept: Keys that take several values in a multirun.
+        trust: Modules that the user has named, and whose code may run.
     """
 
     config: DictConfig
     overrides: tuple[str, ...]
     chosen: Mapping[str, str]
     swept: tuple[str, ...]
+    trust: tuple[str, ...] = ()
 
 
 class OtherConfiguration(SearchPathPlugin):
@@ -60,7 +64,7 @@ class OtherConfiguration(SearchPathPlugin):
     def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
         """Add the folders that there are."""
         if self.folder is not None:
-            search_path.prepend("gsl-user", f"file://{self.folder}", anchor=SearchPathQuery(provider="main"))
+            search_path.prepend(USER, f"file://{self.folder}", anchor=SearchPathQuery(provider="main"))
         for folder in folders():
             search_path.append(f"gsl-{folder.parent.name}", f"file://{folder}")
 
@@ -87,7 +91,8 @@ def opened(config_dir: Path | None) -> Iterator[None]:
     if config_dir is not None and not config_dir.is_dir():
         raise InputError(f"--config-dir {config_dir}: there is no such folder")
     OtherConfiguration.folder = config_dir.resolve() if config_dir is not None else None
-    Plugins.instance().register(OtherConfiguration)
+    installed_plugins().register(OtherConfiguration)
+    BudgetedFiles.replace_hydras()
     with initialize_config_dir(config_dir=str(configuration_folder()), version_base="1.3", job_name="gsl"):
         yield
 
@@ -98,15 +103,17 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
     Raises:
         ConfigError: An argument is malformed, or names a setting, option or effect that does not exist.
     """
-    vocabulary = Vocabulary((), {}, options)
+    vocabulary, typed = Vocabulary((), {}, options), spoken(arguments)
+    find_own_modules(typed)
+    trust = (*typed, *(package for package in packages() if not is_ours(package)))
     try:
-        base = _composed(command, [])
+        base = _composed(command, [], trust)
         vocabulary = Vocabulary(known_keys(_without_hydra(base)), _choices(base), options)
         overrides = rewrite(arguments, vocabulary.chosen)
         _check_grammar(overrides)
-        composition = _added_where_declared(command, overrides, multirun)
+        composition = _added_where_declared(command, overrides, trust, multirun)
     except (CompactHydraException, OmegaConfBaseException, YAMLError) as error:
-        words = _with_choices(command, arguments, vocabulary)
+        words = _with_choices(command, arguments, vocabulary, trust)
         raise unfit(command, arguments, unknown_key(error)) or translated(error, words) from error
     except ValueError as error:
         raise misshapen(arguments, error, vocabulary) from error
@@ -120,10 +127,10 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
     return composition
 
 
-def _with_choices(command: str, arguments: Sequence[str], words: Vocabulary) -> Vocabulary:
+def _with_choices(command: str, arguments: Sequence[str], words: Vocabulary, trust: Sequence[str]) -> Vocabulary:
     """Return the words of a command with what is typed of choices, the same ones if these are what is wrong."""
     try:
-        chosen = _composed(command, _of_choices(_first_values(rewrite(arguments, words.chosen))[0]))
+        chosen = _composed(command, _of_choices(_first_values(rewrite(arguments, words.chosen))[0]), trust)
     except (ConfigError, CompactHydraException, OmegaConfBaseException, YAMLError, ValueError):
         return words
     return replace(words, keys=known_keys(_without_hydra(chosen)))
@@ -156,7 +163,7 @@ def _check_effects(composition: Composition) -> None:
         if not path or override.startswith("~") or name in names():
             continue
         node = OmegaConf.select(composition.config, path)
-        if not (isinstance(node, DictConfig) and "_target_" in node):
+        if not (isinstance(node, DictConfig) and TARGET in node):
             raise ConfigError(path, f"no such effect{did_you_mean(name, names())}")
 
 
@@ -180,25 +187,25 @@ def _check_made(command: str, composition: Composition) -> None:
             raise ConfigError(key, "is made here; gsl optimize takes one that is there")
 
 
-def _added_where_declared(command: str, overrides: list[str], multirun: bool) -> Composition:
+def _added_where_declared(command: str, overrides: list[str], trust: tuple[str, ...], multirun: bool) -> Composition:
     """Compose, adding settings that only the class names, and what it lets the user name."""
     while True:
         first, swept = _first_values(overrides) if multirun else (overrides, ())
         try:
-            config = _composed(command, first)
+            config = _composed(command, first, trust)
         except CompactHydraException as error:
             key = unknown_key(error)
             others = [override for override, one in zip(overrides, first, strict=True) if key_of(one) != key]
-            if key is None or len(others) == len(overrides) or not _declares(command, others, key):
+            if key is None or len(others) == len(overrides) or not _declares(command, others, key, trust):
                 raise
             overrides = [f"++{one}" if key_of(one) == key else one for one in overrides]
             continue
-        return Composition(_without_hydra(config), tuple(overrides), _choices(config), swept)
+        return Composition(_without_hydra(config), tuple(overrides), _choices(config), swept, trust)
 
 
-def _declares(command: str, overrides: list[str], key: str) -> bool:
+def _declares(command: str, overrides: list[str], key: str, trust: Sequence[str]) -> bool:
     parent, _, name = key.rpartition(".")
-    config = _composed(command, _first_values(_of_choices(overrides))[0])
+    config = _composed(command, _first_values(_of_choices(overrides))[0], trust)
     if name in _declared_at(config, parent):
         return True
     above, _, mapping = parent.rpartition(".")
@@ -228,11 +235,14 @@ def _first_value(override: Any) -> str:
     return f"{override.get_key_element()}={override.value().start}"
 
 
-def _composed(command: str, overrides: Sequence[str]) -> DictConfig:
+def _composed(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:
+    """Compose; nothing that a file names is imported before it is checked here."""
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None
     name, how = file_of(command), {"from_shell": False, "with_log_configuration": False}
-    return hydra.compose_config(config_name=name, overrides=list(overrides), run_mode=RunMode.RUN, **how)
+    config = hydra.compose_config(config_name=name, overrides=list(overrides), run_mode=RunMode.RUN, **how)
+    check_code(plain(_without_hydra(config)), trust, references=True)
+    return config
 
 
 def _without_hydra(config: DictConfig) -> DictConfig:

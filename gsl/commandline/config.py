@@ -2,33 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from hydra.errors import InstantiationException
-from hydra.utils import instantiate
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BeforeValidator
 
 from gsl.commandline.composer import Composition
-from gsl.commandline.config_errors import instantiation_error, missing, resolution_error
+from gsl.commandline.config_errors import missing, resolution_error
 from gsl.commandline.known_settings import declared
 from gsl.commandline.overrides import COMMAND_KEYS, file_of
+from gsl.commandline.own_word import modules_of
+from gsl.core.budget import within
 from gsl.core.console import Console
-from gsl.core.described import described
+from gsl.core.described import described, rebuilt
 from gsl.core.setting import component, setting
+from gsl.core.trust import TRUST, check_code
 from gsl.core.validation import make
 
 RUNS = Path("runs")
+LONGEST = 200  # bytes of a folder's name; file systems take 255, and temporary folders have longer ones
 
 
 def _inside(name: str) -> str:
     """Return the name of a run that stays below the folder of the runs."""
+    if "\0" in name or any(len(part.encode()) > LONGEST for part in name.split("/")):
+        raise ValueError(f"must be a name of folders, each of {LONGEST} bytes at most")
     if any(part in ("", ".", "..") for part in name.split("/")):
         raise ValueError("must be a name in runs/, without an empty part or ..; a folder elsewhere is out=")
     return name
+
+
+def _own_folder(out: str | None) -> str | None:
+    """Return the folder of an artifact, which is none that holds the current one."""
+    if out is not None and ("\0" in out or Path.cwd().is_relative_to(Path(out).absolute().resolve())):
+        raise ValueError("must be a folder of its own, such as out=runs/mine/collect")
+    return out
 
 
 @component
@@ -36,9 +47,11 @@ class CommandSettings:
     """What a command does with its stage, as opposed to what the stage does."""
 
     name: Annotated[str, setting("name of the run", min_length=1), AfterValidator(_inside)] = "unnamed"
-    out: Annotated[str | None, setting("folder of the artifact", min_length=1)] = None
+    out: Annotated[str | None, setting("folder of the artifact", min_length=1), AfterValidator(_own_folder)] = None
     force: Annotated[bool, setting("replace an artifact that was built otherwise")] = False
-    trust: Annotated[bool, setting("let files of a run name classes that are not gsl's")] = False
+    trust: Annotated[
+        tuple[str, ...], setting("modules of your own whose code files may name"), BeforeValidator(modules_of)
+    ] = ()
 
     def folder(self, command: str, level: str = "") -> Path:
         """Return the artifact's folder; `level` tells the jobs of a multirun apart."""
@@ -46,15 +59,23 @@ class CommandSettings:
         return place.parent / level / place.name if level else place
 
 
-def execute(command: str, line: str, config: Mapping[str, Any], console: Console, *, level: str = "") -> dict[str, Any]:
+def execute(
+    command: str,
+    line: str,
+    config: Mapping[str, Any],
+    console: Console,
+    *,
+    trust: Collection[str] = (),
+    level: str = "",
+) -> dict[str, Any]:
     """Build the artifact that a resolved configuration describes and return what there is to say about it.
 
-    A stage that `only_looks` says what it would do and builds nothing.
+    A stage that `only_looks` says what it would do and builds nothing; `trust` names modules that are not gsl's.
     """
     from gsl.report.account import account
     from gsl.storage.artifact import build
 
-    stage, settings, own = prepared(config)
+    stage, settings, own = prepared(config, trust)
     if getattr(stage, "only_looks", False):
         return dict(stage.look(console))
     out = own.folder(command, level)
@@ -65,19 +86,22 @@ def execute(command: str, line: str, config: Mapping[str, Any], console: Console
     return {"folder": out.as_posix(), "unchanged": artifact.unchanged, "metrics": artifact.metrics, **more(out)}
 
 
-def prepared(config: Mapping[str, Any]) -> tuple[Any, dict[str, Any], CommandSettings]:
+def prepared(config: Mapping[str, Any], trust: Collection[str] = ()) -> tuple[Any, dict[str, Any], CommandSettings]:
     """Return the stage, its settings and those of the command; the stage gets a command's setting if it has the field.
 
     Raises:
         ConfigError: A value is missing, of the wrong type or impossible.
     """
+    check_code(config, trust)
     wanted = declared(dict(config))
     own = make(CommandSettings, {key: config[key] for key in COMMAND_KEYS if key in config})
     dropped = {*COMMAND_KEYS, "preset", "recipe"} - wanted.keys()
     settings = {key: value for key, value in config.items() if key not in dropped}
     for path in _missing(settings, ""):
         raise missing(path)
-    stage = instantiate_settings(settings)
+    if TRUST in settings:
+        settings[TRUST] = list(trust)
+    stage = rebuilt(settings, trust=trust)
     described(stage)  # refuses what could not be written down afterwards
     return stage, settings, own
 
@@ -89,25 +113,12 @@ def resolved(composition: Composition) -> dict[str, Any]:
         ConfigError: A value refers to something that does not exist.
     """
     try:
-        container = OmegaConf.to_container(composition.config, resolve=True)
+        with within("putting the settings together"):
+            container = OmegaConf.to_container(composition.config, resolve=True)
     except OmegaConfBaseException as error:
         raise resolution_error(error) from error
     assert isinstance(container, dict)
     return {str(key): value for key, value in container.items()}
-
-
-def instantiate_settings(mapping: Mapping[str, Any]) -> Any:
-    """Return the object that a mapping with `_target_` describes.
-
-    Raises:
-        ConfigError: A value is of the wrong type or impossible.
-    """
-    try:
-        return instantiate(dict(mapping), _convert_="all")
-    except InstantiationException as error:
-        raise instantiation_error(error) from error.__cause__
-    except OmegaConfBaseException as error:
-        raise resolution_error(error) from error
 
 
 def _missing(value: Any, path: str) -> Iterator[str]:

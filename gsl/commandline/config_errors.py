@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from hydra.errors import InstantiationException
-from hydra.utils import get_object
 from omegaconf.errors import InterpolationKeyError, InterpolationResolutionError, MissingMandatoryValue
-from pydantic import ValidationError
 
-from gsl.core.setting import settings_of
-from gsl.core.validation import config_error, did_you_mean
+from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError, InputError
 
 _UNKNOWN = re.compile(r"Could not (?:override|delete from config\.) '([^']+)'")
@@ -23,8 +17,6 @@ _MISSING = re.compile(r"[Mm]issing mandatory value: (\S+)")
 _NO_PRIMARY = re.compile(r"Cannot find primary config '([^']+)'")
 _MERGED = re.compile(r"Error merging override (\S+)")
 _AMBIGUOUS = re.compile(r"Ambiguous value for argument '([^'=]+)=([^']*)'")
-_UNEXPECTED = re.compile(r"unexpected keyword argument '(\w+)'")
-_INSTANTIATED = re.compile(r"target '([^']+)'")
 
 
 @dataclass(frozen=True)
@@ -107,43 +99,6 @@ def resolution_error(error: Exception) -> Exception:
 def missing(key: str) -> ConfigError:
     """Return the error for a value that the user has to give."""
     return ConfigError(key, f"has no value yet; say {key}=...")
-
-
-def instantiation_error(error: InstantiationException) -> BaseException:
-    """Return why a component could not be made: a `ConfigError` if it is its settings, else the cause itself."""
-    text, cause = str(error), error.__cause__
-    path = text.rpartition("full_key: ")[2].strip() if "full_key: " in text else ""
-    found = _INSTANTIATED.search(text)
-    target = found.group(1) if found else ""
-    if isinstance(cause, ValidationError):
-        return _of_pydantic(cause, get_object(target), path)
-    if isinstance(cause, ConfigError):
-        return cause.under(path)
-    if isinstance(cause, TypeError) and (unexpected := _UNEXPECTED.search(str(cause))):
-        name = unexpected.group(1)
-        return ConfigError(
-            f"{path}.{name}".lstrip("."), f"no such setting{did_you_mean(name, settings_of(get_object(target)))}"
-        )
-    if text.startswith("Error locating target"):
-        reason = _lacking(target) or (str(cause).splitlines()[1] if cause and "\n" in str(cause) else str(cause))
-        return ConfigError(f"{path}._target_".lstrip("."), f"cannot be loaded: {reason}", given=target)
-    return cause or error
-
-
-def _lacking(target: str) -> str:
-    """Return that a module has no such class, if that is why it cannot be loaded; nothing otherwise."""
-    place, _, name = target.rpartition(".")
-    module = sys.modules.get(place)
-    if module is None or hasattr(module, name):
-        return ""
-    return f"{place} has no class {name}{did_you_mean(name, [one for one in vars(module) if one[:1].isupper()])}"
-
-
-def _of_pydantic(error: ValidationError, target: Callable[..., Any], path: str) -> ConfigError:
-    """Return the error; one that comes from a component deeper inside is told by that component's name."""
-    if error.title != getattr(target, "__name__", ""):
-        return config_error(error, target, where=".".join(filter(None, [path, error.title])))
-    return config_error(error, target, where=path)
 
 
 def _no_such_setting(key: str, words: Vocabulary) -> ConfigError:

@@ -38,6 +38,8 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
         return f"{line}; GSL_TRACEBACK=1 shows more", 1
     if isinstance(failure, OSError):
         return failure.strerror or text, 1
+    if isinstance(failure, RecursionError):
+        return "what was given is nested too deeply", 2
     return f"internal error: {type(failure).__name__}: {text}; GSL_TRACEBACK=1 shows where", 1
 
 

@@ -22,6 +22,7 @@ from gsl.commandline.config import CommandSettings, resolved
 from gsl.commandline.known_settings import declared, plain
 from gsl.commandline.overrides import OPTIONAL_GROUPS
 from gsl.commandline.own_effects import load_own_effects
+from gsl.commandline.own_word import spoken
 from gsl.core.setting import REQUIRED, Setting, settings_of
 from gsl.effects.effect import effect_class, names
 from gsl.errors import ConfigError, GslError
@@ -58,7 +59,7 @@ class Explanation:
 def explained(command: str, typed: Sequence[str] = (), *, config_dir: Path | None = None) -> Explanation:
     """Return what the yaml files and classes of a command say about themselves, with what is typed if it is right."""
     with opened(config_dir):
-        load_own_effects(config_dir)
+        load_own_effects(config_dir, spoken(typed))
         try:
             composition = compose(command, typed)
         except GslError:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from hydra.utils import get_object
 from omegaconf import DictConfig, OmegaConf
 
 from gsl.commandline.overrides import COMMAND_KEYS
 from gsl.core.setting import Setting, settings_of
+from gsl.core.trust import TARGET, class_of
+from gsl.errors import ConfigError
 
 
 def known_keys(config: DictConfig) -> list[str]:
@@ -18,11 +19,11 @@ def known_keys(config: DictConfig) -> list[str]:
 
 
 def declared(node: Mapping[str, Any]) -> Mapping[str, Setting]:
-    """Return the settings of the class that a mapping names with `_target_`, nothing if it names none."""
-    name = node.get("_target_")
+    """Return the settings of the class that a checked mapping names with `_target_`, nothing if it names none."""
+    name = node.get(TARGET)
     try:
-        return settings_of(get_object(name)) if isinstance(name, str) else {}
-    except (ImportError, ValueError, TypeError, AttributeError):
+        return settings_of(class_of(name)) if isinstance(name, str) else {}
+    except (ConfigError, ValueError, TypeError, AttributeError):
         return {}
 
 

@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from gsl.errors import ArtifactError
+from gsl.errors import ArtifactError, InputError
 from gsl.report.account import account, flat, plain
 from gsl.report.console import Console
 from gsl.report.headline import headline
@@ -101,7 +101,7 @@ def _state(place: Path, expected: str) -> str:
     try:
         same = "the same" if content_hash(place) == expected else "built anew since"
         return f"{same}, but {stale}" if (stale := out_of_date(place)) else same
-    except ArtifactError:
+    except InputError:
         return "gone or damaged"
 
 

@@ -32,7 +32,14 @@ def run_jobs(command: str, line: str, composition: Composition, console: Console
     """Run all jobs and return the worst of their exit codes; a job that fails does not stop the others."""
     (RUNS / ".multirun").mkdir(parents=True, exist_ok=True)
     folder = Path(tempfile.mkdtemp(prefix=f"{file_of(command)}-", dir=RUNS / ".multirun"))
-    job = functools.partial(run_job, command=command, line=line, swept=composition.swept, json=console.json)
+    job = functools.partial(
+        run_job,
+        command=command,
+        line=line,
+        swept=composition.swept,
+        trust=composition.trust,
+        json=console.json,
+    )
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None
     hydra.multirun(
@@ -49,7 +56,9 @@ def run_jobs(command: str, line: str, composition: Composition, console: Console
     return _told(folder, console)
 
 
-def run_job(config: DictConfig, *, command: str, line: str, swept: Sequence[str], json: bool) -> Any:
+def run_job(
+    config: DictConfig, *, command: str, line: str, swept: Sequence[str], trust: Sequence[str], json: bool
+) -> Any:
     """Run one job, leave its outcome in hydra's folder and return the figure that a sweeper may look at."""
     console = Console(json=json)
     hydra = HydraConfig.get()
@@ -57,7 +66,7 @@ def run_job(config: DictConfig, *, command: str, line: str, swept: Sequence[str]
     console.status(f"job {hydra.job.num}: {level}")
     try:
         values = resolved(Composition(config, (), {}, ()))
-        outcome = {"job": level, "exit_code": 0, **execute(command, line, values, console, level=level)}
+        outcome = {"job": level, "exit_code": 0, **execute(command, line, values, console, trust=trust, level=level)}
     except Exception as failure:
         message, _ = describe_failure(failure)
         outcome = {"job": level, "exit_code": report(failure, Console(), command=f"gsl {command}"), "error": message}

@@ -86,10 +86,14 @@ def is_group(name: str) -> bool:
         return False
 
 
+def packages() -> list[str]:
+    """Return the packages that bring commands: they were installed, so their files may name what is in them."""
+    return sorted({one.module.partition(".")[0] for one in plugins().values()})
+
+
 def folders() -> list[Path]:
     """Return the folders conf/ of the packages that bring commands."""
-    packages = sorted({one.module.partition(".")[0] for one in plugins().values()})
-    return [place for package in packages if (place := _place(package) / CONF).is_dir()]
+    return [place for package in packages() if (place := _place(package) / CONF).is_dir()]
 
 
 def summary(entry_point: EntryPoint) -> str:

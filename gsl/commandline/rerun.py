@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gsl.commandline.own_word import find_own_modules, spoken
 from gsl.core.described import rebuilt
 from gsl.errors import ArtifactError, ConfigError
 from gsl.report.console import Console
@@ -25,8 +26,8 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
 
     Args:
         reference: A path, or the name of a run.
-        settings: `out=` where it is built, beside the run by default, and `trust=true` if its settings may name classes
-            that are not gsl's.
+        settings: `out=` where it is built, beside the run by default, and `trust=` the modules of others whose classes
+            its settings may name.
         console: Where both are set against each other.
 
     Raises:
@@ -35,7 +36,7 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
     """
     words = dict(word.partition("=")[::2] for word in settings)
     if unknown := sorted(words.keys() - {"out", "trust"}):
-        raise ConfigError(unknown[0], "is no setting of gsl rerun, which takes out= and trust=true")
+        raise ConfigError(unknown[0], "is no setting of gsl rerun, which takes out= and trust=")
     folder = resolve(reference)
     old = Artifact(folder, manifest.read(folder))
     place = Path(words["out"]) if words.get("out") else _beside(folder)
@@ -47,7 +48,9 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
         if content_hash(source) != parent.hash:
             raise ArtifactError(source, f"is no longer what {folder.as_posix()} was made from")
         _move(config, parent.role.split("."), source)
-    stage = rebuilt(config, trust=words.get("trust") == "true")
+    trust = spoken(settings)
+    find_own_modules(trust)
+    stage = rebuilt(config, trust=trust)
     command = f"gsl rerun {folder.as_posix()}"
     new = build(stage, config=config, out=place, command=command, force=False, console=console)
     rows = list(_compared(old, new))

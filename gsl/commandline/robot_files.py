@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gsl.commandline.own_word import find_own_modules
+from gsl.core.trust import modules_in
+from gsl.errors import InputError
 from gsl.report.console import Console
 from gsl.report.render import portrait
 from gsl.robots.catalogue import robot
@@ -20,8 +23,9 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
         console: Where to say so.
 
     Raises:
-        InputError: if there is no such robot, or its file describes none.
+        InputError: if there is no such robot, its file describes none, or another file is in the way.
     """
+    find_own_modules(modules_in({"robot": name}))
     body = robot(name)
     model, picture = folder / f"{body.name}.urdf", folder / f"{body.name}.png"
     shown = any(link.shapes for link in body.links.values())
@@ -29,7 +33,9 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
     remarks = [*body.remarks, *([] if shown else ["no picture: none of its links has a shape that could be shown"])]
     with explained(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        model.write_text(urdf(body), encoding="utf-8")
+        text = urdf(body)
+        _check_free(model, picture if shown else None, text)
+        model.write_text(text, encoding="utf-8")
         if shown:
             portrait(body, picture)
     about = f"{body.name}: {len(body.controlled)} controlled joints, {len(body.links)} links, {body.mass:.3f} kg"
@@ -42,3 +48,11 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
         "files": files,
     }
     console.result(document, text="\n".join(told))
+
+
+def _check_free(model: Path, picture: Path | None, text: str) -> None:
+    """Refuse to write over what is not of this robot: the same URDF, with a picture beside it, is written again."""
+    again = model.is_file() and not model.is_symlink() and model.read_bytes() == text.encode()
+    taken = [path for path in (model, picture) if path is not None and (path.exists() or path.is_symlink())]
+    if taken and not again or picture is not None and picture.is_symlink():
+        raise InputError(f"{taken[0]}: exists, and is not what would be written; move it, or say another out=")

@@ -13,6 +13,7 @@ from gsl.commandline.composer import compose, opened
 from gsl.commandline.config import execute, prepared, resolved
 from gsl.commandline.multirun import run_jobs
 from gsl.commandline.own_effects import load_own_effects
+from gsl.commandline.own_word import spoken
 from gsl.report.console import Console
 
 
@@ -42,15 +43,15 @@ def run(
     flags = [*(["--multirun"] if multirun else []), *([f"--config-dir={config_dir}"] if config_dir else [])]
     line = shlex.join(["gsl", *command.split(), *flags, *overrides])
     with opened(config_dir):
-        load_own_effects(config_dir)
+        load_own_effects(config_dir, spoken(overrides))
         composition = compose(command, overrides, multirun=multirun)
         if cfg:
             console.result(resolved(composition), text=OmegaConf.to_yaml(OmegaConf.create(resolved(composition))))
             return 0
         if multirun:
-            prepared(resolved(composition))
+            prepared(resolved(composition), composition.trust)
             return run_jobs(command, line, composition, console)
-        document = execute(command, line, resolved(composition), console)
+        document = execute(command, line, resolved(composition), console, trust=composition.trust)
         console.result(document, text=said(document))
         return int(document.get("exit_code", 0))
 

@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from gsl.commandline.completion import CONFIG_DIR, complete, name_of, user_folder
+from gsl.core.visible import visible
 
 TYPED = "gsl.typed"
 
@@ -27,7 +28,7 @@ class StageCommand(TyperCommand):
         from gsl.commandline.help import write_help
 
         super().format_help(ctx, formatter)
-        formatter.write(write_help(name_of(ctx), ctx.meta.get(TYPED, []), config_dir=user_folder(ctx)))
+        formatter.write(visible(write_help(name_of(ctx), ctx.meta.get(TYPED, []), config_dir=user_folder(ctx))))
 
 
 class Shown(StrEnum):

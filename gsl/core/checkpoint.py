@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gsl.core.budget import parse_json
 from gsl.errors import ArtifactError
 
 SCHEMA_VERSION = 1
@@ -39,7 +39,7 @@ def _metadata(path: Path, header: Mapping[str, str] | None, kind: str) -> dict[s
     if header is None or METADATA_KEY not in header:
         raise ArtifactError(path, "is not a checkpoint of gsl: it has no metadata under the key `gsl`")
     try:
-        metadata: dict[str, Any] = json.loads(header[METADATA_KEY])
+        metadata: dict[str, Any] = parse_json(header[METADATA_KEY])
     except ValueError as error:
         raise ArtifactError(path, "is damaged: its metadata are not JSON; train the model again") from error
     version = metadata.pop("schema_version", None) if isinstance(metadata, dict) else None

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
-import inspect
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
+from gsl.core.trust import TARGET, check_code, class_of
 from gsl.core.validation import make
 from gsl.errors import ConfigError
 
-_OURS = "gsl"
 _PLAIN = {"builtins", "numpy", "pathlib"}
 
 
@@ -24,7 +22,7 @@ def described(thing: Any) -> Any:
     if is_dataclass(thing) and not isinstance(thing, type):
         kind = type(thing)
         settings = {field.name: described(getattr(thing, field.name)) for field in fields(thing)}
-        return {"_target_": f"{kind.__module__}.{kind.__qualname__}", **settings}
+        return {TARGET: f"{kind.__module__}.{kind.__qualname__}", **settings}
     if isinstance(thing, Mapping):
         return {key: described(value) for key, value in thing.items()}
     if isinstance(thing, list | tuple):
@@ -35,47 +33,31 @@ def described(thing: Any) -> Any:
     return thing
 
 
-def rebuilt(told: Any, *, trust: bool = False, where: str = "") -> Any:
+def rebuilt(told: Any, *, trust: Collection[str] = (), where: str = "") -> Any:
     """Return what `described` told, read from a file, as components again.
 
     Args:
         told: Plain data; every mapping with a `_target_` is a component.
-        trust: Whether classes that are not gsl's may be imported.
+        trust: Modules that are not gsl's and whose classes may be imported.
         where: Dotted path of the data, for errors.
 
     Raises:
         ConfigError: A setting is wrong, or names a class that is not there or may not be imported.
     """
+    check_code(told, trust, where)
+    return _built(told, where)
+
+
+def _built(told: Any, where: str) -> Any:
     if isinstance(told, Mapping):
-        settings = {key: rebuilt(value, trust=trust, where=f"{where}.{key}".lstrip(".")) for key, value in told.items()}
-        if "_target_" not in settings:
+        settings = {key: _built(value, f"{where}.{key}".lstrip(".")) for key, value in told.items()}
+        if TARGET not in settings:
             return settings
-        return make(class_of(settings.pop("_target_"), trust=trust, where=where), settings, where=where)
+        kind = class_of(settings.pop(TARGET), where)
+        try:
+            return make(kind, settings)
+        except ConfigError as error:
+            raise error.under(where) from error
     if isinstance(told, list | tuple):
-        return [rebuilt(value, trust=trust, where=f"{where}.{index}") for index, value in enumerate(told)]
+        return [_built(value, f"{where}.{index}".lstrip(".")) for index, value in enumerate(told)]
     return told
-
-
-def class_of(name: Any, *, trust: bool = False, where: str = "") -> Any:
-    """Return the class that data names.
-
-    Args:
-        name: Of the class, with its module.
-        trust: Whether it may be imported if it is not gsl's.
-        where: Dotted path of the data, for errors.
-
-    Raises:
-        ConfigError: It is not there, or may not be imported.
-    """
-    place, _, attribute = str(name).rpartition(".")
-    setting = f"{where}._target_".lstrip(".")
-    if not trust and place.partition(".")[0] != _OURS:
-        problem = "is no class of gsl; trust=true if you know where this file comes from"
-        raise ConfigError(setting, problem, given=str(name))
-    try:
-        found = getattr(importlib.import_module(place), attribute)
-    except (ImportError, ValueError, AttributeError) as error:
-        raise ConfigError(setting, f"cannot be loaded: {error}", given=str(name)) from error
-    if not inspect.isclass(found) or not (trust or found.__module__.partition(".")[0] == _OURS):
-        raise ConfigError(setting, "is no class of gsl", given=str(name))
-    return found

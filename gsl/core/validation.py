@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -14,6 +15,7 @@ from gsl.errors import ConfigError
 
 T = TypeVar("T")
 
+_UNEXPECTED = re.compile(r"unexpected keyword argument '(\w+)'")
 _RULES = {
     "greater_than_equal": "must be at least {ge:g}",
     "greater_than": "must be above {gt:g}",
@@ -46,7 +48,14 @@ def make(target: Callable[..., T], values: Mapping[str, Any], *, where: str = ""
     try:
         return target(**values)
     except ValidationError as error:
-        raise config_error(error, target, where=where) from None
+        inside = "" if error.title == getattr(target, "__name__", "") else error.title  # made by the component itself
+        raise config_error(error, target, where=".".join(filter(None, [where, inside]))) from None
+    except TypeError as error:
+        unexpected = _UNEXPECTED.search(str(error))
+        if unexpected is None:
+            raise
+        name = ".".join(filter(None, [where, unexpected[1]]))
+        raise ConfigError(name, f"no such setting{did_you_mean(unexpected[1], settings_of(target))}") from error
 
 
 def config_error(error: ValidationError, target: Callable[..., Any], *, where: str = "") -> ConfigError:

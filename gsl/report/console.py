@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from gsl.core.console import LiveTable, Progress
 from gsl.core.interruption import checkpoint
+from gsl.core.visible import visible
 from gsl.report.tables import LineTable, RichLiveTable, drawn, fitting, total
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ class Console:
     def status(self, text: str) -> None:
         """Say what is going on, on stderr."""
         checkpoint()
+        text = visible(text)
         _log.info("%s", text)
         if self._lines is not None:
             self._lines.interrupted = True
@@ -53,8 +55,10 @@ class Console:
         self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
     ) -> None:
         """Print a table of results on stdout, of a `part` on stderr; with JSON it is left to `result`."""
-        title = self._titled(title)
-        _log.info("%s", "\n".join([title, *("\t".join(map(str, row)) for row in [columns, *rows]), caption or ""]))
+        title, caption = visible(self._titled(title)), visible(caption or "")
+        columns = [visible(column) for column in columns]
+        rows = [_visible_cells(row) for row in rows]
+        _log.info("%s", "\n".join([title, *("\t".join(map(str, row)) for row in [columns, *rows]), caption]))
         if self.json:
             return
         above_live_table = self._live is not None and self._stdout.is_terminal
@@ -79,24 +83,26 @@ class Console:
         if self.json:
             from gsl.storage.documents import text as strict_json
 
-            sys.stdout.write(strict_json(document, indent=2) + "\n")
+            sys.stdout.write(visible(strict_json(document, indent=2)) + "\n")
         elif text:
-            sys.stdout.write(text.rstrip("\n") + "\n")
+            sys.stdout.write(visible(text).rstrip("\n") + "\n")
         sys.stdout.flush()
 
     def error(self, message: str, exit_code: int, *, command: str = "gsl") -> int:
         """Say in one line why the command ends, and return the exit code."""
+        message = visible(message)
         _log.info("%s", message)
         if self.json:
             self.result({"error": message, "exit_code": exit_code})
         else:
             sys.stdout.flush()
-            sys.stderr.write(f"{command}: {message}\n")
+            sys.stderr.write(f"{visible(command)}: {message}\n")
         return exit_code
 
     @contextmanager
     def progress(self, total: int, description: str) -> Iterator[Progress]:
         """Show how far a loop of `total` steps is: a bar on a terminal, else a line every ten seconds."""
+        description = visible(description)
         if self._live is not None:
             yield _Lines(total, description, self._live.caption, seconds=0.5)
         elif not self._stderr.is_terminal:
@@ -112,7 +118,7 @@ class Console:
     @contextmanager
     def live_table(self, title: str, columns: Sequence[str]) -> Iterator[LiveTable]:
         """Show a growing table on a terminal, else each row as a line; the final table is for `table`."""
-        title = self._titled(title)
+        title = visible(self._titled(title))
         if not self._stderr.is_terminal or self._live is not None:
             self._lines = LineTable(title, columns, self.status)
             try:
@@ -163,6 +169,10 @@ class _Lines:
         if time.monotonic() - self.said >= self.seconds:
             self.said = time.monotonic()
             self.say(f"{self.description}: {self.done} of {self.total}")
+
+
+def _visible_cells(cells: Sequence[object]) -> list[object]:
+    return [visible(cell) if isinstance(cell, str) else cell for cell in cells]
 
 
 def _rich_console(is_terminal: bool, *, stderr: bool) -> rich.console.Console:

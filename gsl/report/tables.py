@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Literal
 
+from gsl.core.visible import visible
+
 if TYPE_CHECKING:
     import rich.live
     import rich.table
@@ -49,7 +51,7 @@ class RichLiveTable:
 
     def row(self, *cells: object) -> None:
         """Add one row."""
-        self._rows.append(cells)
+        self._rows.append([visible(str(cell)) for cell in cells])
         self._draw()
 
     def caption(self, text: str) -> None:

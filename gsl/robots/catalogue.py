@@ -57,7 +57,7 @@ def robot(name: str) -> Robot:
     try:
         built: Robot = getattr(importlib.import_module(place), function)()
         return built
-    except (ImportError, AttributeError) as error:
+    except (ImportError, AttributeError, ValueError) as error:
         raise ConfigError("robot", f"'{name}' cannot be imported: {error}") from error
 
 

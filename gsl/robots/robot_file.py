@@ -17,18 +17,19 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
-
 from gsl.core.body import Robot
+from gsl.core.budget import read_text
 from gsl.core.setting import component, setting
+from gsl.core.trust import ROBOT_FILES
 from gsl.core.validation import did_you_mean, make
+from gsl.core.yaml_tree import yaml_tree
 from gsl.effects.effect import check_ranges
 from gsl.errors import ConfigError, InputError
 from gsl.robots.hinges import JointSettings, from_description, lone
 from gsl.robots.urdf_xml import read_description
 
 YAML = (".yaml", ".yml")
-SUFFIXES = (".urdf", ".xacro", ".xml", *YAML)
+SUFFIXES = ROBOT_FILES
 
 
 @component
@@ -109,13 +110,7 @@ def _check_motor(robot: Robot, name: str, where: str) -> None:
 
 
 def _settings(path: Path) -> RobotSettings:
-    try:
-        told = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        told = " ".join(str(error).replace('in "<unicode string>", ', "in ").split())
-        raise InputError(f"{path}: is not YAML, or damaged: {told}") from error
+    told = yaml_tree(path, read_text(path))
     if not isinstance(told, Mapping):
         raise InputError(f"{path}: says nothing of a robot; see docs/howto/own-robot.md")
     try:

@@ -11,6 +11,7 @@ from xml.etree import ElementTree as xml
 import numpy as np
 
 from gsl.core.body import Link, Shape
+from gsl.core.budget import JOINTS, URDF_BYTES, check_file, within
 from gsl.core.validation import did_you_mean
 from gsl.errors import InputError
 from gsl.robots.frames import euler, rpy
@@ -18,7 +19,6 @@ from gsl.robots.urdf_remarks import remarks
 
 T = TypeVar("T")
 
-LARGEST = 20e6  # of a file that is read [bytes]
 PRIMITIVES = ("box", "sphere", "cylinder")
 TURNING = ("revolute", "continuous")
 _LIMITS = ("lower", "upper", "effort", "velocity")
@@ -91,9 +91,9 @@ def read_description(path: Path) -> Description:
 
 def _root(path: Path) -> xml.Element:
     try:
-        if path.stat().st_size > LARGEST:
-            raise InputError(f"{path}: is larger than {LARGEST / 1e6:g} MB; that is no URDF")
-        root = xml.parse(path).getroot()
+        check_file(path, URDF_BYTES)
+        with within(f"{path}: reading it"):
+            root = xml.parse(path).getroot()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except (xml.ParseError, ValueError, LookupError) as error:
@@ -106,6 +106,8 @@ def _root(path: Path) -> xml.Element:
     if left := next((text for node in root.iter() for text in _expressions(node)), ""):
         problem = f"holds an expression of xacro that was not replaced, {left[:40]}"
         raise InputError(f"{path}: {problem}; expand it first: xacro {path.name} > robot.urdf")
+    if (count := max(len(root.findall("joint")), len(root.findall("link")))) > JOINTS:
+        raise InputError(f"{path}: has {count:,} joints or links; {JOINTS} are read")
     return root
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from gsl.core.action_noise import ActionNoiseRun
 from gsl.core.seeds import grounding_generator
+from gsl.core.trust import TARGET, class_of
 from gsl.errors import GslError
 from gsl.runner.request import layout_of
 
@@ -54,7 +54,6 @@ def _told(episode: Mapping[str, Any]) -> Iterator[None]:
 
 
 def policy_of(request: Mapping[str, Any]) -> Any:
-    """Return the policy that a request names, built from the modules beside it."""
+    """Return the policy that a checked request names, built from the modules beside it."""
     settings = dict(request["policy"])
-    place, _, name = settings.pop("_target_").rpartition(".")
-    return getattr(importlib.import_module(place), name)(**settings)
+    return class_of(settings.pop(TARGET), "policy")(**settings)

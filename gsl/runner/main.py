@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from gsl.core.visible import visible
 from gsl.errors import GslError
 from gsl.runner import bounds, journal
 from gsl.runner.clock import Simulated, Wall
@@ -36,8 +37,8 @@ def main(folder: Path, words: Sequence[str]) -> int:
     parser.add_argument("--dry-run", action="store_true", help="play against a perfect robot; nothing is written")
     parser.add_argument("--yes", action="store_true", help="ask nothing")
     parser.add_argument("--unpaced", action="store_true", help="do not wait for the clock: for a simulated robot")
-    asked = parser.parse_args(words)
-    code = _run(folder, asked)
+    parser.add_argument("--trust", action="append", default=[], metavar="MODULE", help="whose policy may be run")
+    code = _run(folder, parser.parse_args(words))
     if is_stuck():  # what hangs may keep the process from its end as well
         os._exit(code)
     return code
@@ -49,7 +50,7 @@ def _run(folder: Path, asked: argparse.Namespace) -> int:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.default_int_handler)
     try:
-        request = read_request(folder)
+        request = read_request(folder, asked.trust)
         if asked.dry_run:
             return dry_run(request)
         with alone(folder):
@@ -68,7 +69,7 @@ def _run(folder: Path, asked: argparse.Namespace) -> int:
 def say(text: str) -> None:
     """Tell a person something."""
     with suppress(OSError):  # a terminal that is gone must not keep the robot from being brought back
-        sys.stdout.write(text + "\n")
+        sys.stdout.write(visible(text) + "\n")
         sys.stdout.flush()
 
 

@@ -8,7 +8,9 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from gsl.core.budget import read_json
 from gsl.core.layout import Layout
+from gsl.core.trust import TARGET, check_code, class_of
 from gsl.errors import ArtifactError
 from gsl.runner.plausible import request_problem
 
@@ -23,15 +25,30 @@ def hash_of(request: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def read_request(folder: Path) -> dict[str, Any]:
-    """Return the request of a folder.
+def read_request(folder: Path, trust: Collection[str] = ()) -> dict[str, Any]:
+    """Return the request of a folder; its policy is one of gsl's, or of a module that is trusted.
+
+    Raises:
+        ArtifactError: There is none, it is of another version, or it was changed.
+        ConfigError: Its policy is code of somebody else.
+    """
+    request = stored_request(folder)
+    if any("commands" not in episode for episode in request["episodes"]):
+        policy = request.get("policy")
+        check_code(policy, trust, "policy")
+        class_of(policy.get(TARGET) if isinstance(policy, Mapping) else None, "policy")
+    return request
+
+
+def stored_request(folder: Path) -> dict[str, Any]:
+    """Return the request of a folder to be compared with another; who acts on it needs `read_request`.
 
     Raises:
         ArtifactError: There is none, it is of another version, or it was changed.
     """
     path = folder / NAME
     try:
-        request = json.loads(path.read_text(encoding="utf-8"))
+        request = read_json(path)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise ArtifactError(folder, f"is no request: it holds no {NAME}") from error
     except ValueError as error:

@@ -48,16 +48,17 @@ class Answer:
         str | None, setting("CSV file: episode, distance in m or value, fell (yes or no)", min_length=1)
     ] = None
     episodes: Annotated[tuple[str, ...], setting("names of the logged episodes, in order; none for all of them")] = ()
+    trust: Annotated[tuple[str, ...], setting("modules of your own whose policy the request may name")] = ()
 
     def parents(self) -> Mapping[str, Path]:
         """Return the request and the files that answer it."""
-        read_request(Path(self.request))
+        read_request(Path(self.request), self.trust)
         files = {name: resolve(file) for name, file in (("logs", self.logs), ("returns", self.returns)) if file}
         return {**files, "request": Path(self.request) / NAME}
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the answer in the form that a request's folder is searched for."""
-        request = read_request(Path(self.request))
+        request = read_request(Path(self.request), self.trust)
         files = {role: path for role, path in self.parents().items() if role != "request"}
         if not files:
             raise ArtifactError(self.request, "there is nothing to take in: say logs=, returns= or both")

@@ -64,7 +64,7 @@ class Diagnose:
     held_out: Annotated[
         Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
     ] = field(default_factory=dict)
-    trust: Annotated[bool, setting("let the policies' files name classes that are not gsl's")] = False
+    trust: Annotated[tuple[str, ...], setting("modules of your own whose classes the policies' files may name")] = ()
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def __post_init__(self) -> None:

@@ -41,6 +41,7 @@ class Rehearse:
     world: Annotated[World, setting("what plays the robot's part")]
     tape: Annotated[bool, setting("measure distances with a tape: nothing of the base is logged")] = False
     episodes: Annotated[tuple[str, ...], setting("names of the episodes of this sitting; none for all")] = ()
+    trust: Annotated[tuple[str, ...], setting("modules of your own whose policy the request may name")] = ()
 
     def parents(self) -> Mapping[str, Path]:
         """Return the request."""
@@ -49,7 +50,7 @@ class Rehearse:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the answer."""
         place = Path(self.request)
-        request = read_request(place)
+        request = read_request(place, self.trust)
         _check_runner(place, request)
         layout = self.world.layout
         if list(layout.joints) != request["joints"] or layout.control_period != request["control_period"]:
@@ -60,7 +61,7 @@ class Rehearse:
         try:
             surrogate = Surrogate(request, env, layout, blind=self.tape)
             with console.progress(len(request["episodes"]), "rehearsing") as progress:
-                surrogate.serve(place, folder / ANSWER, self.episodes, progress)
+                surrogate.serve(place, folder / ANSWER, self.episodes, self.trust, progress)
         finally:
             env.close()
         if self.tape and request["distance"]:
@@ -83,7 +84,7 @@ class Surrogate:
         self._acting, self._fell, self._name = False, False, ""
         self.measured: dict[str, tuple[float, bool]] = {}
 
-    def serve(self, folder: Path, log: Path, episodes: Sequence[str], progress: Progress) -> None:
+    def serve(self, folder: Path, log: Path, episodes: Sequence[str], trust: Sequence[str], progress: Progress) -> None:
         """Run the runner of a folder until it ends.
 
         Raises:
@@ -92,6 +93,7 @@ class Surrogate:
         (to_us, from_runner), (to_runner, from_us) = os.pipe(), os.pipe()
         words = [sys.executable, "-I", str((folder / "runner.py").resolve()), f"--robot={bridge.__file__}"]
         words += [f"--log={log.resolve()}", "--yes", "--unpaced", *(f"--episode={name}" for name in episodes)]
+        words += [f"--trust={module}" for module in trust]
         environment = {**os.environ, bridge.PIPES: f"{to_runner},{from_runner}", "PYTHONDONTWRITEBYTECODE": "1"}
         with (
             tempfile.TemporaryFile() as said,  # a pipe that nobody empties would stop the runner

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import time
@@ -15,11 +14,15 @@ from typing import Any, ClassVar, Protocol
 
 import yaml
 
+from gsl.core.budget import read_json, read_text
 from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
 from gsl.core.own_code import package_of
+from gsl.core.trust import modules_in
 from gsl.core.unit import Unit
-from gsl.errors import ArtifactError, GslError
+from gsl.core.yaml_tree import yaml_tree
+from gsl.effects.effect import own
+from gsl.errors import ArtifactError, GslError, InputError
 from gsl.storage import documents, manifest
 from gsl.storage.identity import Identity, changes, content_hash, identify
 from gsl.storage.lineage import broken_link, out_of_date
@@ -68,22 +71,29 @@ class Artifact:
     @property
     def config(self) -> dict[str, Any]:
         """The resolved settings it was built with."""
-        return self._read(CONFIG, yaml.safe_load)
+        return self._read(CONFIG, lambda path: yaml_tree(path, read_text(path)))
 
     @property
     def metrics(self) -> dict[str, Any]:
         """The figures its stage reported; null where a number was not finite."""
-        return self._read(self.manifest.metrics, json.loads)
+        return self._read(self.manifest.metrics, read_json)
 
-    def _read(self, name: str, parse: Callable[[str], Any]) -> dict[str, Any]:
-        path = self.folder / name
+    def _read(self, name: str, read: Callable[[Path], Any]) -> dict[str, Any]:
+        path = self._inside(name)
         try:
-            stored = parse(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
+            stored = read(path)
+        except (OSError, ValueError, InputError) as error:
             raise ArtifactError(path, "is missing or damaged; build the artifact again with force=true") from error
         if not isinstance(stored, dict):
             raise ArtifactError(path, "is damaged: it holds no mapping; build the artifact again with force=true")
         return stored
+
+    def _inside(self, name: str) -> Path:
+        """Return a file of the artifact, which does not lead out of it."""
+        path = self.folder / name
+        if not path.resolve().is_relative_to(self.folder.resolve()):
+            raise ArtifactError(path, "leads out of the artifact; nothing of it is read")
+        return path
 
 
 def build(
@@ -208,7 +218,14 @@ def _work(
         created=created,
         duration=time.perf_counter() - begin,
         unit=_unit(stage),
+        trust=_trusted(stage, config),
     )
+
+
+def _trusted(stage: Stage, config: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the modules whose code took part and that are not gsl's."""
+    effects = [kind.__module__ for kind in own().values()]
+    return tuple(dict.fromkeys([*modules_in(config), *effects, *getattr(stage, "trust", ())]))
 
 
 def _unit(stage: Stage) -> dict[str, Any] | None:

@@ -8,7 +8,6 @@ An action is a row of desired joint positions [rad] in the order of `joints`; a 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.budget import read_json
 from gsl.core.validation import did_you_mean
 from gsl.errors import ArtifactError
 from gsl.policies.limits import Limits, breach, limits
@@ -76,7 +76,7 @@ def read_commands(path: Path, robot: Robot) -> Commands:
 
 def _document(path: Path) -> Mapping[str, Any]:
     try:
-        stored = json.loads(path.read_text(encoding="utf-8"))
+        stored = read_json(path)
     except FileNotFoundError as error:
         raise ArtifactError(path, "does not exist") from error
     except (ValueError, OSError) as error:

@@ -49,7 +49,7 @@ class Identity:
 
 MADE = ("forward_model", "inverse_model", "diagnosis", "servo", "model")
 """Settings that name a part of a grounding; a chain puts what it makes itself in their place."""
-WITHOUT_EFFECT = ("workers", "requests")  # settings of components on which no result depends
+WITHOUT_EFFECT = ("workers", "requests", "trust")  # settings of components on which no result depends
 
 
 def identify(

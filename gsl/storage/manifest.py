@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gsl.core.budget import ARTIFACT_BYTES, read_json
 from gsl.errors import ArtifactError
 from gsl.storage import documents
 from gsl.storage.hashing import contents_hash, file_hash
@@ -60,6 +60,7 @@ class Manifest:
         duration: Time the work took [s].
         links: The artifacts that it built beside itself, as an iteration does; their roles are their paths.
         metrics: Name of the file that holds the metrics.
+        trust: Modules that are not gsl's and whose code took part: what its settings name, and what `trust=` named.
         unit: How values of its task are shown (`gsl.core.unit.Unit`), None where there is no task.
         schema_version: Version of this contract.
     """
@@ -78,6 +79,7 @@ class Manifest:
     links: tuple[Parent, ...] = ()
     metrics: str = "metrics.json"
     unit: Mapping[str, Any] | None = None
+    trust: tuple[str, ...] = ()
     schema_version: int = SCHEMA_VERSION
 
     @property
@@ -94,8 +96,13 @@ def inventory(folder: Path) -> dict[str, File]:
 
 def damaged_file(folder: Path, manifest: Manifest) -> str | None:
     """Return the first file that is missing or not what the manifest says, None when the artifact's own are intact."""
+    place, total = folder.resolve(), sum(file.bytes for file in manifest.files.values())
+    if total > ARTIFACT_BYTES:
+        raise ArtifactError(folder, f"says that it holds {total:,} bytes; {ARTIFACT_BYTES:,} are read")
     for name, file in manifest.files.items():
         path = folder / name
+        if not path.resolve().is_relative_to(place):
+            raise ArtifactError(path, "leads out of the artifact; nothing of it is read")
         if not path.is_file() or path.stat().st_size != file.bytes or file_hash(path) != file.sha256:
             return name
     return None
@@ -132,7 +139,7 @@ def read(folder: Path) -> Manifest:
     if not folder.exists():
         raise ArtifactError(folder, "does not exist")
     try:
-        stored = json.loads((folder / NAME).read_text(encoding="utf-8"))
+        stored = read_json(folder / NAME)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise ArtifactError(folder, f"is no complete artifact: it holds no {NAME}") from error
     except OSError as error:
@@ -162,4 +169,10 @@ def _parsed(stored: dict[str, Any]) -> Manifest:
     files = {name: File(**file) for name, file in stored.pop("files").items()}
     parents = tuple(Parent(**parent) for parent in stored.pop("parents"))
     links = tuple(Parent(**link) for link in stored.pop("links", ()))
-    return Manifest(**stored, files=files, parents=parents, links=links)
+    trust = tuple(stored.pop("trust", ()))
+    for name in (*files, stored.get("metrics", Manifest.metrics)):
+        if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
+            raise ValueError(f"{name} is no file of the artifact")
+    if not all(isinstance(file.bytes, int) for file in files.values()):
+        raise ValueError("a size is no number")
+    return Manifest(**stored, files=files, parents=parents, links=links, trust=trust)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gsl.core.budget import read_json
 from gsl.errors import ArtifactError
 from gsl.storage import documents
 
@@ -72,7 +72,7 @@ def read_policies(path: Path) -> Policies:
         ArtifactError: It is missing, damaged, of another version, or a number in it is not finite.
     """
     try:
-        stored = json.loads(path.read_text(encoding="utf-8"))
+        stored = read_json(path)
     except FileNotFoundError as error:
         raise ArtifactError(path, "does not exist") from error
     except (ValueError, OSError) as error:

@@ -9,8 +9,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gsl.core.trust import modules_in
 from gsl.errors import ArtifactError
-from gsl.runner.request import NAME, SCHEMA_VERSION, hash_of, read_request
+from gsl.runner.request import NAME, SCHEMA_VERSION, hash_of, stored_request
 from gsl.storage import documents
 from gsl.storage.answers import answer_files
 from gsl.storage.bundle import RUNNER, bundled
@@ -90,7 +91,7 @@ def write_request(folder: Path, request: Mapping[str, Any], warnings: Sequence[s
             raise ArtifactError(
                 folder / NAME, "is missing beside an answer to it; put it back, or move the answer away"
             )
-        read_request(folder)
+        stored_request(folder)
         raise ArtifactError(found[0], "answers another request, which has changed since; move it away")
     files = files_of(request)
     with explained(folder.parent):
@@ -120,7 +121,7 @@ def restore(folder: Path, request: Mapping[str, Any]) -> bool:
 def _check_ours(folder: Path, new: Path) -> None:
     """Refuse a folder with a request that is damaged, or without one and with files of our names that are not ours."""
     if (folder / NAME).exists():
-        read_request(folder)
+        stored_request(folder)
         return
     for path in (path for path in sorted(new.rglob("*")) if path.is_file() and path.name != ROBOT):
         old = folder / path.relative_to(new)
@@ -160,6 +161,7 @@ def _limits(request: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _readme(request: Mapping[str, Any], warnings: Sequence[str]) -> str:
+    trust = "".join(f" --trust={module}" for module in modules_in(request["policy"]))
     joints = ", ".join(request["joints"])
     lines = [
         request["about"],
@@ -168,8 +170,8 @@ def _readme(request: Mapping[str, Any], warnings: Sequence[str]) -> str:
         f"Joints in order: {joints}",
         "",
         "1. fill in read() and send() of robot.py",
-        "2. python runner.py --dry-run      plays against a perfect robot: rates and extremes",
-        "3. python runner.py                plays on the robot, asks before every movement, writes answer.csv",
+        f"2. python runner.py{trust} --dry-run      plays against a perfect robot: rates and extremes",
+        f"3. python runner.py{trust}                plays on the robot, asks before every movement, writes answer.csv",
         "4. bring answer.csv (and returns.csv) back into this folder and type the gsl command again",
         "",
         *(["Beware:", *(f"- {one}" for one in warnings), ""] if warnings else []),

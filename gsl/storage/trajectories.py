@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gsl.core.budget import parse_json
 from gsl.core.trajectory import Batch
 from gsl.errors import TrajectoryError
 from gsl.storage import documents
@@ -111,7 +111,7 @@ def _stored_metadata(path: Path, table: pa.Table) -> Any:
             path, "has no metadata under the key `gsl`; it is no trajectory file; see docs/reference/files.md"
         )
     try:
-        return json.loads(stored)
+        return parse_json(stored)
     except ValueError as error:
         raise TrajectoryError(path, "the metadata key `gsl` is not JSON; write the file with gsl") from error
 

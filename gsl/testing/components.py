@@ -11,6 +11,7 @@ import numpy as np
 
 from gsl.core.described import described, rebuilt
 from gsl.core.setting import settings_of
+from gsl.core.trust import modules_in
 from gsl.errors import ConfigError
 
 
@@ -43,7 +44,8 @@ def check_component(component: Any) -> None:
         raise AssertionError(f"{type(component).__name__}: cannot go to a worker process ({error})") from error
     require(component, alike(described(again), described(component)), "is another one after pickling")
     try:
-        back = rebuilt(described(component), trust=True)
+        plain = described(component)
+        back = rebuilt(plain, trust=modules_in(plain))
     except ConfigError as error:
         raise AssertionError(f"{type(component).__name__}: cannot be built again from a file: {error}") from error
     require(component, alike(described(back), described(component)), "is another one when read from a file")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -91,12 +91,12 @@ def measured_parents(reference: str) -> dict[str, Path]:
     return parents
 
 
-def real_returns(reference: str, sim: BulletWorld, *, trust: bool = False) -> RealReturns:
+def real_returns(reference: str, sim: BulletWorld, *, trust: Collection[str] = ()) -> RealReturns:
     """Return the policies of an artifact of `evaluate` or `iterate` with their real returns, at most `MOST`.
 
     Raises:
         ArtifactError: There is none, or its policies are of another robot, task or control period than the simulator.
-        ConfigError: It names a class that is not gsl's although `trust` is not set.
+        ConfigError: It names a class that is not gsl's, and whose module is not in `trust`.
     """
     named = _resolved(reference)
     places = _iterations(named) if manifest.read(named).kind == _ITERATE else [named]

@@ -60,7 +60,8 @@ def as_trial(row: dict[str, Any]) -> Trial:
 def composed(typed: list[str]) -> Any:
     what, rest = (f"reproduce_{typed[1]}", typed[2:]) if typed[0] == "reproduce" else (typed[0], typed[1:])
     with opened(None):
-        return prepared(resolved(compose(what.replace("-", "_"), rest)))[0]
+        composition = compose(what.replace("-", "_"), rest)
+        return prepared(resolved(composition), composition.trust)[0]
 
 
 def test_pages_have_such_commands() -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import struct
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -10,9 +13,12 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.lib import format as npy
 
+from gsl.core.budget import HEADER_BYTES
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.sizes import check_need
 from gsl.storage.importers.table import missing_column
+
+_DAMAGED = (OSError, EOFError, zipfile.BadZipFile, zlib.error, struct.error)
 
 
 class ArrayTable:
@@ -26,7 +32,7 @@ class ArrayTable:
             with zipfile.ZipFile(path) as archive:
                 members = [info for info in archive.infolist() if info.filename.endswith(".npy")]
                 self.shapes = {info.filename.removesuffix(".npy"): _header(archive, info, path) for info in members}
-        except (zipfile.BadZipFile, EOFError, RuntimeError) as error:  # the last: encrypted, or packed in a way unknown
+        except (*_DAMAGED, RuntimeError) as error:  # the last: encrypted, or packed in a way unknown
             raise TrajectoryError(path, "is no npz archive, or truncated or damaged; copy it again") from error
         self.names: Sequence[str] = [name for name, (shape, _) in self.shapes.items() if shape]
         single = [name for name, (shape, kind) in self.shapes.items() if not shape and not kind.hasobject]
@@ -53,7 +59,7 @@ class ArrayTable:
         try:
             with np.load(self.path, allow_pickle=False) as archive:
                 return {name: archive[name] for name in names}
-        except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        except (*_DAMAGED, ValueError, KeyError) as error:
             raise TrajectoryError(self.path, f"is damaged: {error}; copy it again") from error
 
 
@@ -62,11 +68,16 @@ def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> tupl
     try:
         with archive.open(info) as file:
             return _declared(file)  # type: ignore[arg-type]
-    except ValueError as error:
+    except (ValueError, SyntaxError, TypeError, EOFError, zlib.error, MemoryError, RecursionError) as error:
         raise TrajectoryError(path, "is no numpy array; save it with numpy.savez", column=info.filename) from error
 
 
 def _declared(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    read = npy.read_array_header_1_0 if npy.read_magic(file) == (1, 0) else npy.read_array_header_2_0
-    shape, _, kind = read(file)
+    version = npy.read_magic(file)
+    size = file.read(2 if version == (1, 0) else 4)  # of the header, which is read at once, however long it says it is
+    if int.from_bytes(size, "little") > HEADER_BYTES:
+        raise ValueError(f"its header has {int.from_bytes(size, 'little'):,} bytes")
+    rest = io.BytesIO(size + file.read(int.from_bytes(size, "little")))
+    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, _, kind = read(rest)
     return shape, kind

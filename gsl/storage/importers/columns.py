@@ -38,8 +38,9 @@ def joints_of(mapping: LogMapping, table: Table) -> dict[str, str]:
     if not (isinstance(form, str) and form.count(_JOINT) == 1):
         raise ConfigError("mapping.joints", "has no value; name them in order, or say {joint} in the positions' column")
     before, after = form.split(_JOINT)
-    found = [re.fullmatch(f"{re.escape(before)}(.+){re.escape(after)}", name) for name in table.names]
-    names = [match.group(1) for match in found if match]
+    shortest = len(before) + len(after)
+    fitting = [one for one in table.names if one.startswith(before) and one.endswith(after) and len(one) > shortest]
+    names = [one[len(before) : len(one) - len(after)] for one in fitting]
     if not names:
         there = ", ".join(table.names[:12]) or "none"
         problem = f"is in no column; there is {there}; say in a mapping where things are (docs/howto/own-logs.md)"

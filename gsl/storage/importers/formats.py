@@ -10,7 +10,7 @@ from gsl.storage.importers.array_table import ArrayTable
 from gsl.storage.importers.bag_table import BagTable
 from gsl.storage.importers.json_table import LINES, JsonTable
 from gsl.storage.importers.parquet_table import ParquetTable
-from gsl.storage.importers.table import Table
+from gsl.storage.importers.table import Table, check_columns
 from gsl.storage.importers.text_table import TextTable
 
 TEXT, DOCUMENTS, BAGS = (".csv", ".tsv", ".txt"), (".json", *LINES), (".mcap", ".db3", ".bag")
@@ -34,7 +34,9 @@ def table(path: Path, *, topic: str, records: str, memory: float) -> Table:
         return BagTable(path, topic, memory)
     if not path.stat().st_size:
         raise TrajectoryError(path, "is empty; log it again")
-    return _reader(path, records, memory)()
+    found = _reader(path, records, memory)()
+    check_columns(path, found.names)
+    return found
 
 
 def _reader(path: Path, records: str, memory: float) -> Callable[[], Table]:

@@ -9,11 +9,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from gsl.core.budget import within
 from gsl.errors import ConfigError, InputError
 from gsl.storage.importers.formats import ENDS, is_bag, readable, stem
 from gsl.version import PACKAGE
 
 HOME = PACKAGE.parent
+MOST_FIELDS, MOST_SECONDS = 12, 2.0  # of a pattern of paths, and of CPU that it may take for a name
 
 
 class Place(NamedTuple):
@@ -60,8 +62,10 @@ def _found(source: str) -> tuple[Path, list[Path]]:
     path = Path(source)
     if path.is_dir():
         return (path.parent if is_bag(path) else path), [path]
-    if path.exists():
+    if path.is_file():
         return path.parent, [path]
+    if path.exists():
+        raise InputError(f"source = {source}: is no plain file")
     found = [Path(one) for one in sorted(glob.glob(source, recursive=True))]
     if not found:
         raise InputError(f"source = {source}: there is no such file, folder or pattern")
@@ -116,9 +120,12 @@ def fields_of(name: str, pattern: str) -> dict[str, str]:
     if not pattern:
         return {}
     parts = re.split(r"\{(\w+)\}", pattern)
+    if len(parts) // 2 > MOST_FIELDS:
+        raise ConfigError("mapping.path", f"names more than {MOST_FIELDS} parts", given=pattern)
     try:
         form = "".join(f"(?P<{part}>[^/]+?)" if index % 2 else re.escape(part) for index, part in enumerate(parts))
-        fitting = re.fullmatch(f"(?:.*/)?{form}", name)
+        with within("mapping.path: taking names apart", seconds=MOST_SECONDS):
+            fitting = re.fullmatch(f"(?:.*/)?{form}", name)
     except re.error as error:
         raise ConfigError("mapping.path", f"is no pattern: {error}", given=pattern) from error
     if fitting is None:

@@ -61,9 +61,12 @@ def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[R
     Raises:
         InputError: A file is missing something, or is empty, damaged or too large.
     """
-    tables = _tables(place, mapping, memory)
+    tables: dict[str, Table] = {}
     try:
+        tables |= _tables(place, mapping, memory)
         yield from _episodes(place, mapping, tables)
+    except RecursionError as error:
+        raise TrajectoryError(place.name, "is nested too deeply; it is no log") from error
     except TrajectoryError as error:
         raise _in_lines(error, tables.values()) from error
 

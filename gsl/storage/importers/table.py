@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from gsl.core.budget import COLUMNS
 from gsl.errors import TrajectoryError
 from gsl.storage.trajectory_contract import suggestion
 
@@ -32,6 +33,16 @@ class Table(Protocol):
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return columns that are there: numbers, truth values or texts (T,), or several numbers a row (T, n)."""
         ...
+
+
+def check_columns(path: Path, names: Sequence[str]) -> None:
+    """Refuse a table of more columns than any robot logs.
+
+    Raises:
+        TrajectoryError: It says how many there are.
+    """
+    if len(names) > COLUMNS:
+        raise TrajectoryError(path, f"has {len(names):,} columns; {COLUMNS:,} are read; cut what is no signal")
 
 
 def missing_column(table: Table, name: str, others: Collection[str] = ()) -> TrajectoryError:

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gsl.core.budget import repeated
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.sizes import check_need, opened
-from gsl.storage.importers.table import missing_column, numbers
+from gsl.storage.importers.table import check_columns, missing_column, numbers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,9 +42,9 @@ class TextTable:
         self.names: Sequence[str] = cells if self.header else [str(index) for index in range(len(cells))]
         values = _cells(second if self.header else first, self.separator)
         self.decimal = "," if self.separator != "," and any(map(_DECIMAL_COMMA.fullmatch, values)) else "."
-        for name in self.names:
-            if list(self.names).count(name) > 1:
-                raise TrajectoryError(path, "there are several columns of this name; keep one", column=name)
+        check_columns(path, self.names)
+        if (name := repeated(self.names)) is not None:
+            raise TrajectoryError(path, "there are several columns of this name; keep one", column=name)
 
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return the wanted columns, read in pieces."""

@@ -1,0 +1,76 @@
+"""The user's own word: the modules that he names on the command line, or in GSL_TRUST, and whose code may run."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any
+
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import ChoiceSweep, QuotedString
+from hydra.errors import HydraException
+
+from gsl.core.trust import TRUST, modules_in
+from gsl.errors import ConfigError
+
+VARIABLE = "GSL_TRUST"
+_MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
+_TRUTH = ("true", "false")
+
+
+def spoken(arguments: Sequence[str]) -> tuple[str, ...]:
+    """Return the modules that a command line names: in `trust=`, and wherever it says itself which class to take.
+
+    Args:
+        arguments: As they were typed.
+
+    Raises:
+        ConfigError: `trust` names no module.
+    """
+    named = [word for word in os.environ.get(VARIABLE, "").replace(",", " ").split()]
+    for key, value in _typed(arguments):
+        named += modules_of(value) if key == TRUST else modules_in({key.rpartition(".")[2]: value})
+    return tuple(dict.fromkeys(named))
+
+
+def modules_of(value: Any) -> tuple[str, ...]:
+    """Return the modules that a value of `trust` names, one or a list.
+
+    Raises:
+        ConfigError: One of them is no name of a module.
+    """
+    words = value if isinstance(value, list | tuple) else [value]
+    for word in words:
+        if not isinstance(word, str) or not _MODULE.fullmatch(word) or word in _TRUTH:
+            given = str(word).lower() if isinstance(word, bool) else str(word)
+            raise ConfigError(TRUST, "names the modules whose code may run, such as trust=my_module", given=given)
+    return tuple(words)
+
+
+def find_own_modules(trust: Collection[str]) -> None:
+    """Let modules of the current folder be imported once the user has named one; before that nothing in it is code."""
+    if trust and os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+
+
+def _typed(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    """Yield keys and values; what cannot be read is told by whoever composes."""
+    parser = OverridesParser.create()
+    for argument in arguments:
+        try:
+            override = parser.parse_override(argument)
+        except (HydraException, ValueError, RecursionError):
+            continue
+        value = override._value
+        for one in value.list if isinstance(value, ChoiceSweep) else [value]:
+            yield override.key_or_group, _plain(one)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, QuotedString):
+        return value.text
+    if isinstance(value, dict):
+        return {str(_plain(key)): _plain(one) for key, one in value.items()}
+    return [_plain(one) for one in value] if isinstance(value, list) else value

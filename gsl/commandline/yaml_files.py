@@ -1,0 +1,125 @@
+"""The yaml files of a configuration, of which those from elsewhere have a budget and do not touch hydra itself."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from hydra._internal.core_plugins.file_config_source import FileConfigSource
+from hydra._internal.sources_registry import SourcesRegistry
+from hydra.core.plugins import Plugins
+from hydra.plugins.config_source import ConfigResult, ConfigSource
+from omegaconf.errors import OmegaConfBaseException
+from omegaconf.grammar.gen.OmegaConfGrammarParser import OmegaConfGrammarParser
+from omegaconf.grammar_parser import parse
+
+from gsl.core.budget import read_text
+from gsl.core.trust import TRUST
+from gsl.core.yaml_tree import yaml_tree
+from gsl.errors import InputError
+
+USER = "gsl-user"
+_HYDRA = "hydra"
+_SELECT = "oc.select"  # a setting, or a value where there is none
+
+
+class BudgetedFiles(FileConfigSource):
+    """Reads yaml files as hydra does; a file that is not below our folders is checked before."""
+
+    @classmethod
+    def replace_hydras(cls) -> None:
+        """Have hydra read its files through this."""
+        SourcesRegistry.instance().types[cls.scheme()] = cls
+
+    def load_config(self, config_path: str) -> ConfigResult:
+        """Return what is in a file.
+
+        Raises:
+            InputError: A file from elsewhere is too large or damaged, or says what only the user can say.
+        """
+        path = Path(os.path.realpath(os.path.join(self.path, self._normalize_file_name(config_path))))
+        ours = path.is_relative_to(os.path.realpath(self.path))
+        if self.provider == USER or not ours:
+            check_file(path, config_path if ours else path.stem)
+        return super().load_config(config_path)
+
+
+def check_file(path: Path, name: str) -> None:
+    """Refuse a file that is too large, or that sets what only the user can set.
+
+    Args:
+        path: The file.
+        name: Below the folder of the configuration.
+
+    Raises:
+        InputError: It says why.
+    """
+    text = read_text(path)
+    tree = yaml_tree(path, text)
+    if not isinstance(tree, dict | None):
+        raise InputError(f"{path}: holds no settings by name")
+    settings = tree or {}
+    package = ConfigSource._get_header_dict(text[:512]).get("package") or ""
+    words = [*map(str, settings), *name.split("/"), package, *_words(settings.get("defaults"))]
+    if any(_HYDRA in word for word in words):
+        raise InputError(f"{path}: sets hydra itself, which can start programs; type such settings instead")
+    if resolver := next(_resolvers([tree]), ""):
+        raise InputError(f"{path}: refers to {resolver}; a file refers to settings, such as ${{sim.robot}}, alone")
+    if TRUST in settings or TRUST in package.split("."):
+        raise InputError(f"{path}: says {TRUST}, which only you can say, on the command line")
+
+
+def _words(value: Any) -> Iterator[str]:
+    if isinstance(value, dict):
+        yield from (str(key) for key in value)
+    for one in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from _words(one)
+    if isinstance(value, str):
+        yield value
+
+
+def _resolvers(value: Any) -> Iterator[str]:
+    """Yield references to anything but settings, such as the environment's variables."""
+    parts = [*value, *value.values()] if isinstance(value, dict) else value if isinstance(value, list) else [value]
+    for part in parts:
+        if isinstance(part, dict | list):
+            yield from _resolvers(part)
+        elif isinstance(part, str) and "${" in part and (name := _resolver(part)):
+            yield f"'{name}' in {part}"
+
+
+def _resolver(text: str) -> str:
+    """Return the name of what a text refers to beside settings; nothing if it does not."""
+    try:
+        waiting: list[Any] = [parse(text)]
+    except OmegaConfBaseException:
+        return ""  # it is told when it is resolved
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, OmegaConfGrammarParser.InterpolationResolverContext):
+            resolver: Any = node
+            name = str(resolver.resolverName().getText())
+            if name != _SELECT:
+                return name
+        waiting += list(getattr(node, "children", None) or ())
+    return ""
+
+
+def installed_plugins() -> Plugins:
+    """Return hydra's plugins; a folder hydra_plugins where the command is typed is not imported."""
+    with _without_current_folder():
+        return Plugins.instance()
+
+
+@contextmanager
+def _without_current_folder() -> Iterator[None]:
+    before, here = list(sys.path), os.getcwd()
+    sys.path[:] = [place for place in before if place and os.path.realpath(place) != os.path.realpath(here)]
+    try:
+        yield
+    finally:
+        sys.path[:] = before

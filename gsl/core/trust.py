@@ -1,0 +1,120 @@
+"""Which code a file may name: components of gsl, and the modules that the user himself has named.
+
+A word on the command line is the user's own. What stands in a file is not: it may name a component of gsl, or a class
+of a module that `trust=` names. Whatever builds objects from plain data asks here before anything is imported.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import is_dataclass
+from typing import Any
+
+from gsl.errors import ConfigError
+
+TARGET, TRUST = "_target_", "trust"
+ROBOT_FILES = (".urdf", ".xacro", ".xml", ".yaml", ".yml")
+"""Ends of a robot's name that make it a file."""
+
+_PACKAGES = ("gsl_benchmarks", "gsl_experiments")  # of gsl, beside it
+_ROOMS = (
+    *("effects", "grounding", "models", "optimizers", "policies", "robots", "stages", "storage.importers", "tasks"),
+    *("validation", "worlds", "studies", "blind"),
+)
+_OURS = (*_PACKAGES, *(f"gsl.{room}" for room in _ROOMS))
+_LABELS = "gsl.storage.importers."  # a mapping's `robot` says whose log it is, and builds none
+_NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)+")
+
+
+def _of_class(name: str) -> str:
+    return name.rpartition(".")[0]
+
+
+def _of_robot(name: str) -> str:
+    return "" if name.lower().endswith(ROBOT_FILES) else name.rpartition(".")[0]
+
+
+def _of_environment(name: str) -> str:
+    return name.partition(":")[0] if ":" in name else ""
+
+
+_MODULE: Mapping[str, Callable[[str], str]] = {TARGET: _of_class, "robot": _of_robot, "env_id": _of_environment}
+"""Settings that name code, and the module in such a name; an empty one imports nothing."""
+
+
+def code_in(told: Any, where: str = "") -> Iterator[tuple[str, str, str]]:
+    """Yield where plain data names code that is not gsl's: its dotted path, the name, and the module of it."""
+    if isinstance(told, Mapping):
+        entries = [(str(key), value) for key, value in told.items()]
+    elif isinstance(told, list | tuple):
+        entries = [(str(index), value) for index, value in enumerate(told)]
+    else:
+        return
+    labels = isinstance(told, Mapping) and str(told.get(TARGET)).startswith(_LABELS)
+    for key, value in entries:
+        path = f"{where}.{key}".lstrip(".")
+        if key in _MODULE and isinstance(value, str):
+            module = _MODULE[key](value)
+            if (module or key == TARGET) and not is_ours(module) and not (labels and key == "robot"):
+                yield path, value, module
+        else:
+            yield from code_in(value, path)
+
+
+def is_ours(module: str) -> bool:
+    """Whether components of a module may be named by any file."""
+    return _below(module, _OURS)
+
+
+def modules_in(told: Any) -> tuple[str, ...]:
+    """Return the modules that plain data names and that are not gsl's."""
+    return tuple(dict.fromkeys(module for _, _, module in code_in(told)))
+
+
+def check_code(told: Any, trust: Collection[str] = (), where: str = "", *, references: bool = False) -> None:
+    """Refuse plain data that names code of others.
+
+    Args:
+        told: What a file says.
+        trust: Modules whose code may be named, theirs below them included.
+        where: Dotted path of the data, for errors.
+        references: Whether a `${...}` stands for something that is checked once it is known.
+
+    Raises:
+        ConfigError: It names the setting and what to say to trust it.
+    """
+    foreign = [one for one in code_in(told, where) if not (references and "${" in one[1])]
+    if refused := [one for one in foreign if not _below(one[2], trust)]:
+        path, name, _ = refused[0]
+        wanted = dict.fromkeys(filter(None, [*trust, *(module for _, _, module in refused)]))
+        how = f"{TRUST}={next(iter(wanted), '')}" if len(wanted) < 2 else f"'{TRUST}=[{','.join(wanted)}]'"
+        raise ConfigError(path, f"is code that is not gsl's; say {how} if you know where it comes from", given=name)
+
+
+def class_of(name: Any, where: str = "") -> Any:
+    """Import a class whose name has been checked.
+
+    Raises:
+        ConfigError: It is not there, or is no class; one of gsl has to be a component, too.
+    """
+    place, _, attribute = str(name).rpartition(".")
+    setting = f"{where}.{TARGET}".lstrip(".")
+    if not _NAME.fullmatch(str(name)):
+        raise ConfigError(setting, "is no name of a class, which is module.Class", given=str(name))
+    try:
+        module = importlib.import_module(place)
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise ConfigError(setting, f"cannot be loaded: {reason}", given=str(name)) from error
+    found = getattr(module, attribute, None)
+    if not isinstance(found, type):
+        raise ConfigError(setting, f"cannot be loaded: {place} has no class {attribute}", given=str(name))
+    if is_ours(place) and not (is_dataclass(found) and is_ours(found.__module__)):
+        raise ConfigError(setting, "is no component of gsl", given=str(name))
+    return found
+
+
+def _below(module: str, places: Collection[str]) -> bool:
+    return any(f"{module}.".startswith(f"{place}.") for place in places)

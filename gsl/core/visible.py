@@ -1,0 +1,15 @@
+"""Text as a terminal may show it: what would steer the terminal, or turn the order of letters, is spelled out."""
+
+from __future__ import annotations
+
+import re
+
+_STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+
+
+def visible(text: str) -> str:
+    """Return a text in which only line ends and tabs are left of control characters; others are spelled as in JSON.
+
+    What was JSON is JSON afterwards, and says the same.
+    """
+    return _STEERING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
