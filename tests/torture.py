@@ -6,7 +6,6 @@ undisturbed run. Every case is drawn from the seed.
 
 from __future__ import annotations
 
-import contextlib
 import resource
 import shutil
 import subprocess
@@ -81,9 +80,12 @@ def kill(folder: Path, number: int, rng: np.random.Generator, counts: Counter[st
             whole[name] = time.monotonic() - begin, payloads(run)
             shutil.rmtree(run)
         seconds, wanted = whole[name]
-        with started(*command, folder=folder) as process, contextlib.suppress(subprocess.TimeoutExpired):
-            process.communicate(timeout=seconds * rng.uniform(0.3, 1.0))  # before that there is nothing but imports
-        counts["kills"] += 1
+        with started(*command, folder=folder) as process:
+            try:
+                process.communicate(timeout=seconds * rng.uniform(0.3, 1.0))  # before that there is nothing but imports
+                counts["kills that came too late"] += 1
+            except subprocess.TimeoutExpired:
+                counts["kills"] += 1
         counts["! damaged after a kill"] += bool(run.exists() and [*run.rglob("manifest.json")]) and (
             gsl("verify", "k", folder=folder).code != 0
         )
