@@ -29,7 +29,7 @@ from gsl.commandline.yaml_files import USER, BudgetedFiles, installed_plugins
 from gsl.core.setting import Setting
 from gsl.core.trust import TARGET, check_code, is_ours
 from gsl.core.validation import did_you_mean
-from gsl.effects.effect import names
+from gsl.effects.effect import names, withheld
 from gsl.errors import ConfigError, InputError
 
 REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
@@ -164,7 +164,7 @@ def _check_effects(composition: Composition) -> None:
             continue
         node = OmegaConf.select(composition.config, path)
         if not (isinstance(node, DictConfig) and TARGET in node):
-            raise ConfigError(path, f"no such effect{did_you_mean(name, names())}")
+            raise withheld(name) or ConfigError(path, f"no such effect{did_you_mean(name, names())}")
 
 
 def _check_referred(command: str, composition: Composition) -> None:

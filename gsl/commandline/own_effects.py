@@ -18,19 +18,28 @@ GROUP = "effect"
 def load_own_effects(folder: Path | None, trust: Collection[str]) -> None:
     """Have the effects of a user's folder stand beside the library's; without a folder, none.
 
+    One of a module that is not trusted is withheld: only a command that names it fails.
+
     Raises:
-        ConfigError: A file does not name an effect, or one of a module that is not trusted.
+        ConfigError: A file does not name an effect.
     """
-    files = sorted((folder / GROUP).glob("*.yaml")) if folder is not None else []
+    classes: dict[str, type] = {}
+    refused: dict[str, ConfigError] = {}
     find_own_modules(trust)
-    use_own({path.stem: _named_class(path, trust) for path in files})
+    for path in sorted((folder / GROUP).glob("*.yaml")) if folder is not None else []:
+        content, where = _read(path), f"{GROUP}/{path.name}"
+        try:
+            check_code(content, trust, where)
+        except ConfigError as error:
+            refused[path.stem] = error
+        else:
+            classes[path.stem] = class_of(content[TARGET], where)
+    use_own(classes, refused)
 
 
-def _named_class(path: Path, trust: Collection[str]) -> type:
-    where = f"{GROUP}/{path.name}"
+def _read(path: Path) -> dict[str, str]:
     content = yaml_tree(path, read_text(path))
     if not isinstance(content, dict) or content.keys() != {TARGET}:
-        raise ConfigError(where, "has one line, `_target_: module.Class`; defaults stand in the class")
-    check_code(content, trust, where)
-    kind: type = class_of(content[TARGET], where)
-    return kind
+        problem = "has one line, `_target_: module.Class`; defaults stand in the class"
+        raise ConfigError(f"{GROUP}/{path.name}", problem)
+    return content

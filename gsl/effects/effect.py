@@ -46,13 +46,15 @@ class Effect(Protocol):
 
 
 _OWN: dict[str, type] = {}  # effects of a user's own in this process, by name
+_WITHHELD: dict[str, ConfigError] = {}  # those that may not be used, with what to do
 
 
-def use_own(classes: Mapping[str, type]) -> None:
+def use_own(classes: Mapping[str, type], refused: Mapping[str, ConfigError] | None = None) -> None:
     """Have effects of a user's own stand beside the library's from now on, or before one of the same name.
 
     Args:
         classes: By name; those of before are forgotten.
+        refused: What is raised for others that are named.
 
     Raises:
         ConfigError: One of them is no effect, or could not be searched.
@@ -61,11 +63,18 @@ def use_own(classes: Mapping[str, type]) -> None:
         check_own(name, kind)
     _OWN.clear()
     _OWN.update(classes)
+    _WITHHELD.clear()
+    _WITHHELD.update(refused or {})
 
 
 def own() -> Mapping[str, type]:
     """Return the effects of a user's own, by name."""
     return dict(_OWN)
+
+
+def withheld(name: str) -> ConfigError | None:
+    """Return why an effect of a user's own may not be used, None of any other name."""
+    return _WITHHELD.get(name)
 
 
 def check_own(name: str, kind: Any) -> None:
@@ -109,6 +118,8 @@ def effect_class(name: str) -> type:
     """
     if name in _OWN:
         return _OWN[name]
+    if name in _WITHHELD:
+        raise _WITHHELD[name]
     if name not in names():
         near = difflib.get_close_matches(name, names(), 1)
         hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names())}"
