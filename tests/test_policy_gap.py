@@ -24,7 +24,7 @@ from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.rollout.parallel import Job, episodes
 from gsl.rollout.rollout import Scenario
-from gsl.storage.manifest import inventory
+from gsl.storage import manifest
 from gsl.storage.policies import write_policies
 from gsl.storage.policy_choice import EVALUATION, policies, record
 from gsl.tasks.arm import Arm
@@ -234,9 +234,7 @@ def rewritten(folder: Path, name: str, change: tuple[str, str]) -> None:
     config = place / "config.yaml"
     assert change[0] in config.read_text()
     config.write_text(config.read_text().replace(*change))
-    stored = json.loads((place / "manifest.json").read_text())
-    stored["files"] = {key: vars(one) for key, one in inventory(place).items()}
-    (place / "manifest.json").write_text(json.dumps(stored))
+    manifest.write(place, replace(manifest.read(place), files=manifest.inventory(place)))
 
 
 @pytest.mark.parametrize(
