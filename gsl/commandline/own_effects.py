@@ -15,10 +15,13 @@ from gsl.errors import ConfigError
 GROUP = "effect"
 
 
-def load_own_effects(folder: Path | None, trust: Collection[str]) -> None:
+def load_own_effects(folder: Path | None, trust: Collection[str]) -> list[ConfigError]:
     """Have the effects of a user's folder stand beside the library's; without a folder, none.
 
     One of a module that is not trusted is withheld: only a command that names it fails.
+
+    Returns:
+        Why effects are withheld, one reason each.
 
     Raises:
         ConfigError: A file does not name an effect.
@@ -35,6 +38,7 @@ def load_own_effects(folder: Path | None, trust: Collection[str]) -> None:
         else:
             classes[path.stem] = class_of(content[TARGET], where)
     use_own(classes, refused)
+    return list(refused.values())
 
 
 def _read(path: Path) -> dict[str, str]:

@@ -43,7 +43,8 @@ def run(
     flags = [*(["--multirun"] if multirun else []), *([f"--config-dir={config_dir}"] if config_dir else [])]
     line = shlex.join(["gsl", *command.split(), *flags, *overrides])
     with opened(config_dir):
-        load_own_effects(config_dir, spoken(overrides))
+        for reason in load_own_effects(config_dir, spoken(overrides)):
+            console.status(f"left out: {reason}")
         composition = compose(command, overrides, multirun=multirun)
         if cfg:
             console.result(resolved(composition), text=OmegaConf.to_yaml(OmegaConf.create(resolved(composition))))
