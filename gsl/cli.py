@@ -195,7 +195,7 @@ def call(arguments: Sequence[str]) -> int:
     except SystemExit as leaving:
         return int(leaving.code or 0)
     except (Exception, KeyboardInterrupt) as failure:
-        return _told(failure, console, _command(arguments))
+        return _report_failure(failure, console, _command(arguments))
 
 
 def _command(arguments: Sequence[str]) -> str:
@@ -204,7 +204,7 @@ def _command(arguments: Sequence[str]) -> str:
     return " ".join(["gsl", *words[: 1 + (bool(words) and is_group(words[0]))]])
 
 
-def _told(failure: BaseException, console: Console, command: str) -> int:
+def _report_failure(failure: BaseException, console: Console, command: str) -> int:
     usage: Callable[[], str] | None = getattr(failure, "format_message", None)
     if usage is not None:
         return console.error(" ".join(usage().split()), 2, command=command)

@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant, nominal
 from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, ServoLaw
 from gsl.diagnosis.log.records import Pieces, Record, cut_pieces, slope
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
 from gsl.worlds.held import Held
 
 STEP, PERIOD = 0.002, 0.02
-NAO = lumped(nao())
+NAO = lump(nao())
 EVERYTHING = {
     "smoothing": 0.01, "play": 0.01, "compliance": 0.01, "delay": 0.013, "sensor_delay": 0.005, "quantum": 0.001,
     "coulomb": 0.05, "stribeck": 0.05, "load_friction": 0.05, "duty_loss": 0.1, "fade": 0.1, "deadband": 0.002,
@@ -31,7 +31,7 @@ def with_fields(robot: Robot, given: Mapping[str, float]) -> Plant:
 
 def with_effects(effects: Mapping[str, Any]) -> Plant:
     """NAO with effects."""
-    return applied(nominal(NAO), built(effects))
+    return apply_all(nominal(NAO), build(effects))
 
 
 def law(plant: Plant, *, lag: float = 0.0, weights: float = 0.0, last: float = 0.0, seed: int = 0) -> ServoLaw:

@@ -15,7 +15,7 @@ from gsl.core.body import Robot
 from gsl.core.interfaces import REAL, Policy, Task
 from gsl.errors import Waiting
 from gsl.grounding.ane import ActionNoise
-from gsl.real_robot.errand import Errand, Order, asked
+from gsl.real_robot.errand import Errand, Order, ask
 from gsl.robots.catalogue import robot
 from gsl.rollout.parallel import Job
 from gsl.rollout.rollout import Scenario
@@ -37,7 +37,7 @@ def requested(
     orders = [Order(name, Job(theta, index)) for index, (name, theta) in enumerate(thetas.items())]
     errand = Errand("", "A test.", until_fall=False, logs=True)
     try:
-        asked(scenario, orders, errand, workers=1, console=QUIET)
+        ask(scenario, orders, errand, workers=1, console=QUIET)
     except Waiting as waiting:
         return waiting.request
     raise AssertionError("nobody has answered")

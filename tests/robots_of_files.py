@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.dynamics import forward_kinematics, jacobian
 from gsl.worlds.engine import quiet
 
 
 def holding(body: Robot, angles: dict[str, float]) -> np.ndarray:
     """Torques that hold a pose against gravity [N·m], as sums of textbook Jacobians."""
-    body = lumped(body)
+    body = lump(body)
     frames, total = forward_kinematics(body, angles), np.zeros(len(body.motors))
     for link in body.links.values():
         total += 9.81 * link.mass * jacobian(body, frames, link.name, link.com)[1][2, 6:]

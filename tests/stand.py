@@ -7,9 +7,9 @@ import numpy as np
 
 from gsl.core.body import Joint, Link, Robot
 from gsl.core.plant import nominal
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.worlds.servo import encoder_motion, servo_torque
-from gsl.worlds.servo_state import OUTPUT_ARMATURE, first_state, packed
+from gsl.worlds.servo_state import OUTPUT_ARMATURE, first_state, pack
 
 STEP, PERIOD = 0.002, 0.02
 KP, KD, LIMIT, NO_LOAD, ARMATURE, REACH = 20.0, 1.0, 3.0, 7.0, 0.007, 2.0
@@ -65,8 +65,8 @@ def run(
         every_step: Log every physics step, the start left out.
         **of_robot: For `robot`.
     """
-    plant = applied(nominal(robot(**of_robot)), built(effects))
-    parameters, n = packed(plant.servo, plant.robot.supply_voltage), len(plant.robot.motors)
+    plant = apply_all(nominal(robot(**of_robot)), build(effects))
+    parameters, n = pack(plant.servo, plant.robot.supply_voltage), len(plant.robot.motors)
     paths = np.broadcast_to(targets[:, None] if targets.ndim == 1 else targets, (len(targets), n))
     motion, torque = np.array([paths[0], np.zeros(n)]), np.zeros(n)
     state, rows = first_state(paths[:1], motion, STEP), []

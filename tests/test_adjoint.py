@@ -17,7 +17,7 @@ from gsl.training.frozen import Frozen, freeze, heavier
 from gsl.training.gradient import NUMBERS, Gradient
 from gsl.training.replay_path import LOST
 from gsl.worlds.held import Held, Windows
-from gsl.worlds.servo_state import OUTPUT_ARMATURE, packed
+from gsl.worlds.servo_state import OUTPUT_ARMATURE, pack
 
 SUBSTEPS, ROBUST = round(PERIOD / STEP), 3.0
 N, JOINTS = len(NAO.motors), len(NAO.controlled)
@@ -54,7 +54,7 @@ def told() -> Pieces:
 
 def gradient_of(plant: Plant, data: Frozen, added: ServoLaw) -> tuple[float, Gradient]:
     to = Gradient(np.zeros((NUMBERS, N)), *(np.zeros_like(field) for field in added[3:]))
-    servos = packed(plant.servo, NAO.supply_voltage, added)
+    servos = pack(plant.servo, NAO.supply_voltage, added)
     return cost_and_gradient(servos, data, np.arange(len(data.clock)), STEP, SUBSTEPS, ROBUST, to), to
 
 
@@ -98,8 +98,8 @@ def test_derivatives_by_the_numbers_are_those_of_differences(name: str, told: Pi
         def cost(change: np.ndarray, number: str = number) -> float:
             value = getattr(plant.servo, number)
             other = plant.with_servo(**{number: value * np.exp(change) if number in FACTORS else value + change})
-            carried = packed(other.servo, NAO.supply_voltage).rows[OUTPUT_ARMATURE]
-            more = carried - packed(plant.servo, NAO.supply_voltage).rows[OUTPUT_ARMATURE]
+            carried = pack(other.servo, NAO.supply_voltage).rows[OUTPUT_ARMATURE]
+            more = carried - pack(plant.servo, NAO.supply_voltage).rows[OUTPUT_ARMATURE]
             return gradient_of(other, heavier(data, more), added)[0]
 
         ahead = number in ("delay", "deadband", "coulomb") and number not in BASES[name]  # they are never below zero
@@ -149,7 +149,7 @@ def test_frozen_links_move_as_the_chain_does_where_the_replay_is_right(name: str
     data = freeze(plant, replace(some, real=chain, warm_up=0), FLOOR, PERIOD)
     silent = law(plant)
     to = Gradient(np.zeros((NUMBERS, N)), *(np.zeros_like(field) for field in silent[3:]))
-    servos, wide = packed(plant.servo, NAO.supply_voltage, silent), 1e6  # all residuals count by their squares
+    servos, wide = pack(plant.servo, NAO.supply_voltage, silent), 1e6  # all residuals count by their squares
     cost = cost_and_gradient(servos, data, np.arange(len(some)), STEP, SUBSTEPS, wide, to)
     assert np.sqrt(cost / chain.size) < 0.1
 

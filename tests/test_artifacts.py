@@ -141,7 +141,7 @@ def test_force_replaces_only_when_the_new_one_is_complete(out: Path) -> None:
     with pytest.raises(RuntimeError):
         built(Doubling(2, ending=raising(RuntimeError())), out, force=True)
     assert (out / "sub/payload.txt").read_text() == "11"
-    assert manifest.damaged_file(out, manifest.read(out)) is None
+    assert manifest.find_damage(out, manifest.read(out)) is None
     built(Doubling(2), out, force=True)
     assert (out / "sub/payload.txt").read_text() == "22"
     assert not hidden(out.parent)
@@ -452,7 +452,7 @@ def test_every_flipped_bit_of_a_manifest_is_seen_and_force_mends_it(out: Path) -
     with pytest.raises(ArtifactError, match=r"manifest\.json: is damaged.*force=true"):
         built(Doubling(), out)
     built(Doubling(), out, force=True)
-    assert manifest.damaged_file(out, manifest.read(out)) is None
+    assert manifest.find_damage(out, manifest.read(out)) is None
 
 
 def test_a_manifest_without_files_hides_no_damage(out: Path) -> None:

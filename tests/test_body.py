@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gsl.core.body import Joint, Link, Robot, lumped, rotation, with_mass
+from gsl.core.body import Joint, Link, Robot, lump, rotation, with_mass
 from gsl.core.dynamics import forward_kinematics
 from gsl.robots.nao import nao
 
@@ -21,8 +21,8 @@ def moments(robot: Robot) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def test_welding_fixed_joints_keeps_mass_centre_of_mass_and_inertia() -> None:
-    whole, welded = moments(nao()), moments(lumped(nao()))
-    assert all(joint.fixed_at is None for joint in lumped(nao()).joints)
+    whole, welded = moments(nao()), moments(lump(nao()))
+    assert all(joint.fixed_at is None for joint in lump(nao()).joints)
     for before, after in zip(whole, welded, strict=True):
         np.testing.assert_allclose(after, before, rtol=1e-12, atol=1e-15)
 
@@ -46,7 +46,7 @@ def welded_and_hinged(held_at: float) -> Robot:
 
 
 def test_what_moves_on_a_welded_link_moves_on_the_one_that_carries_it() -> None:
-    body = lumped(welded_and_hinged(0.0))
+    body = lump(welded_and_hinged(0.0))
     (hinge,) = body.joints
     assert (hinge.parent, hinge.child, [*body.links]) == ("a", "c", ["a", "c"])
     np.testing.assert_allclose(hinge.origin, [0.6, 0.0, 0.2])
@@ -55,7 +55,7 @@ def test_what_moves_on_a_welded_link_moves_on_the_one_that_carries_it() -> None:
 
 def test_nothing_may_move_on_a_link_that_is_held_at_an_angle() -> None:
     with pytest.raises(ValueError, match="hinge moves on b"):
-        lumped(welded_and_hinged(0.2))
+        lump(welded_and_hinged(0.2))
 
 
 def test_rotation_agrees_with_the_rotation_vector() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from learned_servos import EVERYTHING, lawful, some_law, with_fields
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.dynamics import forward_kinematics, jacobian, mass_matrix
 from gsl.core.lanes import LANES
 from gsl.core.plant import Plant, Push, nominal
@@ -20,7 +20,7 @@ from gsl.worlds.servo_state import COMMANDS, first_state
 from gsl.worlds.start import resting
 
 PERIOD, STEP = 0.02, 0.002
-NAO = lumped(nao())
+NAO = lump(nao())
 
 
 def with_heavy_links(robot: Robot) -> Robot:
@@ -51,7 +51,7 @@ def window(targets: np.ndarray) -> Windows:
 
 def in_bullet(plant: Plant, targets: np.ndarray, step: float) -> np.ndarray:
     engine = Engine(plant, Physics(step, 50, PERIOD, floating=False))
-    start = resting(lumped(plant.robot), targets[0], targets[0], floating=False)
+    start = resting(lump(plant.robot), targets[0], targets[0], floating=False)
     engine.load(start.reading, start.commands)
     seen = []
     for target in targets:

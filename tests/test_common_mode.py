@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.hypothesis.candidates import library
@@ -13,12 +13,12 @@ from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.reference import Nominal
 from gsl.diagnosis.search.stepwise import Search
 from gsl.diagnosis.simulate.calibration import COULOMB, KD, no_shifts
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
 from gsl.worlds.held import Held
 
 PERIOD = 0.02
-NAO = lumped(nao())
+NAO = lump(nao())
 MASKS = {"all": np.ones(15, dtype=bool), "legs": np.arange(15) < 11, "arms": np.arange(15) >= 11}
 
 
@@ -52,7 +52,7 @@ def test_friction_that_differs_between_legs_and_arms_is_told_apart() -> None:
     paths = [0.2 * np.sin(2 * np.pi * f * time)[:, None] * np.ones(len(NAO.motors)) for f in (0.4, 0.7, 1.0, 1.4)]
     paths = [path + np.array([NAO.stance.get(motor, 0.0) for motor in NAO.motors]) for path in paths]
     rng = np.random.default_rng(0)
-    played = Held.of(applied(plant, built(effects)), 0.002, PERIOD).play(paths, [path[0] for path in paths], 25)
+    played = Held.of(apply_all(plant, build(effects)), 0.002, PERIOD).play(paths, [path[0] for path in paths], 25)
     logged = [told[:, :15] + 0.001 * rng.standard_normal((len(told), 15)) for told in played]
     episodes = tuple(
         Trajectory(PERIOD * np.arange(151), path[:, :15], told, np.zeros_like(told))

@@ -10,7 +10,7 @@ import pytest
 from bodies import held
 from scenarios import QUIET
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.dynamics import gravity_torque, mass_matrix
 from gsl.core.grounding import gain
 from gsl.core.history import History, windows
@@ -24,7 +24,13 @@ from gsl.models.forward import ForwardModel
 from gsl.models.inverse import Solver
 from gsl.models.network import Network
 from gsl.validation.compliance import AMPLITUDE, FREQUENCY, MOST, Compliance, measure, rounds, stance
-from gsl.validation.compliance_transfer import SECTION, ComplianceReport, report_compliance, transferred, with_real
+from gsl.validation.compliance_transfer import (
+    SECTION,
+    ComplianceReport,
+    compute_transfers,
+    report_compliance,
+    with_real,
+)
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.held import Held
 from gsl.worlds.servo import BRISTLE
@@ -47,7 +53,7 @@ def of(effects: dict) -> Compliance:
 
 def closed_form(plant: Plant) -> np.ndarray:
     """Impedance at each motor of PD servos on a tree of rigid bodies in the stance, from the textbook's matrices."""
-    robot, servo, angles = lumped(plant.robot), plant.servo, stance(plant.robot)[plant.robot.drive]
+    robot, servo, angles = lump(plant.robot), plant.servo, stance(plant.robot)[plant.robot.drive]
 
     def weight(at: np.ndarray) -> np.ndarray:
         return gravity_torque(robot, dict(zip(robot.motors, at, strict=True)), plant.gravity)
@@ -85,7 +91,7 @@ def test_dry_friction_adds_the_describing_function_of_a_bristle_that_slips() -> 
 
 
 def test_a_joint_gives_way_where_its_torque_limit_and_its_weight_say() -> None:
-    robot = lumped(held().plant.robot)
+    robot = lump(held().plant.robot)
     angles = dict(zip(robot.motors, stance(robot)[robot.drive], strict=True))
     weight = np.abs(gravity_torque(robot, angles, held().plant.gravity))
     assert (
@@ -100,14 +106,14 @@ def test_a_joint_that_does_not_give_way_has_the_greatest_load() -> None:
 
 def test_without_grounding_nothing_is_handed_over_and_with_the_true_effects_everything() -> None:
     real = {**SOFT, **WEAK}
-    for share in transferred(of({}), of({}), of(real)).values():
+    for share in compute_transfers(of({}), of({}), of(real)).values():
         assert share == pytest.approx((0.0, 0.0, 0.0))
-    for share in transferred(of({}), of(real), of(real)).values():
+    for share in compute_transfers(of({}), of(real), of(real)).values():
         assert share == pytest.approx((1.0, 1.0, 1.0))
 
 
 def test_where_simulator_and_robot_do_not_differ_there_is_no_share() -> None:
-    for share in transferred(of({}), of({}), of(WEAK)).values():
+    for share in compute_transfers(of({}), of({}), of(WEAK)).values():
         assert share.stiffness is None and share.impedance is None and share.torque == pytest.approx(0.0)
     assert "legs: stiffness no difference, strength 0.00" in ComplianceReport(of({}), of({}), of(WEAK)).told
 
@@ -156,7 +162,7 @@ def test_models_that_know_how_joints_move_hand_over_little_of_how_they_yield() -
     by_action = simulator.network.layers[0][0][:, : len(simulator.joints)]
     grounding = LoadedTransformation(forward, Solver(simulator, gain(by_action, 0.2), 0.2))
     found = measure(held(), grounding, 1)
-    for share in transferred(of({}), found, of(real)).values():
+    for share in compute_transfers(of({}), found, of(real)).values():
         assert share.stiffness is not None and -0.2 < share.stiffness < 0.3
         assert share.impedance is not None and share.impedance < 0.3
     assert (np.abs(found.torque - of({}).torque) < 0.05 * EFFORT).all()

@@ -9,12 +9,12 @@ import yaml
 from example_stage import ExampleWorld
 
 from gsl.cli import call
-from gsl.commandline.composer import compose, configuration_folder, opened
-from gsl.commandline.config import prepared, resolved
+from gsl.commandline.composer import compose, configuration_folder, open_hydra
+from gsl.commandline.config import prepare, resolve
 from gsl.commandline.failure import describe_failure
 from gsl.commandline.multirun import job_level
 from gsl.commandline.plugins import folders
-from gsl.core.described import described, rebuilt
+from gsl.core.described import describe, rebuilt
 from gsl.errors import ConfigError
 
 CONF = Path(__file__).parent / "conf_example"
@@ -310,11 +310,11 @@ def _typed(group: str, conf: Path, command: str) -> list[str]:
 @pytest.mark.parametrize("line", list(_choices()), ids=" ".join)
 def test_every_option_of_ours_composes_and_builds(line: tuple[str, ...]) -> None:
     command, *choices = line
-    with opened(None):
+    with open_hydra(None):
         composition = compose(command, choices)
-        stage, settings, _ = prepared(resolved(composition), composition.trust)
+        stage, settings, _ = prepare(resolve(composition), composition.trust)
     assert stage.kind in (command.replace("-", "_"), command.partition("-")[0])
-    assert rebuilt(described(stage), trust=composition.trust) == stage
+    assert rebuilt(describe(stage), trust=composition.trust) == stage
     assert not {"preset", "recipe", "name", "out"} & settings.keys()
 
 

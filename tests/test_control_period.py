@@ -7,7 +7,7 @@ import pytest
 from learned_servos import lawful, some_law
 
 from gsl.core.plant import nominal
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
 from gsl.worlds.bullet_c import NO_HANDLE, client_handle
 from gsl.worlds.engine import Engine
@@ -46,7 +46,7 @@ def test_compiled_and_python_agree_to_the_bit(floating: bool, learned: bool) -> 
 
 @pytest.mark.parametrize("floating", [True, False])
 def test_torque_noise_is_the_same_to_the_bit_in_both(floating: bool) -> None:
-    plant = applied(nominal(nao()), built({"torque_noise": {"step": 0.3, "constant": 0.1}}))
+    plant = apply_all(nominal(nao()), build({"torque_noise": {"step": 0.3, "constant": 0.1}}))
     engine = Engine(plant, Physics(0.002, 50, 0.02, floating=floating))
     if engine.handle == NO_HANDLE:
         pytest.skip("this build of pybullet does not tell where its clients are")

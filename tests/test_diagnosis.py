@@ -22,7 +22,7 @@ from gsl.diagnosis.search.screening import _between
 from gsl.diagnosis.simulate import calibration
 from gsl.diagnosis.verdict.document import document
 from gsl.diagnosis.verdict.findings import Findings
-from gsl.effects.effect import SCOPE, Scope, applied, built, scope, use_own
+from gsl.effects.effect import SCOPE, Scope, apply_all, build, scope, use_own
 from gsl.report.diagnosis_text import summary_lines
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo_state import COMMANDS
@@ -66,7 +66,7 @@ def log(effects: Mapping[str, Any], seed: int = 1, *, jitter: float = 1.0, noise
     rng, robot = np.random.default_rng(seed), arm()
     drawn = calibration.SPREADS[:, None] * rng.standard_normal((len(calibration.SPREADS), 2)) * 0.7 * jitter
     drawn[calibration.COULOMB] = np.abs(drawn[calibration.COULOMB])
-    held = Held.of(calibration.calibrate(applied(nominal(robot), built(effects)), drawn), 0.002, PERIOD)
+    held = Held.of(calibration.calibrate(apply_all(nominal(robot), build(effects)), drawn), 0.002, PERIOD)
     played = motions()
     names = [*played, "steps_a"]
     return Batch(
@@ -229,7 +229,7 @@ def test_the_diagnosed_world_moves_as_the_robot() -> None:
     effects = {"servo_gain": {"kp": 0.6}}
     result = found(effects)
     exp = result.log
-    world: Plant = applied(nominal(arm()), built(result.effects))
+    world: Plant = apply_all(nominal(arm()), build(result.effects))
     told = replace(result.simulator, plant=world).simulate({}, calibration.no_shifts(2), exp.pieces)
     left = exp.comparison.floor * exp.comparison.residual(told, exp.pieces)
     assert np.sqrt(np.mean(left**2)) < 1.1 * NOISE
@@ -303,7 +303,7 @@ def test_the_library_is_tried_whole_but_for_what_is_left_out() -> None:
     assert names - {candidate.effect for candidate in library(arm(), ("backlash",))} == {"backlash"}
     for candidate in library(arm()):
         for parameters in candidate.grid:
-            applied(nominal(arm()), built({candidate.effect: candidate.entry(parameters)}))
+            apply_all(nominal(arm()), build({candidate.effect: candidate.entry(parameters)}))
 
 
 def test_threads_do_not_change_the_answer() -> None:

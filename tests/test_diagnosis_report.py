@@ -16,12 +16,12 @@ from gsl.report.console import Console
 from gsl.report.diagnosis import report_html
 from gsl.report.diagnosis_bars import Bar, bar_chart
 from gsl.report.diagnosis_curves import Curve, line_chart, ticks
-from gsl.report.diagnosis_html import element, escaped, prose
+from gsl.report.diagnosis_html import element, escape, prose
 from gsl.report.diagnosis_next import steps
 from gsl.report.diagnosis_scatter import Pair, Span, scatter
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.diagnosis_verdict import cause_name, headline, places, where_sentence
-from gsl.report.diagnosis_words import between, interval, level, listed, probability, share, short, value
+from gsl.report.diagnosis_words import between, interval, level, list_words, probability, share, short, value
 
 DOCUMENTS: dict[str, Callable[[], dict[str, Any]]] = {
     "causes": made.document,
@@ -295,7 +295,7 @@ def test_numbers_are_told_as_people_read_them() -> None:
     torque = {"value": 0.1234, "low": 0.1, "high": 0.15, "unit": "N·m"}
     assert (value(torque), interval(torque)) == ("0.12 N·m", "0.10 to 0.15 N·m")
     assert value({"value": 2.5, "unit": "s"}) == "2.50 s"
-    assert listed(["a", "b", "c", "d", "e", "f"]) == "a, b, c and 3 more"
+    assert list_words(["a", "b", "c", "d", "e", "f"]) == "a, b, c and 3 more"
 
 
 def test_noise_is_told_in_mrad_and_where_it_comes_from() -> None:
@@ -390,7 +390,7 @@ def test_dots_are_on_the_line_where_both_worlds_agree_and_whiskers_stay_inside()
 
 def test_text_is_escaped_once_and_markup_never() -> None:
     assert element("td", "a < b", element("b", "&")) == "<td>a &lt; b<b>&amp;</b></td>"
-    assert escaped(escaped('"')) == "&quot;"
+    assert escape(escape('"')) == "&quot;"
     assert element("p", class_="a", title='"', aria_label=None) == '<p class="a" title="&quot;"></p>'
     assert prose("97 % of 3 ms") == "97\u00a0% of 3\u00a0ms"
 

@@ -19,8 +19,8 @@ import pytest
 from commands import done
 from pages import FENCE, GUIDES, ROOT, Command, commands
 
-from gsl.commandline.composer import compose, opened
-from gsl.commandline.config import prepared, resolved
+from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.config import prepare, resolve
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import spoken
 from gsl.effects.effect import names, use_own
@@ -107,11 +107,11 @@ def built(words: list[str], home: Path) -> None:
     own = None if place is None else home / rest[place + 1]
     taken = [word for k, word in enumerate(rest) if word not in FLAGS and (place is None or k - place not in (0, 1))]
     assert all("=" in word or word.startswith("~") for word in taken), taken
-    with opened(own):
+    with open_hydra(own):
         load_own_effects(own, spoken(taken))
         composition = compose(name, taken, multirun="--multirun" in rest)
         try:
-            prepared(resolved(composition), composition.trust)
+            prepare(resolve(composition), composition.trust)
         except ConfigError as error:
             assert LACKING in str(error)
 

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gsl.core.body import Joint, Link, Robot, lumped
+from gsl.core.body import Joint, Link, Robot, lump
 from gsl.core.dynamics import forward_kinematics, jacobian, mass_matrix
 from gsl.core.plant import nominal
 from gsl.robots.nao import nao
@@ -36,7 +36,7 @@ def test_double_pendulum_has_its_textbook_inertia() -> None:
 
 
 def test_kinetic_energy_is_that_of_the_links() -> None:
-    robot, rng = lumped(nao()), np.random.default_rng(0)
+    robot, rng = lump(nao()), np.random.default_rng(0)
     angles, speeds = rng.uniform(-0.5, 0.5, 16), rng.standard_normal(22)
     named = dict(zip(robot.motors, angles, strict=True))
     frames, energy = forward_kinematics(robot, named), 0.0
@@ -48,7 +48,7 @@ def test_kinetic_energy_is_that_of_the_links() -> None:
 
 
 def test_jacobian_is_the_derivative_of_a_points_place() -> None:
-    robot, rng, h = lumped(nao()), np.random.default_rng(1), 1e-6
+    robot, rng, h = lump(nao()), np.random.default_rng(1), 1e-6
     angles, point = rng.uniform(-0.5, 0.5, 16), np.array([0.02, 0.01, -0.03])
 
     def place(at: np.ndarray) -> np.ndarray:
@@ -62,14 +62,14 @@ def test_jacobian_is_the_derivative_of_a_points_place() -> None:
 
 
 def test_the_whole_robot_falls_as_one_mass() -> None:
-    robot = lumped(nao())
+    robot = lump(nao())
     matrix = mass_matrix(robot, robot.stance)
     np.testing.assert_allclose(matrix[3:6, 3:6], robot.mass * np.eye(3), atol=1e-12)
     assert np.linalg.eigvalsh(matrix).min() > 0.0
 
 
 def test_joint_inertia_agrees_with_bullets(tmp_path: Path) -> None:
-    robot, rng = lumped(nao()), np.random.default_rng(2)
+    robot, rng = lump(nao()), np.random.default_rng(2)
     engine = Engine(nominal(nao()), Physics(0.002, 50, 0.02, floating=False))
     start = resting(robot, np.zeros(16), np.zeros(16), floating=False)
     engine.load(start.reading, start.commands)

@@ -5,7 +5,7 @@ import pytest
 from bodies import STANCE, followed, held, walked, world
 
 from gsl.core.plant import Plant, nominal
-from gsl.effects.effect import KINDS, applied, built, confused_with, effect_class, names
+from gsl.effects.effect import KINDS, apply_all, build, describe_confusion, effect_class, names
 from gsl.errors import ConfigError
 from gsl.robots.nao import CONTROLLED, nao
 
@@ -110,7 +110,7 @@ def test_on_a_slippery_ground_the_robot_gets_less_far() -> None:
 
 
 def test_ground_friction_is_the_coefficient_between_sole_and_ground() -> None:
-    plant = applied(nominal(nao()), built({"ground_friction": {"friction": 0.4}}))
+    plant = apply_all(nominal(nao()), build({"ground_friction": {"friction": 0.4}}))
     assert plant.contact.ground_friction * plant.contact.foot_friction == pytest.approx(0.4)
 
 
@@ -123,14 +123,14 @@ def test_the_order_of_the_yaml_does_not_matter() -> None:
         "link_mass": {"link": "torso", "mass": 0.3},
     }
     backwards = dict(reversed(effects.items()))
-    assert built(effects) == built(backwards)
-    one, other = (applied(nominal(nao()), built(each)) for each in (effects, backwards))
+    assert build(effects) == build(backwards)
+    one, other = (apply_all(nominal(nao()), build(each)) for each in (effects, backwards))
     np.testing.assert_array_equal(one.servo.kp, other.servo.kp)
 
 
 def test_an_effect_acts_twice_with_different_scopes() -> None:
     entries = [{"torque": 0.2, "joints": "legs"}, {"torque": 0.1, "joints": ["arms", "LKneePitch"]}]
-    coulomb = applied(nominal(nao()), built({"coulomb_friction": entries})).servo.coulomb
+    coulomb = apply_all(nominal(nao()), build({"coulomb_friction": entries})).servo.coulomb
     motors = nao().motors
     assert coulomb[motors.index("RKneePitch")] == coulomb[motors.index("RHipYawPitch")] == 0.2
     assert coulomb[motors.index("LKneePitch")] == pytest.approx(0.3)
@@ -156,7 +156,7 @@ def test_the_shared_hip_joint_is_one_scope() -> None:
 )
 def test_what_does_not_exist_or_cannot_be_is_named(effects: dict, line: str) -> None:
     with pytest.raises(ConfigError, match=line):
-        applied(nominal(nao()), built(effects))
+        apply_all(nominal(nao()), build(effects))
 
 
 def test_every_effect_of_the_library_can_be_found() -> None:
@@ -172,11 +172,11 @@ def test_a_users_own_effect_stands_beside_ours() -> None:
         def apply(self, plant: Plant) -> Plant:
             return plant.with_servo(kp=2.0 * plant.servo.kp)
 
-    both = built({"mine": Stiff(), "servo_gain": {"kp": 0.5}})
-    np.testing.assert_array_equal(applied(nominal(nao()), both).servo.kp, nominal(nao()).servo.kp)
+    both = build({"mine": Stiff(), "servo_gain": {"kp": 0.5}})
+    np.testing.assert_array_equal(apply_all(nominal(nao()), both).servo.kp, nominal(nao()).servo.kp)
 
 
 @pytest.mark.parametrize("name", names())
 def test_every_effect_says_what_tells_it_from_others(name: str) -> None:
-    told = confused_with(name)
+    told = describe_confusion(name)
     assert len(told) > 40 and not told.endswith(".")

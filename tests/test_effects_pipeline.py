@@ -127,7 +127,7 @@ def test_identification_fits_the_same_log_without_a_verdict(air: tuple[Path, Sai
 def test_what_a_plan_leaves_out_is_no_candidate(monkeypatch: pytest.MonkeyPatch) -> None:
     stages: list[Any] = []
     log = SimpleNamespace(folder="log")
-    monkeypatch.setattr(diagnosis_plan, "built", lambda stage, *_: stages.append(stage) or log)
+    monkeypatch.setattr(diagnosis_plan, "build_link", lambda stage, *_: stages.append(stage) or log)
     plan = DiagnosisPlan(Excitation("nao"), without=("command_latency",))
     world = BulletWorld("nao", {})
     for method in ("diagnose", "identify"):

@@ -17,12 +17,12 @@ from scenarios import AIR, GROUND, QUIET
 from scipy import stats
 
 from gsl.core.checkpoint import read_checkpoint
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.plant import Plant
 from gsl.errors import ConfigError
 from gsl.grounding.diagnosis_file import read_diagnosis, uncertain_causes
 from gsl.grounding.draws import DRAWS, UncertainCause, around, drawings, hypercube, within
-from gsl.grounding.effects import DiagnosedEffects, switched_on
+from gsl.grounding.effects import DiagnosedEffects, switch_on
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.randomised import RandomisedEffects
 from gsl.grounding.servo import LearnedServo
@@ -99,7 +99,7 @@ class Found:
 
 
 def made(stage: Any, out: Path) -> str:
-    build(stage, config=described(stage), out=out, command="", force=False, console=QUIET)
+    build(stage, config=describe(stage), out=out, command="", force=False, console=QUIET)
     return str(out)
 
 
@@ -226,7 +226,7 @@ def test_draws_of_a_report_leave_its_calibration(folder: Path) -> None:
     )
     assert gain.entry == EFFECTS["servo_gain"][0]
     grounding = DiagnosedEffects(diagnosis=str(folder / "runs/found/diagnose"), draws=True)
-    world = switched_on(NAO, found)
+    world = switch_on(NAO, found)
     drawn = grounding.drawn(world, found)
     assert isinstance(drawn, EnsembleWorld) and len(drawn.members) == DRAWS
     for one in drawn.members:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from bodies import STANCE, followed, held, walked
 
-from gsl.commandline.composer import compose, opened
-from gsl.commandline.config import resolved
+from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.config import resolve
 from gsl.core.described import rebuilt
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import Setting, settings_of
-from gsl.effects.effect import KINDS, applied, built, effect_class, names
+from gsl.effects.effect import KINDS, apply_all, build, effect_class, names
 from gsl.errors import ConfigError
 from gsl.robots.nao import nao
 from gsl.testing import check_effect
@@ -69,8 +69,8 @@ def from_command_line(name: str, entry: dict[str, Any]) -> BulletWorld:
     said = [f"world.effects.{name}.{key}={value}" for key, value in entry.items()]
     on_ground = effect_class(name).kind == "contact"
     where = [f"world.floating={str(on_ground).lower()}", "world.settle=0.1", "world.start_noise=0"]
-    with opened(None):
-        config = resolved(compose("collect", ["world=nao_ideal", *where, *said]))
+    with open_hydra(None):
+        config = resolve(compose("collect", ["world=nao_ideal", *where, *said]))
     made: BulletWorld = rebuilt(config["world"])
     return made
 
@@ -140,7 +140,7 @@ def test_the_library_has_the_table_of_the_design_in_its_order() -> None:
 
 @pytest.mark.parametrize("name", names())
 def test_it_keeps_the_contract_of_an_effect(name: str) -> None:
-    check_effect(built({name: [halfway(name)]})[0], neutral=NEUTRAL.get(name))
+    check_effect(build({name: [halfway(name)]})[0], neutral=NEUTRAL.get(name))
 
 
 @pytest.mark.parametrize("page", ["reference/effects", "howto/own-components"])
@@ -158,7 +158,7 @@ WORST = {"quantum", "lower_stop", "upper_stop", "stribeck_velocity", "roughness"
 
 @pytest.mark.parametrize("name", sorted({*TABLE} - {"gravity_tilt"}))
 def test_two_entries_add_but_factors_multiply_noises_add_in_square_and_of_some_the_worse_counts(name: str) -> None:
-    none, once, twice = (strengths(applied(nominal(nao()), built({name: [halfway(name)] * n}))) for n in range(3))
+    none, once, twice = (strengths(apply_all(nominal(nao()), build({name: [halfway(name)] * n}))) for n in range(3))
     changed = [key for key in once if not np.array_equal(once[key], none[key])]
     assert changed
     for key in changed:
@@ -187,7 +187,7 @@ def strengths(plant: Plant) -> dict[str, np.ndarray]:
 def test_gravity_turned_twice_is_turned_by_both_angles() -> None:
     for axis in ("roll", "pitch"):
         once, twice = (
-            applied(nominal(nao()), built({"gravity_tilt": entries})).gravity
+            apply_all(nominal(nao()), build({"gravity_tilt": entries})).gravity
             for entries in ({axis: 0.15}, [{axis: 0.05}, {axis: 0.1}])
         )
         np.testing.assert_allclose(twice, once, atol=1e-12)
@@ -196,7 +196,7 @@ def test_gravity_turned_twice_is_turned_by_both_angles() -> None:
 def test_two_stictions_leave_their_mean_velocity_whichever_comes_first() -> None:
     entries = [{"torque": 0.1, "velocity": 0.1}, {"torque": 0.3, "velocity": 0.5}]
     for order in (entries, entries[::-1]):
-        servo = applied(nominal(nao()), built({"stribeck_friction": order})).servo
+        servo = apply_all(nominal(nao()), build({"stribeck_friction": order})).servo
         np.testing.assert_allclose(servo.stribeck, 0.4)
         np.testing.assert_allclose(servo.stribeck_velocity, 0.4)
 
@@ -229,5 +229,5 @@ def test_what_cannot_be_simulated_is_refused_in_a_line(effects: dict[str, Any], 
 def test_play_without_a_rotor_is_refused_and_a_rotor_helps() -> None:
     bare = nominal(nao()).with_servo(armature=np.zeros(16))
     with pytest.raises(ConfigError, match="effects.backlash.joints: LHipYawPitch has no rotor; effects.armature"):
-        check_plant(applied(bare, built({"backlash": {"width": 0.01}})), 0.002, 0.02)
-    check_plant(applied(bare, built({"backlash": {"width": 0.01}, "armature": {"inertia": 0.01}})), 0.002, 0.02)
+        check_plant(apply_all(bare, build({"backlash": {"width": 0.01}})), 0.002, 0.02)
+    check_plant(apply_all(bare, build({"backlash": {"width": 0.01}, "armature": {"inertia": 0.01}})), 0.002, 0.02)

@@ -13,7 +13,7 @@ import pytest
 from bodies import followed, held
 from commands import done, gsl
 
-from gsl.core.body import Joint, Link, Robot, Shape, lumped
+from gsl.core.body import Joint, Link, Robot, Shape, lump
 from gsl.core.dynamics import forward_kinematics
 from gsl.core.layout import Layout
 from gsl.policies.excitation import MENU, VARIANTS, Excitation
@@ -154,7 +154,7 @@ def test_sides_are_read_off_the_geometry() -> None:
 
 @pytest.mark.parametrize(("motion", "variant"), ALL)
 def test_each_leg_stays_on_its_own_side(motion: str, variant: str) -> None:
-    body = lumped(nao())
+    body = lump(nao())
     for targets in played(motion, variant)[::5]:
         angles = dict(zip(body.motors, targets[body.drive].tolist(), strict=True))
         frames = forward_kinematics(body, angles)

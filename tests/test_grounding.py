@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsl.core.grounding import gain, grounded, solved
+from gsl.core.grounding import gain, ground, solve_action
 from gsl.core.history import History
 from gsl.core.layout import Layout
 from gsl.errors import ConfigError
@@ -61,9 +61,9 @@ def sent(grounding: object, steps: int = 20, seed: int = 0) -> tuple[np.ndarray,
 
 def test_alpha_goes_from_the_agents_action_to_the_inverse() -> None:
     action, inverse = np.array([0.1, 0.2]), np.array([0.5, -0.2])
-    np.testing.assert_array_equal(grounded(action, inverse, 0.0), action)
-    np.testing.assert_allclose(grounded(action, inverse, 1.0), inverse)
-    np.testing.assert_allclose(grounded(action, inverse, 0.25), 0.75 * action + 0.25 * inverse)
+    np.testing.assert_array_equal(ground(action, inverse, 0.0), action)
+    np.testing.assert_allclose(ground(action, inverse, 1.0), inverse)
+    np.testing.assert_allclose(ground(action, inverse, 0.25), 0.75 * action + 0.25 * inverse)
 
 
 def test_the_gain_solves_the_damped_least_squares() -> None:
@@ -78,7 +78,7 @@ def test_the_gain_solves_the_damped_least_squares() -> None:
 def test_undamped_the_solved_action_has_the_wanted_effect() -> None:
     rng = np.random.default_rng(0)
     sensitivity, action, wanted = rng.normal(size=(N, N)), rng.normal(size=N), rng.normal(size=N)
-    found = solved(action, gain(sensitivity, 1e-12), wanted, sensitivity @ action)
+    found = solve_action(action, gain(sensitivity, 1e-12), wanted, sensitivity @ action)
     np.testing.assert_allclose(sensitivity @ found, wanted)
 
 

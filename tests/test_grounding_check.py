@@ -19,7 +19,7 @@ from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
-from gsl.validation.check import ALPHAS, allowed_falls, check, largest_stable
+from gsl.validation.check import ALPHAS, check, count_allowed_falls, largest_stable
 from gsl.validation.replay import PAST, Deviations, Place, places, replay
 from gsl.validation.report import BARE, GROUNDED, OFF, PI0, STILL, GroundingReport
 from gsl.worlds.bullet import BulletWorld
@@ -158,7 +158,7 @@ def test_trajectories_of_another_robot_are_refused() -> None:
 @pytest.mark.parametrize(("share", "allowed"), [(0.0, 0), (0.1, 2), (0.6, 4), (1.0, 4)])
 def test_pi0_may_fall_as_it_does_in_real(share: float, allowed: int) -> None:
     heldout = Batch((), ("a",), 0.02, {"pi0_falls": share})
-    assert allowed_falls(heldout) == allowed
+    assert count_allowed_falls(heldout) == allowed
 
 
 def test_a_robot_without_feet_is_replayed() -> None:

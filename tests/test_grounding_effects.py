@@ -20,7 +20,7 @@ from gsl.effects.effect import together
 from gsl.errors import ConfigError, GslError
 from gsl.grounding.ane import ActionNoise
 from gsl.grounding.diagnosis_file import Diagnosis
-from gsl.grounding.effects import DiagnosedEffects, innermost, switched_on
+from gsl.grounding.effects import DiagnosedEffects, innermost, switch_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.preparation import parents_of
@@ -55,14 +55,14 @@ def ran(scenario: Scenario, seed: int = 3) -> Trajectory:
 @pytest.mark.parametrize("effects", PAIRS.values(), ids=PAIRS.keys())
 def test_a_simulator_with_what_it_lacks_is_the_real_world(effects: Mapping[str, Any]) -> None:
     real = replace(AIR, effects=effects)
-    mended = switched_on(AIR, found(effects))
+    mended = switch_on(AIR, found(effects))
     one, other = (ran(replace(arm(), world=world)) for world in (mended, real))
     np.testing.assert_array_equal(one.position, other.position)
 
 
 def test_effects_add_up_to_those_of_the_simulator() -> None:
     worn = replace(AIR, effects=DRY)
-    mended = switched_on(worn, found(LATE, simulated=DRY))
+    mended = switch_on(worn, found(LATE, simulated=DRY))
     for name, value in replace(AIR, effects={**DRY, **LATE}).plant.servo._asdict().items():
         np.testing.assert_array_equal(getattr(mended.plant.servo, name), value)  # type: ignore[attr-defined]
     assert together([DRY, LATE, DRY])["coulomb_friction"] == [*DRY["coulomb_friction"]] * 2
@@ -70,9 +70,9 @@ def test_effects_add_up_to_those_of_the_simulator() -> None:
 
 def test_a_diagnosis_of_another_simulator_is_refused() -> None:
     with pytest.raises(ConfigError, match="of another simulator: the nao with no effects; take this one"):
-        switched_on(replace(AIR, effects=DRY), found(LATE))
+        switch_on(replace(AIR, effects=DRY), found(LATE))
     with pytest.raises(ConfigError, match="of another simulator"):
-        switched_on(AIR, replace(found(LATE), robot="pepper"))
+        switch_on(AIR, replace(found(LATE), robot="pepper"))
 
 
 def test_a_grounding_without_diagnosis_or_before_its_effects_are_on_is_refused() -> None:

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 from commands import done, gsl, refused
 
-from gsl.commandline.composer import compose, opened
-from gsl.commandline.config import prepared, resolved
+from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.config import prepare, resolve
 from gsl.core.layout import check_alike
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError, GslError, TrajectoryError
 from gsl.grounding.ane import ActionNoise
@@ -31,7 +31,7 @@ from gsl.models.config import ModelConfig
 from gsl.models.states import NearestChoice, StateForward, StateInverse
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.mlp import Mlp
-from gsl.policies.policy import sized
+from gsl.policies.policy import size
 from gsl.rollout.rl_env import GroundedSimulator
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.storage.models import read_forward_model, read_inverse_model
@@ -39,7 +39,7 @@ from gsl.storage.trajectories import read, write
 from gsl.tasks.own_reward import OwnReward
 from gsl.training.data import Parts
 from gsl.training.states import forward_of_states, inverse_of_states
-from gsl.validation.uncharged import uncharged
+from gsl.validation.uncharged import is_uncharged
 from gsl.validation.values_of_states import ValueReport, value_report
 from gsl.worlds.control_cost import Charged, Quadratic
 from gsl.worlds.environments import own_module
@@ -116,7 +116,7 @@ class InPlace(Strange):
 
 
 def a_policy(world: GymnasiumWorld, hidden: tuple[int, ...] = ()) -> Any:
-    return sized(Mlp(hidden=hidden), world)
+    return size(Mlp(hidden=hidden), world)
 
 
 def episodes(world: GymnasiumWorld, count: int, sd: float = 0.0, role: str = "sim") -> Batch:
@@ -124,7 +124,7 @@ def episodes(world: GymnasiumWorld, count: int, sd: float = 0.0, role: str = "si
     noise = RandomChoice(sd) if world.layout.choices else ActionNoise(sd=sd)
     scenario = Scenario(world, OwnReward(), policy, role, noise)
     env = scenario.make()
-    found = tuple(rollout(scenario, env, policy.initial, derived_seed(1, role, k)) for k in range(count))
+    found = tuple(rollout(scenario, env, policy.initial, derive_seed(1, role, k)) for k in range(count))
     layout = world.layout
     about = {"robot": world.env_id, "role": role, "cells": layout.cells, "choices": layout.choices}
     return Batch(found, layout.joints, layout.control_period, about)
@@ -422,8 +422,8 @@ def test_heavier_bodies() -> None:
 def test_garat_s_worlds_weigh_what_they_say(name: str, body: str, mass: float) -> None:
     pytest.importorskip("mujoco")
     line = [f"world={name}", "task=own_reward", "policy=mlp"]
-    with opened(None):
-        stage, *_ = prepared(resolved(compose("collect", line)))
+    with open_hydra(None):
+        stage, *_ = prepare(resolve(compose("collect", line)))
     assert stage.world.make().unwrapped_env.model.body(body).mass[0] == pytest.approx(mass, rel=1e-3)
 
 
@@ -535,7 +535,7 @@ def test_too_few_episodes_are_refused_before_anything_is_collected(tmp_path: Pat
 def test_environments_that_charge_nothing_are_known() -> None:
     pytest.importorskip("mujoco")
     told = ("InvertedPendulum-v5", "InvertedDoublePendulum-v5", "HalfCheetah-v5", "Pendulum-v1", "examples.cart:Cart")
-    assert [uncharged(GymnasiumWorld(env_id=name)) for name in told] == [False, False, False, True, False]
+    assert [is_uncharged(GymnasiumWorld(env_id=name)) for name in told] == [False, False, False, True, False]
 
 
 def test_noise_that_may_be_charged_for_is_told_where_a_real_value_is(tmp_path: Path) -> None:

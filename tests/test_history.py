@@ -8,7 +8,7 @@ import pytest
 from gsl.core.angles import decode, encode
 from gsl.core.history import History, Window, tilt, windows
 from gsl.core.layout import Layout
-from gsl.core.observation import Senses, observations, sensed
+from gsl.core.observation import Senses, observations, read_sensors
 from gsl.core.scaling import scaling
 from gsl.core.split import split
 from gsl.core.trajectory import Trajectory
@@ -39,7 +39,7 @@ LAYOUT = Layout(
 )
 def test_the_window_of_a_running_episode_is_that_of_its_recording(history: History) -> None:
     episode = an_episode()
-    recorded = sensed(episode, history.sensors)
+    recorded = read_sensors(episode, history.sensors)
     ticks = np.arange(history.span, len(episode))
     expected = windows(history, episode.position, episode.action, recorded, ticks)
     window, seen = Window(history, 3), []
@@ -55,7 +55,7 @@ def test_an_episode_that_begins_at_rest_has_windows_of_its_first_ticks() -> None
     episode, history = an_episode(), History(3, ("gyro",), rested=True)
     window, seen = Window(history, 3), []
     for tick in range(len(episode)):
-        window.see(episode.position[tick], sensed(episode, history.sensors)[tick])
+        window.see(episode.position[tick], read_sensors(episode, history.sensors)[tick])
         seen.append(window.complete(episode.action[tick]).copy())
         window.remember(episode.action[tick])
     found = transitions([episode], history, 2, carried_out=False)
@@ -94,7 +94,7 @@ def test_observations_and_recorded_columns_give_the_same_senses() -> None:
     episode, sensors = an_episode(), ("gyro", "tilt", "foot_force")
     senses = Senses(LAYOUT, sensors)
     rows = observations(episode, LAYOUT)
-    np.testing.assert_allclose([senses.sensed(row) for row in rows], sensed(episode, sensors))
+    np.testing.assert_allclose([senses.sensed(row) for row in rows], read_sensors(episode, sensors))
     np.testing.assert_array_equal([senses.position(row) for row in rows], episode.position)
 
 
@@ -102,7 +102,7 @@ def test_a_column_that_was_not_recorded_is_named() -> None:
     episode = an_episode()
     del episode.sensors["gyro.y"]  # type: ignore[attr-defined]
     with pytest.raises(KeyError, match=r"gyro\.y"):
-        sensed(episode, ("gyro",))
+        read_sensors(episode, ("gyro",))
 
 
 def test_transitions_add_up_to_the_motion() -> None:

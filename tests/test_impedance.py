@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gsl.core.impedance import closed, handed_over, impedance
+from gsl.core.impedance import compute_closure, compute_transfer, impedance
 
 STEP, FREQUENCY = 1e-4, 1.25
 OMEGA = 2.0 * np.pi * FREQUENCY
@@ -43,7 +43,7 @@ SIM, REAL = np.array([150.0, 150.0, 50.0]), np.array([75.0, 90.0, 60.0])  # the 
 NOISE = np.full(3, 1.0)
 
 
-@pytest.mark.parametrize("share", [handed_over, closed])
+@pytest.mark.parametrize("share", [compute_transfer, compute_closure])
 @pytest.mark.parametrize("way", [0.0, 0.3, 1.0])
 def test_a_grounding_that_goes_a_part_of_the_way_at_every_joint_has_that_share(share, way: float) -> None:
     assert share(SIM, SIM + way * (REAL - SIM), REAL, NOISE) == pytest.approx(way)
@@ -53,17 +53,17 @@ def test_joints_that_do_not_differ_do_not_count() -> None:
     real = REAL.copy()
     real[1] = SIM[1] - 0.5
     grounded = np.array([75.0, 0.0, 60.0])
-    assert handed_over(SIM, grounded, real, NOISE) == pytest.approx(1.0)
-    assert handed_over(SIM, grounded, SIM, NOISE) is None
-    assert closed(SIM, grounded, SIM, NOISE) is None
+    assert compute_transfer(SIM, grounded, real, NOISE) == pytest.approx(1.0)
+    assert compute_transfer(SIM, grounded, SIM, NOISE) is None
+    assert compute_closure(SIM, grounded, SIM, NOISE) is None
 
 
 def test_what_goes_too_far_at_one_joint_closes_no_gap_at_another() -> None:
     sim, real, grounded = np.array([100.0, 100.0]), np.array([50.0, 50.0]), np.array([0.0, 100.0])
-    assert handed_over(sim, grounded, real, NOISE[:2]) == pytest.approx(1.0)
-    assert closed(sim, grounded, real, NOISE[:2]) == pytest.approx(0.0)
+    assert compute_transfer(sim, grounded, real, NOISE[:2]) == pytest.approx(1.0)
+    assert compute_closure(sim, grounded, real, NOISE[:2]) == pytest.approx(0.0)
 
 
 def test_the_wrong_phase_is_a_gap() -> None:
     sim, real = np.array([150.0 + 30j]), np.array([75.0 + 30j])
-    assert closed(sim, np.array([75.0 - 45j]), real, NOISE[:1]) == pytest.approx(0.0)
+    assert compute_closure(sim, np.array([75.0 - 45j]), real, NOISE[:1]) == pytest.approx(0.0)

@@ -14,7 +14,7 @@ from commands import done
 
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.log.files import read_logs
-from gsl.storage.importers.suspicions import STUCK, saturated, stopped
+from gsl.storage.importers.suspicions import STUCK, measure_saturation, measure_stops
 from gsl.storage.trajectories import read
 
 JOINTS = ("shoulder", "elbow")
@@ -363,9 +363,9 @@ def followed(command: np.ndarray, *, stop: float = 1.0, play: float = 0.0, lag: 
 def test_a_joint_is_at_a_stop_where_its_command_is_beyond_it(
     command: np.ndarray, how: dict[str, Any], is_at_it: bool
 ) -> None:
-    assert (stopped(followed(command, **how), command) > STUCK) == is_at_it
+    assert (measure_stops(followed(command, **how), command) > STUCK) == is_at_it
 
 
 def test_a_torque_at_its_end_while_the_command_moves_is_saturated() -> None:
     torque = np.clip(4.0 * SWING, -1.0, 1.0)
-    assert saturated(torque, SWING) > STUCK > saturated(2.0 * SWING, SWING)
+    assert measure_saturation(torque, SWING) > STUCK > measure_saturation(2.0 * SWING, SWING)

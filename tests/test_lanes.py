@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import LANES, side_by_side, where, zeros_in_lanes
 from gsl.core.sine import sine_cosine
 
 
-@compiled
+@compile_kernel
 def _formulas(one: float, other: float, result: np.ndarray) -> None:
     result[0] = one + 2.0 * other - one / other
     result[1] = where(one > other, -one, min(1.0, other))
@@ -22,7 +22,7 @@ def _formulas(one: float, other: float, result: np.ndarray) -> None:
     result[5], result[6] = sine_cosine(20.0 * one)
 
 
-@compiled
+@compile_kernel
 def _in_lanes(numbers: np.ndarray, result: np.ndarray) -> None:
     columns = side_by_side(numbers)
     _formulas(columns[0], columns[1], side_by_side(result))
@@ -38,14 +38,14 @@ def test_every_lane_has_the_bits_of_a_float() -> None:
         np.testing.assert_array_equal(result[:, lane], single)
 
 
-@compiled
+@compile_kernel
 def _functions(one: float, result: np.ndarray) -> None:
     result[0], result[1], result[2] = np.sin(one), np.cos(one), np.tan(one)
     result[3], result[4] = np.tanh(one), np.arctan(one)
     result[5], result[6] = np.sqrt(abs(one)), np.log(1.0 + abs(one))
 
 
-@compiled
+@compile_kernel
 def _functions_in_lanes(numbers: np.ndarray, result: np.ndarray) -> None:
     _functions(side_by_side(numbers)[0], side_by_side(result))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gsl.core.plant import Plant
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.held import Held
@@ -16,7 +16,7 @@ FINEST = 0.02 / 320  # of the reference [s]
 
 
 def plant_with(effects: dict[str, dict[str, float]]) -> Plant:
-    return applied(BulletWorld("nao", {}).plant, built(effects))
+    return apply_all(BulletWorld("nao", {}).plant, build(effects))
 
 
 def replay(plant: Plant, step: float, accurate: bool) -> np.ndarray:

@@ -12,13 +12,13 @@ from gsl.core.plant import Plant, nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.log.records import slope
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.errors import ConfigError, InputError
 from gsl.models.servo import ServoModel, neutral, with_group, without_group
 from gsl.robots.go2 import go2
 from gsl.robots.pendulum import pendulum
 from gsl.training.learn_servo import LearnedServo, document, learn_servo
-from gsl.training.servo_split import left_out, split
+from gsl.training.servo_split import leave_out, split
 from gsl.worlds.bullet import BulletEnv, BulletWorld
 from gsl.worlds.fits import fitting_step
 from gsl.worlds.held import Held
@@ -63,7 +63,7 @@ def log(plant: Plant, *, period: float = PERIOD, motions: int = 10, seconds: flo
 
 
 def real(effects: dict[str, Any]) -> Plant:
-    return applied(nominal(ROBOT), built(effects))
+    return apply_all(nominal(ROBOT), build(effects))
 
 
 def prepared(effects: dict[str, Any], **how: Any) -> Log:
@@ -194,12 +194,12 @@ def test_what_does_not_hold_at_a_gain_that_is_left_out_is_not_learned(
 def test_each_condition_is_left_out_in_turn() -> None:
     exp = cut_log(at_gains(0.0, 0.0, 0.0), ROBOT)
     parts = split(exp, labelled=False)
-    folds = left_out(exp, parts)
+    folds = leave_out(exp, parts)
     assert [set(exp.pieces.record[one.test]) for one in folds] == [set(range(k, k + 4)) for k in (0, 4, 8)]
     for one in folds:
         assert sorted(np.concatenate([one.train, one.judge, one.test])) == list(range(len(exp.pieces)))
     labelled = cut_log(at_gains(0.0, 0.0, 0.0), ROBOT, held_out={"kp": 2.0})
-    last = left_out(labelled, split(labelled, labelled=False))[2]
+    last = leave_out(labelled, split(labelled, labelled=False))[2]
     assert last.judge.size
     assert not np.isin(exp.pieces.record[last.judge], exp.pieces.record[last.test]).any()
 

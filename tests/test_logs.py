@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.files import check_log, log_files, on_ground, read_logs
 from gsl.errors import GslError
 from gsl.robots.nao import nao
 from gsl.storage.trajectories import write
 
-NAO = lumped(nao())
+NAO = lump(nao())
 REST = np.array([0.5 * NAO.stance.get(joint, 0.0) for joint in NAO.controlled])
 
 
@@ -79,7 +79,7 @@ def test_a_hole_in_time_is_refused() -> None:
     time = batch.episodes[0].time.copy()
     time[40:] += 0.3
     with pytest.raises(GslError, match=r"step 39: 0\.32 s to the next row"):
-        check_log(replace(batch, episodes=(replace(batch.episodes[0], time=time),)), lumped(NAO), "log")
+        check_log(replace(batch, episodes=(replace(batch.episodes[0], time=time),)), lump(NAO), "log")
 
 
 def test_a_folder_of_files_is_one_log(tmp_path: Path) -> None:

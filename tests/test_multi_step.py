@@ -19,8 +19,8 @@ from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import FARTHEST, ModelConfig
 from gsl.models.forward import ForwardModel
 from gsl.models.free_run import TICKS as FREE
-from gsl.models.free_run import predicted_error, segments
-from gsl.models.multi_step import MultiStep, travelled
+from gsl.models.free_run import predict_error, segments
+from gsl.models.multi_step import MultiStep, measure_travel
 from gsl.models.network import Network
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_inverse import TrainInverse
@@ -40,7 +40,7 @@ def test_the_loss_is_of_what_a_model_says_when_it_is_fed_with_its_own_answers(hi
     pieces = segments(batch.episodes, history, carried_out=True, ticks=TICKS, every=1)
     layer = 0.1 * rng.standard_normal((2, history.size(2))), np.array([0.01, -0.02])
     model = ForwardModel(Network([layer]), history, batch.joints)
-    errors = [predicted_error(model, pieces._replace(ticks=tick)) for tick in range(1, TICKS + 1)]
+    errors = [predict_error(model, pieces._replace(ticks=tick)) for tick in range(1, TICKS + 1)]
     by_tick, scale = np.array([np.mean(one**2) for one in errors]), np.array([1.0, 2.0, 3.0, 4.0])
     weight, bias = (torch.as_tensor(part, dtype=torch.float32) for part in layer)
     loss = MultiStep(pieces, scale).loss(lambda windows: windows @ weight.T + bias)
@@ -48,7 +48,7 @@ def test_the_loss_is_of_what_a_model_says_when_it_is_fed_with_its_own_answers(hi
     few = torch.arange(3)
     some = MultiStep(pieces, scale).loss(lambda windows: windows @ weight.T + bias, few)
     assert some.item() == pytest.approx(np.mean([np.mean(one[:3] ** 2) for one in errors] / scale), rel=1e-4)
-    moved = travelled(pieces)
+    moved = measure_travel(pieces)
     assert len(moved) == TICKS and 0.0 < moved[0] < moved[1]
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.plant import nominal
 from gsl.robots.nao import CONTROLLED, FOOT_HEIGHT, HIP_OFFSET_Y, HIP_OFFSET_Z, THIGH, TIBIA, nao
 from gsl.robots.nao_legs import leg_angles
@@ -59,7 +59,7 @@ def test_left_and_right_are_mirror_images() -> None:
 
 
 def test_every_inertia_tensor_is_that_of_a_body() -> None:
-    for robot in (nao(), lumped(nao())):
+    for robot in (nao(), lump(nao())):
         for link in robot.links.values():
             np.testing.assert_array_equal(link.inertia, link.inertia.T)
             moments = np.linalg.eigvalsh(link.inertia)
@@ -93,7 +93,7 @@ def within_limits(robot, side: str, angles: np.ndarray) -> bool:
 def test_leg_kinematics_agree_with_bullet() -> None:
     robot, rng = nao(), np.random.default_rng(1)
     engine = Engine(nominal(robot), Physics(0.002, 50, 0.02, floating=False))
-    welded = lumped(robot)
+    welded = lump(robot)
     for _ in range(300):
         yaw, ankles = reachable(rng)
         positions = np.zeros(16)
@@ -116,7 +116,7 @@ def test_out_of_reach_the_leg_is_straight() -> None:
 
 
 def test_the_stance_stands_on_flat_soles() -> None:
-    robot = lumped(nao())
+    robot = lump(nao())
     positions = np.array([robot.stance.get(name, 0.0) for name in robot.motors])
     reading = resting(robot, positions, positions, floating=True).reading
     assert reading.place[2] == pytest.approx(0.23 + HIP_OFFSET_Z, abs=2e-3)

@@ -21,7 +21,7 @@ from gsl.diagnosis.design.rehearsal import Explanation, Rehearsal
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.simulate import calibration
 from gsl.diagnosis.verdict.findings import Findings
-from gsl.effects.effect import applied, built, names
+from gsl.effects.effect import apply_all, build, names
 from gsl.policies.limits import breach, limits
 from gsl.robots.nao import nao
 from gsl.worlds.held import Held
@@ -49,7 +49,7 @@ def played(
     rng, robot = np.random.default_rng(3), arm()
     drawn = 0.5 * calibration.SPREADS[:, None] * rng.standard_normal((len(calibration.SPREADS), 2))
     drawn[calibration.COULOMB] = np.abs(drawn[calibration.COULOMB])
-    held = Held.of(calibration.calibrate(applied(nominal(robot), built(effects)), drawn), 0.002, PERIOD)
+    held = Held.of(calibration.calibrate(apply_all(nominal(robot), build(effects)), drawn), 0.002, PERIOD)
     order = [*commands, next(iter(commands))]
     episodes = tuple(logged(held, commands[name], NOISE, rng) for name in order)
     batch = Batch(episodes, robot.controlled, PERIOD, {"episodes": [{"policy": name} for name in order]})

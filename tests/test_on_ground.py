@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.plant import GRAVITY, Plant, nominal
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.simulate import calibration
 from gsl.diagnosis.simulate.on_ground import Walking, _heights, _moving, jitter_error
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
 from gsl.worlds.bullet import BulletWorld
 from gsl_benchmarks.blind.walks import Walks
@@ -23,11 +23,11 @@ NONE = np.zeros(0)
 def walk() -> Log:
     sim = BulletWorld(robot="nao", effects={}, start_noise=0.02)
     log = Walks(episodes=2, duration=1.0).logged(sim, None, {}, 0.0, np.random.default_rng(0))
-    return cut_log(log, lumped(nao()), walking=True)
+    return cut_log(log, lump(nao()), walking=True)
 
 
 def plant(**effects: dict[str, float]) -> Plant:
-    return applied(nominal(nao()), built(effects))
+    return apply_all(nominal(nao()), build(effects))
 
 
 def test_a_bias_of_the_encoders_moves_the_log_and_not_the_robot(walk: Log) -> None:

@@ -17,7 +17,7 @@ from gsl import make_world
 from gsl.commandline.help import write_help
 from gsl.core.plant import nominal
 from gsl.diagnosis.hypothesis.candidates import library
-from gsl.effects.effect import applied, built, effect_class, names, own, use_own
+from gsl.effects.effect import apply_all, build, effect_class, names, own, use_own
 from gsl.errors import ConfigError
 from gsl.robots.nao import nao
 from gsl.testing import check_effect
@@ -79,7 +79,7 @@ def test_the_pages_example_keeps_the_contract(mine: type) -> None:
 
 def test_it_stands_beside_ours(mine: type) -> None:
     assert NAME in names() and effect_class(NAME) is mine and "backlash" in names()
-    plant, still = (applied(nominal(nao()), built(effects)) for effects in ({NAME: {"thickness": 0.5}}, {}))
+    plant, still = (apply_all(nominal(nao()), build(effects)) for effects in ({NAME: {"thickness": 0.5}}, {}))
     np.testing.assert_allclose(plant.servo.viscous - still.servo.viscous, 0.15)
 
 
@@ -140,9 +140,9 @@ def test_without_the_folder_nobody_knows_it(home: Path) -> None:
 
 def test_a_file_that_names_a_class_loads_none() -> None:
     with pytest.raises(ConfigError, match="effects.x._target_ = shutil.rmtree: is no effect that is loaded"):
-        built({"x": {"_target_": "shutil.rmtree", "path": "/"}})
+        build({"x": {"_target_": "shutil.rmtree", "path": "/"}})
     with pytest.raises(ConfigError, match="keep it as effect/x.yaml in the folder of --config-dir"):
-        built({"x": {"_target_": "not_imported.Effect"}})
+        build({"x": {"_target_": "not_imported.Effect"}})
 
 
 def test_after_an_edit_of_the_class_an_artifact_is_another(home: Path) -> None:

@@ -16,8 +16,8 @@ from commands import done
 from scenarios import AIR, QUIET, REACH
 from test_bad_input import refused
 
-from gsl.core.described import described, rebuilt
-from gsl.core.seeds import derived_seed
+from gsl.core.described import describe, rebuilt
+from gsl.core.seeds import derive_seed
 from gsl.core.statistics import bootstrap_interval, rank_correlation
 from gsl.effects.effect import names
 from gsl.errors import ConfigError
@@ -204,7 +204,7 @@ def _played_as_written(found: Mapping[str, Any], world: Mapping[str, Any]) -> No
     """The second simulator is the one in the written file, held in the air as the real one was."""
     second = replace(rebuilt(world), floating=False, settle=0.1, start_noise=0.02)
     scenario = Scenario(second, TASK, REACH, "real", NoGrounding())
-    jobs = [Job(lifting(4)[0], derived_seed(1, "policy_gap", "lift_0", number)) for number in range(2)]
+    jobs = [Job(lifting(4)[0], derive_seed(1, "policy_gap", "lift_0", number)) for number in range(2)]
     values = [one.value for one in episodes(scenario, jobs, workers=1, progress=_Silent())]
     assert found["rows"][0]["diagnosed"]["value"] == pytest.approx(np.mean(values), rel=1e-12)
 
@@ -278,8 +278,8 @@ def test_policies_that_have_changed_or_gone_since_are_refused(arms: Path) -> Non
 
 def test_a_component_comes_back_from_its_description() -> None:
     for thing in (TASK, REACH, AIR):
-        assert rebuilt(described(thing)) == thing
-        assert rebuilt(yaml.safe_load(yaml.safe_dump(described(thing)))) == thing
+        assert rebuilt(describe(thing)) == thing
+        assert rebuilt(yaml.safe_load(yaml.safe_dump(describe(thing)))) == thing
     with pytest.raises(ConfigError, match=r"task\.duration = -1"):
         rebuilt({"_target_": "gsl.tasks.arm.Arm", "duration": -1}, where="task")
     for name in ("os.system", "gsl.tasks.arm.math", "gsl.tasks.arm.Nothing", "gsl.tasks.arm.Mapping"):

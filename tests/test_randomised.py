@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scenarios import QUIET, walk
 
-from gsl.effects.effect import documented
+from gsl.effects.effect import list_documented
 from gsl.errors import ConfigError, Refused
 from gsl.grounding.none import NoGrounding
-from gsl.grounding.randomised import Draw, RandomisedEffects, randomised
+from gsl.grounding.randomised import Draw, RandomisedEffects, randomise
 from gsl.robots.catalogue import robot
 from gsl.validation.check_grounding import check_grounding
 from gsl.validation.gate import Gate
@@ -33,7 +33,7 @@ def last_positions(env: object, seed: int) -> np.ndarray:
 
 
 def test_an_episode_is_a_function_of_its_seed_whatever_came_before() -> None:
-    made = pickle.loads(pickle.dumps(randomised(WORLD, SETTINGS, 0.5)))
+    made = pickle.loads(pickle.dumps(randomise(WORLD, SETTINGS, 0.5)))
     env, other = made.make(), made.make()
     first, second = last_positions(env, 1), last_positions(env, 2)
     assert np.abs(first - second).max() > 1e-4
@@ -48,7 +48,7 @@ def test_a_draw_stays_within_its_share_of_the_documented_ranges_and_reaches_its_
     drawn = [Draw(SETTINGS.effects, width, own)(rng) for _ in range(400)]
     assert max(one["command_latency"]["delay"] for one in drawn) > 0.07  # of .08
     for name in SETTINGS.effects:
-        for key, known in documented(name, own).items():
+        for key, known in list_documented(name, own).items():
             if known.neutral is None:
                 continue
             values = np.array([one[name][key] for one in drawn])
@@ -58,7 +58,7 @@ def test_a_draw_stays_within_its_share_of_the_documented_ranges_and_reaches_its_
 
 
 def test_what_the_world_has_already_stays() -> None:
-    effects = randomised(WORLD, RandomisedEffects(("command_latency",)), 0.5).world.effects
+    effects = randomise(WORLD, RandomisedEffects(("command_latency",)), 0.5).world.effects
     assert effects == WORLD.effects
 
 
@@ -70,7 +70,7 @@ def test_effects_that_cannot_be_drawn_are_refused(name: str) -> None:
 
 def test_a_world_without_effects_is_refused() -> None:
     with pytest.raises(ConfigError, match="only Bullet worlds"):
-        randomised(NoGrounding(), SETTINGS, 0.5)
+        randomise(NoGrounding(), SETTINGS, 0.5)
 
 
 def test_a_width_in_which_pi0_falls_is_refused_even_if_it_is_the_least(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsl.core.history import History, asked_at_rest
+from gsl.core.history import History, find_rest_action
 from gsl.core.region import INSIDE, region
 from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import transitions
@@ -19,9 +19,9 @@ from gsl.models.network import Network
 from gsl.policies.walk_engine import WalkEngine
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
-from gsl.validation.check import asked
+from gsl.validation.check import ask_reachability
 from gsl.validation.drift import drifts
-from gsl.validation.reachability import FLOOR, TOLERANCE, missed_by, reachability
+from gsl.validation.reachability import FLOOR, TOLERANCE, measure_misses, reachability
 from gsl.validation.replay import places
 from gsl.worlds.bullet import BulletWorld
 
@@ -55,7 +55,7 @@ def test_a_simulator_can_do_what_it_does_and_what_no_servo_can_is_told_joint_by_
     starts, bare = places([walk], SIM.layout, 6), SIM.make()
     x = SIM.layout["position"]
     own = [place.seen[place.tick + 1][x] - place.seen[place.tick][x] for place in starts]
-    missed = np.array([missed_by(bare, place, change, 1) for place, change in zip(starts, own, strict=True)])
+    missed = np.array([measure_misses(bare, place, change, 1) for place, change in zip(starts, own, strict=True)])
     jump = np.zeros(len(JOINTS))
     jump[KNEE] = 0.8
     impossible = reachability(bare, predicts(jump), starts, 1)
@@ -74,8 +74,8 @@ def test_a_long_past_is_asked_about_where_there_is_one() -> None:
     weight = np.zeros((n, history.size(n)))
     f = ForwardModel(Network([(weight, np.zeros(n))]), history, JOINTS)
     bare = SIM.make()
-    found = asked(bare, LoadedTransformation(f, Solver(f, np.eye(n), 1e-9)), [walk], 1)
-    none = asked(bare, LoadedTransformation(f, Solver(f, np.eye(n), 1e-9)), [_begun(walk, 25)], 1)
+    found = ask_reachability(bare, LoadedTransformation(f, Solver(f, np.eye(n), 1e-9)), [walk], 1)
+    none = ask_reachability(bare, LoadedTransformation(f, Solver(f, np.eye(n), 1e-9)), [_begun(walk, 25)], 1)
     bare.close()
     assert found is not None and found.steps == len(range(20, len(walk) - 9, 15)) and none is None
 
@@ -99,7 +99,7 @@ def test_what_a_robot_was_told_at_rest_is_known_before_a_large_step_and_before_a
     env.close()
     position = seen[SIM.layout["position"]]
     for step, off in ((1.0, 0.02), (0.15, 0.02), (0.01, 0.011)):
-        assert np.abs(asked_at_rest(posture - step, position) - posture).max() < off
+        assert np.abs(find_rest_action(posture - step, position) - posture).max() < off
 
 
 def test_a_region_holds_its_own_kind_and_little_else() -> None:

@@ -7,7 +7,7 @@ import pytest
 from bodies import followed
 from robots_of_files import holding
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.dynamics import forward_kinematics, mass_matrix
 from gsl.core.layout import Layout
 from gsl.core.plant import nominal
@@ -17,7 +17,7 @@ from gsl.robots import pendulum as bench
 from gsl.robots import so101 as arm_facts
 from gsl.robots.catalogue import robot
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.drive_train import limited
+from gsl.worlds.drive_train import limit_torque
 
 GAINS = (100, 200, 400, 800)
 PERIODS = {"pendulum": 0.005, "so101": 0.02, "go2": 0.005}
@@ -32,7 +32,7 @@ def test_the_pendulums_servo_is_the_firmwares_law(gain: int) -> None:
     for error in np.linspace(-1.5, 1.5, 13):
         for speed in (0.0, 0.5, 4.0):
             wanted = float(servo.kp[0] * error - servo.kd[0] * speed)
-            ours = limited(wanted, speed, float(servo.limit[0]), float(servo.no_load_speed[0]))
+            ours = limit_torque(wanted, speed, float(servo.limit[0]), float(servo.no_load_speed[0]))
             duty = min(1.0, max(-1.0, gain * e * error))
             if duty * stall - stall / no_load * speed > -stall:
                 assert ours == pytest.approx(stall * duty - stall / no_load * speed, abs=1e-12)
@@ -44,7 +44,7 @@ def test_the_pendulum_hangs_down_and_weighs_what_its_mass_says() -> None:
         weight = (0.49 + 0.5 * bench.ARM_MASS) * 9.81 * 0.1 * math.sin(angle)
         assert holding(one, {"joint": angle}) == pytest.approx([weight], abs=1e-12)
     rod = bench.ARM_MASS * 0.1**2 / 3.0
-    assert mass_matrix(lumped(one), {})[6, 6] == pytest.approx(0.49 * 0.1**2 + rod, rel=1e-6)
+    assert mass_matrix(lump(one), {})[6, 6] == pytest.approx(0.49 * 0.1**2 + rod, rel=1e-6)
 
 
 def test_the_xl330_is_as_strong_and_fast_as_its_maker_says() -> None:
@@ -61,7 +61,7 @@ def test_the_arms_servo_loses_friction_once_at_full_duty_as_at_any_other() -> No
         duty = min(1.0, max(-1.0, arm_facts.GAIN * arm_facts.DUTY_PER_RADIAN * error))
         for speed in (0.0, 0.5, 4.0):
             wanted = float(servo.kp[0] * error - servo.kd[0] * speed)
-            ours = limited(wanted, speed, float(servo.limit[0]), float(servo.no_load_speed[0]))
+            ours = limit_torque(wanted, speed, float(servo.limit[0]), float(servo.no_load_speed[0]))
             torque = arm_facts.STALL * (duty - speed / arm_facts.NO_LOAD)
             if torque > -arm_facts.STALL:
                 assert ours == pytest.approx(torque, abs=1e-12)
@@ -78,7 +78,7 @@ def test_menageries_arm_is_the_same_but_for_its_servos() -> None:
 
 def test_the_arm_stands_and_weighs_as_published() -> None:
     arm = robot("so101")
-    frames = forward_kinematics(lumped(arm), {})
+    frames = forward_kinematics(lump(arm), {})
     assert arm.mass == pytest.approx(0.632006)
     np.testing.assert_allclose(frames.origin["gripper"], [0.2932, -0.0002, 0.2344], atol=1e-4)
     np.testing.assert_allclose(frames.axis["Pitch"], [0.0, 1.0, 0.0], atol=1e-6)
@@ -97,7 +97,7 @@ def test_the_arm_stands_and_weighs_as_published() -> None:
 def test_the_go2_has_its_feet_where_its_maker_has_them() -> None:
     dog = robot("go2")
     assert dog.mass == pytest.approx(15.017) and len(dog.controlled) == 12 and dog.controlled[4] == "FR_thigh_joint"
-    frames = forward_kinematics(lumped(dog), {})
+    frames = forward_kinematics(lump(dog), {})
     for leg, x, y in (("FL", 1, 1), ("FR", 1, -1), ("RL", -1, 1), ("RR", -1, -1)):
         foot = frames.origin[f"{leg}_calf"] + [0.0, 0.0, -0.213]
         np.testing.assert_allclose(foot, [0.1934 * x, 0.142 * y, -0.426], atol=1e-12)
@@ -121,7 +121,7 @@ def test_bullet_holds_it_in_the_air_and_it_follows(name: str) -> None:
     targets = Excitation(robot=name, duration=2.0).commands("triangle_slow", "a", PERIODS[name])
     seen = followed(env, targets)[:, world.layout["position"]]
     env.close()
-    load = np.abs(holding(lumped(robot(name)), {})).max() / min(kp for kp, _ in robot(name).gains.values())
+    load = np.abs(holding(lump(robot(name)), {})).max() / min(kp for kp, _ in robot(name).gains.values())
     assert np.isfinite(seen).all() and np.abs(seen[-1] - targets[-1]).max() < 0.03 + 2.0 * load
 
 

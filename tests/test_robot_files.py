@@ -8,7 +8,7 @@ import pytest
 from commands import done
 from robots_of_files import as_bullet_reads, holding
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.dynamics import forward_kinematics, mass_matrix
 from gsl.core.plant import nominal
 from gsl.diagnosis.hypothesis.candidates import library
@@ -41,7 +41,7 @@ def test_what_is_written_is_read_back(name: str, tmp_path: Path) -> None:
     ours, file = robot(name), tmp_path / "it.urdf"
     file.write_text(urdf(ours))
     back = robot(str(file))
-    one, other = lumped(ours), lumped(back)
+    one, other = lump(ours), lump(back)
     assert [*one.links] == [*other.links] and set(back.motors) == set(ours.motors)
     for link in one.links:
         assert other.links[link].mass == pytest.approx(one.links[link].mass, rel=1e-11)
@@ -70,14 +70,14 @@ def test_turned_frames_weigh_what_bullet_weighs(tmp_path: Path) -> None:
             at = [bullets.joints.index(name) for name in ours.motors]
             signs = np.array([-1.0 if name == "right_finger" else 1.0 for name in ours.motors])
             inertia = bullets.inertia(theirs)[np.ix_(at, at)] * np.outer(signs, signs)
-            np.testing.assert_allclose(mass_matrix(lumped(ours), pose)[6:, 6:], inertia, atol=2e-7)
+            np.testing.assert_allclose(mass_matrix(lump(ours), pose)[6:, 6:], inertia, atol=2e-7)
 
 
 def test_the_chain_falls_as_the_textbook_says() -> None:
     ours = robot(str(EXAMPLE))
     armature = np.diag([ours.joint(name).armature for name in ours.motors])
     for pose in poses(ours):
-        inertia = mass_matrix(lumped(ours), pose)[6:, 6:] + armature
+        inertia = mass_matrix(lump(ours), pose)[6:, 6:] + armature
         np.testing.assert_allclose(inertia @ chain_acceleration(ours, pose), -holding(ours, pose), atol=1e-9)
 
 
@@ -92,7 +92,7 @@ def test_what_is_left_open_is_derived_and_what_is_left_out_is_told() -> None:
 
 
 def test_a_joint_that_follows_goes_the_other_way_by_the_same_angle() -> None:
-    body = lumped(robot(str(EXAMPLE)))
+    body = lump(robot(str(EXAMPLE)))
     frames = forward_kinematics(body, {FINGER: 0.5, "right_finger": 0.5})
     ahead = body.links["left"].com / np.linalg.norm(body.links["left"].com)
     left, right = (frames.turn["fore"].T @ frames.turn[side] @ ahead for side in ("left", "right"))
@@ -162,7 +162,7 @@ def test_a_robot_without_shapes_has_no_picture(tmp_path: Path) -> None:
 
 def test_servos_without_a_body_turn_loads_of_their_own(written: Callable[[str], Path]) -> None:
     ours = robot(str(written("joints: {a: {effort: 1, velocity: 5}, b: {effort: 2, velocity: 5, inertia: 0.02}}")))
-    inertia = mass_matrix(lumped(ours), {})[6:, 6:]
+    inertia = mass_matrix(lump(ours), {})[6:, 6:]
     np.testing.assert_allclose(inertia, np.diag([ours.joint("a").armature, 0.02]), atol=1e-15)
     np.testing.assert_allclose(holding(ours, {"a": 0.3, "b": -1.0}), 0.0, atol=1e-12)
     load = next(one for one in library(ours) if one.effect == "centre_of_mass" and one.fixed["link"] == "b_load")

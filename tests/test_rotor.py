@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.dynamics import forward_kinematics, jacobian, mass_matrix
 from gsl.core.plant import GRAVITY, Plant, nominal
 from gsl.robots.nao import nao
 from gsl.worlds.engine import Engine
 from gsl.worlds.physics import Physics
-from gsl.worlds.rotor import carried_inertia
+from gsl.worlds.rotor import carry_inertia
 from gsl.worlds.start import resting
 
 JOINTS = ("LHipPitch", "LKneePitch")  # parallel axes
@@ -27,7 +27,7 @@ def leg() -> Robot:
     stiff = tuple(replace(whole.joint(name), fixed_at=0.0) for name in ("LAnklePitch", "LAnkleRoll"))
     links = {name: whole.links[name] for name in ("torso", "LThigh", "LTibia", "LAnkle", "LFoot")}
     gains = dict.fromkeys(JOINTS, (SOFT, 0.0))
-    return lumped(Robot("leg", links, (hip, knee, *stiff), JOINTS, gains=gains))
+    return lump(Robot("leg", links, (hip, knee, *stiff), JOINTS, gains=gains))
 
 
 def torque_driven(robot: Robot) -> Plant:
@@ -92,7 +92,7 @@ def test_parallel_axes_turn_as_with_true_rotors() -> None:
 
 def test_servos_do_not_chatter() -> None:
     """After a disturbance a held robot comes to rest from one physics step to the next."""
-    robot = lumped(nao())
+    robot = lump(nao())
     engine = Engine(nominal(nao()), Physics(0.002, 50, 0.002, floating=False))
     stance = np.array([robot.stance.get(name, 0.0) for name in robot.motors])
     start = resting(robot, stance, stance, floating=False)
@@ -120,7 +120,7 @@ def momentum(engine: Engine) -> np.ndarray:
 
 def drift(step: float, *, spin: float, movement: float) -> float:
     """Greatest change of angular momentum [N·m·s] in 0.3 s of free flight without gravity, limbs in motion."""
-    robot = lumped(nao())
+    robot = lump(nao())
     engine = Engine(nominal(nao()), Physics(step, 50, 0.02, floating=True))
     stance = np.array([robot.stance.get(name, 0.0) for name in robot.motors])
     start = resting(robot, stance, stance, floating=True)
@@ -144,7 +144,7 @@ def test_a_robot_in_free_flight_keeps_its_angular_momentum(spin: float, movement
 
 
 def test_a_robot_in_free_flight_keeps_its_speed() -> None:
-    robot = lumped(nao())
+    robot = lump(nao())
     engine = Engine(nominal(nao()), Physics(0.0005, 50, 0.02, floating=True))
     stance = np.array([robot.stance.get(name, 0.0) for name in robot.motors])
     start = resting(robot, stance, stance, floating=True)
@@ -161,8 +161,8 @@ def test_a_robot_in_free_flight_keeps_its_speed() -> None:
 
 
 def test_inertia_on_a_link_is_about_its_axis_alone() -> None:
-    robot = lumped(nao())
-    extra = carried_inertia(robot, np.ones(16))
+    robot = lump(nao())
+    extra = carry_inertia(robot, np.ones(16))
     for name in robot.motors:
         joint = robot.joint(name)
         assert joint.axis @ extra[joint.child] @ joint.axis == pytest.approx(1.0)

@@ -13,7 +13,7 @@ import pytest
 from omegaconf import OmegaConf
 from robots_elsewhere import requested, run
 
-from gsl.core.described import described, rebuilt
+from gsl.core.described import describe, rebuilt
 from gsl.core.interfaces import Policy
 from gsl.core.seeds import grounding_generator
 from gsl.errors import ArtifactError, ConfigError, GslError
@@ -30,7 +30,7 @@ from gsl.runner.guard import Guard, ramp
 from gsl.runner.request import due, layout_of, read_request
 from gsl.runner.robots import PerfectRobot
 from gsl.runner.senses import RobotError
-from gsl.storage.bundle import bundled
+from gsl.storage.bundle import bundle
 from gsl.tasks.excite import Excite
 from gsl.tasks.walk import Walk
 from gsl.worlds.external import ExternalRobot
@@ -91,7 +91,7 @@ def test_the_runner_acts_as_the_policy_does_to_the_bit(name: str, noise: float, 
 
 def test_a_policy_that_needs_more_than_numpy_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"gsl\.worlds\.mujoco needs mujoco, but beside a robot there is numpy"):
-        bundled(("gsl.worlds.mujoco",))
+        bundle(("gsl.worlds.mujoco",))
 
 
 def test_a_robot_elsewhere_has_the_feet_and_the_files_of_its_robot() -> None:
@@ -176,7 +176,7 @@ def test_what_a_journal_keeps_comes_back_and_an_episode_run_again_takes_its_plac
     for episode, fell in ((0, False), (10, False), (1, True), (0, True)):
         journal.keep(path, "h", columns, [[episode, 0, 0.1, False, False], [episode, 1, 1 / 3, fell, False]])
     assert journal.ends(path) == {10: False, 1: True, 0: True}
-    assert journal.marked(path) == "h" and path.read_text().count("0.3333333333333333") == 3
+    assert journal.read_mark(path) == "h" and path.read_text().count("0.3333333333333333") == 3
 
 
 ROBOT = """
@@ -222,7 +222,7 @@ def test_an_answer_in_two_sittings(walk: Path, tmp_path: Path) -> None:
     second = run(walk, *words, typed="\n\nf\n")
     assert "all is answered" in second.stdout
     assert journal.ends(tmp_path / "answer.csv") == {0: False, 1: False}
-    rows = journal.returned(tmp_path / "returns.csv")
+    rows = journal.read_returns(tmp_path / "returns.csv")
     assert (rows["one"]["distance"], rows["one"]["fell"]) == ("0.12", "no")
     assert (rows["two"]["distance"], rows["two"]["fell"]) == ("", "yes")
 
@@ -321,7 +321,7 @@ def test_an_unsafe_target_stops_the_episode_safely_and_counts_as_a_fall(tmp_path
 
 def test_the_policy_of_a_request_is_all_of_it(walk: Path) -> None:
     request = read_request(walk)
-    assert request["policy"] == described(WalkEngine())
+    assert request["policy"] == describe(WalkEngine())
     assert request["episodes"][0]["parameters"] == WalkEngine().initial.tolist()
 
 
@@ -687,7 +687,7 @@ def test_missing_distances_are_named_and_asked_for_at_the_next_start(walk: Path,
     second = run(walk, *words, typed="0.3\n\n").stdout
     assert "one is logged, but nobody has said how far it came" in second and "distances are missing: two;" in second
     assert "all is answered" in run(walk, *words, typed="f\n").stdout
-    rows = journal.returned(tmp_path / "returns.csv")
+    rows = journal.read_returns(tmp_path / "returns.csv")
     assert (rows["one"]["distance"], rows["two"]["fell"]) == ("0.3", "yes")
 
 
@@ -696,7 +696,7 @@ def test_an_episode_run_again_forgets_what_was_measured_before(walk: Path, tmp_p
     run(walk, *words, typed="\n\nf\n\n\n0.2\n")
     again = run(walk, *words, "--yes", "--episode=one").stdout
     assert "distances are missing: one;" in again
-    assert list(journal.returned(tmp_path / "returns.csv")) == ["two"]
+    assert list(journal.read_returns(tmp_path / "returns.csv")) == ["two"]
 
 
 def test_an_episode_that_leaves_no_log_takes_the_earlier_one_away(tmp_path: Path) -> None:
@@ -722,7 +722,7 @@ def test_returns_written_by_hand_keep_their_columns(tmp_path: Path) -> None:
     path = tmp_path / "returns.csv"
     path.write_bytes(b'\xef\xbb\xbfepisode,value,fell,note\r\none,0.3,TRUE,"wet, cold"\r\ntwo,0.2,no,\r\n')
     journal.add_return(path, "h", "two", "1.5", fell=False)
-    rows = journal.returned(path)
+    rows = journal.read_returns(path)
     assert rows["one"] == {"episode": "one", "value": "0.3", "fell": "TRUE", "note": "wet, cold", "distance": ""}
     assert rows["two"]["distance"] == "1.5" and rows["two"]["value"] == ""
-    assert journal.is_yes(rows["one"]["fell"]) and journal.marked(path) == ""
+    assert journal.is_yes(rows["one"]["fell"]) and journal.read_mark(path) == ""

@@ -6,7 +6,7 @@ import pytest
 from gsl.core.servo import ROW, Servo, numbers
 from gsl.worlds.drive_train import TOOTH_STIFFNESS
 from gsl.worlds.servo import BRISTLE, servo_torque
-from gsl.worlds.servo_state import first_state, packed
+from gsl.worlds.servo_state import first_state, pack
 
 STEP, PERIOD = 0.002, 0.02
 INERTIA = 0.008  # of the joint's output in these tests [kg·m²]
@@ -14,7 +14,7 @@ INERTIA = 0.008  # of the joint's output in these tests [kg·m²]
 
 def servo(**fields: float) -> np.ndarray:
     usual = {"kp": 10.0, "kd": 0.0, "limit": 5.0, "no_load_speed": 8.0, "armature": 0.007}
-    return packed(Servo.of(**{name: np.array([value]) for name, value in {**usual, **fields}.items()}), 12.0)
+    return pack(Servo.of(**{name: np.array([value]) for name, value in {**usual, **fields}.items()}), 12.0)
 
 
 def torque(parameters: np.ndarray, target: float, q: float, v: float, elapsed: float = 0.0) -> float:
@@ -39,7 +39,7 @@ def targets_seen(delay: float, commands: np.ndarray) -> np.ndarray:
 
 def test_every_number_stands_in_its_row() -> None:
     values = {name: np.full(2, 2.0 + k) for k, name in enumerate(Servo._fields)}
-    rows = packed(Servo.of(**values), 12.0).rows
+    rows = pack(Servo.of(**values), 12.0).rows
     for name, value in values.items():
         np.testing.assert_array_equal(rows[getattr(ROW, name)], value)
 

@@ -12,7 +12,7 @@ from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, LAYERS, NOBODY, SPEED_UNIT,
 from gsl.worlds.bullet import BulletEnv
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo import servo_torque
-from gsl.worlds.servo_state import COMMANDS, first_state, packed
+from gsl.worlds.servo_state import COMMANDS, first_state, pack
 
 N = len(NAO.motors)
 PLANTS = {"nominal": with_fields(NAO, {}), "everything": with_fields(NAO, EVERYTHING)}
@@ -22,7 +22,7 @@ GROUPS = np.arange(N) % 2
 
 def torques(plant: Plant, steps: int = 60) -> np.ndarray:
     """Torques of servos whose joints are moved at random [N·m], shape (steps, N)."""
-    rng, parameters = np.random.default_rng(0), packed(plant.servo, plant.robot.supply_voltage, plant.law)
+    rng, parameters = np.random.default_rng(0), pack(plant.servo, plant.robot.supply_voltage, plant.law)
     motion, rows = np.array([rng.uniform(-0.2, 0.2, N), rng.uniform(-2.0, 2.0, N)]), []
     state, torque = first_state(rng.uniform(-0.2, 0.2, (COMMANDS, N)), motion, STEP), np.empty(N)
     for k in range(steps):

@@ -14,14 +14,14 @@ from gsl.core.layout import Layout
 from gsl.core.scaling import scaling
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
-from gsl.models.calibration import calibrated, mixing
+from gsl.models.calibration import calibrate, mixing
 from gsl.models.choice import fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Ensemble, ensemble
 from gsl.models.forward import ForwardModel
 from gsl.models.head import Head
 from gsl.models.inverse import Solver
-from gsl.models.network import Network, unscaled
+from gsl.models.network import Network, unscale
 from gsl.storage.models import read_forward_model, write_model
 
 JOINTS, HISTORY = ("a", "b"), History(1)
@@ -76,7 +76,7 @@ def test_raw_outputs_of_scaled_targets_are_those_of_plain_ones(head: Head) -> No
     outputs = scaling(values)
     network, x = a_network(head), np.random.default_rng(2).normal(size=(4, SIZE))
     as_they_are = scaling(np.zeros((2, SIZE)))
-    plain = unscaled(list(network.layers), as_they_are, head.scaling(outputs))
+    plain = unscale(list(network.layers), as_they_are, head.scaling(outputs))
     wanted = outputs.undo(head.expected(network.predict_many(x)))
     np.testing.assert_allclose(head.expected(plain.predict_many(x)), wanted, rtol=1e-4)
     if head.draws:
@@ -141,7 +141,7 @@ def test_calibration_finds_how_wide_errors_are_and_how_long_they_last(head: Head
     sd = np.sqrt((weights[..., None] * (sds**2 + (means - expected[:, None]) ** 2)).sum(axis=-2))
     outputs = expected + [1.5, 0.8] * sd * np.array([drawn.normal(N) for _ in range(count)])
     parts = [(inputs[k : k + 300], outputs[k : k + 300]) for k in range(0, count, 300)]
-    wider, found = calibrated(network, head, parts)
+    wider, found = calibrate(network, head, parts)
     np.testing.assert_allclose(found, memory, atol=0.06)
     np.testing.assert_array_equal(head.expected(wider.predict_many(inputs)), expected)
     scale = head.parts(wider.predict_many(inputs))[2] / sds
@@ -153,7 +153,7 @@ def test_a_joint_that_is_quite_still_has_no_memory() -> None:
     inputs = rng.normal(size=(300, SIZE))
     outputs = GAUSSIAN.expected(network.predict_many(inputs))
     outputs[:, 0] += rng.normal(size=300)
-    _, memory = calibrated(network, GAUSSIAN, [(inputs, outputs)])
+    _, memory = calibrate(network, GAUSSIAN, [(inputs, outputs)])
     assert memory[1] == 0.0 and np.isfinite(memory).all()
 
 

@@ -25,7 +25,7 @@ from gsl.errors import ConfigError, InputError
 from gsl.runner.request import NAME, hash_of
 from gsl.storage.manifest import HASH
 from gsl.storage.manifest import _hash as manifest_hash
-from gsl.storage.requests import sealed, write_request
+from gsl.storage.requests import seal, write_request
 
 SECONDS = 30.0
 LOG = "time,action.a,position.a\n" + "".join(f"{0.01 * k:.2f},{0.1 * k},{0.1 * k}\n" for k in range(50))
@@ -167,7 +167,7 @@ def request(folder: Path, target: str) -> None:
         "ramp": {"seconds": 1.0, "speed": 0.5, "within": 0.1}, "policy": {"_target_": "gsl.policies.linear.Linear"},
         "action_noise": 0.0, "task": {}, "until_fall": False, "distance": False, "episodes": [episode],
     }  # fmt: skip
-    write_request(folder, sealed(asked), [])
+    write_request(folder, seal(asked), [])
     changed = {**asked, "policy": {"_target_": target}, "schema_version": 1}
     (folder / NAME).write_text(json.dumps({**changed, "hash": hash_of(changed)}))
 

@@ -8,7 +8,7 @@ from typing import Any, cast
 import pytest
 
 from gsl.core.unit import Unit
-from gsl.report.account import returned
+from gsl.report.account import describe_choice
 from gsl.report.evaluation_cells import cells
 from gsl.report.headline import _optimize
 from gsl.report.iteration import Rounds
@@ -48,7 +48,7 @@ def evaluation(*figures: float) -> Artifact:
     ],
 )
 def test_a_value_is_never_its_gain(figures: tuple[float, ...], end: str) -> None:
-    told = returned(metrics(*figures), Unit())
+    told = describe_choice(metrics(*figures), Unit())
     assert told.startswith(
         f"generation_01 is returned: on fresh episodes {figures[1]:.1f}, no falls in 10; π0 -6.0; gain "
     )

@@ -6,11 +6,11 @@ import numpy as np
 from bodies import STANCE, followed, held, world
 from scipy.linalg import solve_discrete_lyapunov
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.dynamics import mass_matrix
 from gsl.core.plant import noiseless, nominal
 from gsl.diagnosis.hypothesis.candidates import library
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
 from gsl.worlds.bullet import BulletEnv, BulletWorld
 from gsl.worlds.torque_noise import TorqueNoise
@@ -46,7 +46,7 @@ def test_a_constant_torque_deflects_a_joint_by_its_size_over_the_gain() -> None:
 
 
 def test_white_torque_trembles_as_a_linear_system_driven_by_white_noise_does() -> None:
-    robot, servo, sd = lumped(nao()), nominal(nao()).servo, 0.3
+    robot, servo, sd = lump(nao()), nominal(nao()).servo, 0.3
     stance = dict(zip(robot.motors, at_rest({}, range(1))[0, -1], strict=True))
     inertia = mass_matrix(robot, stance)[6:, 6:] + np.diag(servo.armature)
     inverse, n = np.linalg.inv(inertia), len(robot.motors)
@@ -61,7 +61,7 @@ def test_white_torque_trembles_as_a_linear_system_driven_by_white_noise_does() -
 
 
 def test_it_acts_on_the_joints_of_its_scope_alone_and_draws_nothing_for_others() -> None:
-    plant = applied(nominal(nao()), built({"torque_noise": {"step": 0.2, "constant": 0.1, "joints": "arms"}}))
+    plant = apply_all(nominal(nao()), build({"torque_noise": {"step": 0.2, "constant": 0.1, "joints": "arms"}}))
     noise = TorqueNoise(plant.torque_noise, 10, np.random.default_rng(0))
     drawn = np.array([noise.draw() for _ in range(400)])
     mask = plant.mask("arms")
@@ -93,5 +93,5 @@ def test_an_episode_is_a_function_of_its_seed_and_no_other_noise_changes() -> No
 
 def test_no_replay_has_it_and_no_diagnosis_tries_it() -> None:
     assert "torque_noise" not in {candidate.effect for candidate in library(nao())}
-    plant = applied(nominal(nao()), built({"torque_noise": {"step": 0.2, "constant": 0.1}}))
+    plant = apply_all(nominal(nao()), build({"torque_noise": {"step": 0.2, "constant": 0.1}}))
     assert not noiseless(plant).torque_noise.any()

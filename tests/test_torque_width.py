@@ -11,7 +11,7 @@ from bodies import STANCE, followed, held
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.log import Log, cut_log
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
 from gsl.training.torque_width import held_out_widths
 from gsl.worlds.held import Held, Windows
@@ -43,7 +43,7 @@ def log(effects: dict[str, Any], count: int = 16) -> Log:
 
 
 def widths(effects: dict[str, Any], known: dict[str, Any] | None = None) -> dict[str, tuple[float, float]]:
-    both = held_out_widths(log(effects), applied(nominal(nao()), built(known or {})), step=0.002)
+    both = held_out_widths(log(effects), apply_all(nominal(nao()), build(known or {})), step=0.002)
     return {group: tuple(width) for group, width in both.items()}
 
 

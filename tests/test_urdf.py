@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.dynamics import forward_kinematics
 from gsl.core.plant import nominal
 from gsl.robots.nao import nao
 from gsl.robots.urdf import principal_axes, urdf
 from gsl.worlds.engine import Engine
 from gsl.worlds.physics import Physics
-from gsl.worlds.rotor import carried_inertia, rotors
+from gsl.worlds.rotor import carry_inertia, rotors
 from gsl.worlds.start import resting
 
 
@@ -24,11 +24,11 @@ def matrix(engine: Engine, quaternion: tuple) -> np.ndarray:
 
 
 def test_bullet_knows_the_masses_and_inertias_that_were_written(engine: Engine) -> None:
-    robot = lumped(nao())
+    robot = lump(nao())
     start = resting(robot, np.zeros(16), np.zeros(16), floating=True)
     engine.load(start.reading, start.commands)
     carried = rotors(robot, nominal(nao()).servo.armature, floating=True).carried
-    extra, links = carried_inertia(robot, carried), engine.links
+    extra, links = carry_inertia(robot, carried), engine.links
     total = 0.0
     for name, link in robot.links.items():
         info = engine.bullet.getDynamicsInfo(engine.body, links[name], physicsClientId=engine.client)
@@ -43,7 +43,7 @@ def test_bullet_knows_the_masses_and_inertias_that_were_written(engine: Engine) 
 
 
 def test_bullet_puts_every_link_where_our_kinematics_put_it(engine: Engine) -> None:
-    robot, rng = lumped(nao()), np.random.default_rng(0)
+    robot, rng = lump(nao()), np.random.default_rng(0)
     for _ in range(20):
         positions = np.array([rng.uniform(robot.joint(name).lower, robot.joint(name).upper) for name in robot.motors])
         start = resting(robot, positions, positions, floating=True)

@@ -9,7 +9,7 @@ import pytest
 from commands import done, gsl, refused
 from robots_of_files import as_bullet_reads, holding
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.dynamics import forward_kinematics
 from gsl.policies.limits import limits
 from gsl.robots.catalogue import robot
@@ -95,10 +95,10 @@ def test_a_follower_of_a_follower_turns_as_bullet_turns_it(tmp_path: Path) -> No
     told = robot(file)
     assert dict(told.coupled) == {"j3": "j1"}  # j2 goes twice as far, which no servo of ours does
     at = 0.4
-    frames = forward_kinematics(lumped(told), {"j1": at, "j3": at})
+    frames = forward_kinematics(lump(told), {"j1": at, "j3": at})
     angle = 0.5 * (-2.0 * at + 0.2) - 0.3
     expected = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
-    com = lumped(told).links["c"].com
+    com = lump(told).links["c"].com
     np.testing.assert_allclose(frames.turn["c"] @ com, expected @ [0.0, 0.0, 0.05], atol=1e-12)
     place = -2.0 * 0.0 + 0.2  # where it follows to while its leader is at 0
     assert f"joint j2 is held at {place:g} rad (follows j1 by a factor of -2; only 1 and -1 can be driven)" in (

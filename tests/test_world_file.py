@@ -12,7 +12,7 @@ from test_plausibility import claim
 
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.simulate import calibration
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 
 PARTS = ("kp", "kd", "coulomb", "viscous", "armature", "offset", "load_friction", "stribeck")
 
@@ -31,7 +31,7 @@ def test_a_calibration_of_either_sign_is_in_the_file(cause: Hypothesis, size: fl
     answer = replace(result.answer, fit=replace(fit, shifts=shifted), **cast(Any, parts))
     changed = replace(result, selection=replace(result.selection, chosen=answer, none=answer))
     assert changed.answer is answer
-    written = applied(result.simulator.plant, built(changed.effects))
+    written = apply_all(result.simulator.plant, build(changed.effects))
     for part in PARTS:
         scored = getattr(changed.corrected.servo, part)
         np.testing.assert_allclose(getattr(written.servo, part), scored, rtol=1e-4, atol=2e-6, err_msg=part)

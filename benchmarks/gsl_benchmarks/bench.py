@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.interfaces import SIM
 from gsl.core.scratch import Scratch
 from gsl.core.trajectory import Batch, Trajectory
@@ -132,8 +132,8 @@ def _writing(scenario: Scenario, made: Sequence[Trajectory]) -> float:
         "role": SIM,
         "source": "gsl bench",
         "seed": 0,
-        "world": described(scenario.world),
-        "policy": described(scenario.policy),
+        "world": describe(scenario.world),
+        "policy": describe(scenario.policy),
     }
     batch = Batch(episodes, layout.joints, layout.control_period, about)
     with Scratch() as folder:

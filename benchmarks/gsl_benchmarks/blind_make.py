@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from gsl.core.console import Console
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.setting import component, setting
 from gsl.errors import GslError
 from gsl.policies.excitation import Excitation
@@ -77,7 +77,7 @@ class BlindMake:
         shared = (
             workshop,
             Track(world, self.walks),
-            {key: value for key, value in described(world).items() if key != "_target_"},
+            {key: value for key, value in describe(world).items() if key != "_target_"},
         )
         with console.progress(len(orders), "making cases") as progress:
             made = in_parallel(_made, shared, orders, self.workers, progress)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.interfaces import REAL
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.statistics import rank_correlation
 from gsl.core.trajectory import Trajectory
 from gsl.grounding.none import NoGrounding
@@ -64,7 +64,7 @@ def measured(step: float, iterations: int, first_seed: int = 0) -> Measured:
     chosen = [policy.initial] * REPEATS + [neighbour(policy, policy.initial, SPREAD, rng) for _ in range(POLICIES)]
     rollout(scenario, env, policy.initial, 0)  # compiles
     begun = time.process_time()
-    walks = [rollout(scenario, env, theta, derived_seed(first_seed, i)) for i, theta in enumerate(chosen)]
+    walks = [rollout(scenario, env, theta, derive_seed(first_seed, i)) for i, theta in enumerate(chosen)]
     cpu = (time.process_time() - begun) / sum(map(len, walks)) * scenario.task.duration / world.period
     env.close()
     values, falls = np.array([walk.value for walk in walks]), np.array([walk.ended_in_a_fall for walk in walks])

@@ -12,7 +12,7 @@ import numpy as np
 
 from gsl.core.console import Console
 from gsl.core.interfaces import REAL, SIM, Grounding
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval
 from gsl.errors import ConfigError
@@ -155,7 +155,7 @@ class Budget:
         acting = Scenario(chain.sim, chain.task, chain.policy, SIM, ready).prepare(found.metrics).grounding
         assert isinstance(acting, LoadedTransformation), "its world is a robot"
         env: Any = chain.sim.make()
-        drawn = derived_seed(seed, "replays")
+        drawn = derive_seed(seed, "replays")
         grounded, bare = (replayed(env, one, begins, drawn)[TICKS] for one in (acting.expected, NoGrounding()))
         env.close()
         errors = degrees(grounded.joints), degrees(bare.joints)

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from gsl.core.console import Console
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval
 from gsl.core.table import Table
@@ -107,7 +107,7 @@ class Figure11:
 
     def _trial(self, simulator: Table, start: np.ndarray, noise: float, method: str, trial: int) -> Point:
         real, policy = self._real(noise), start
-        rng = np.random.default_rng(derived_seed(self.seed, self.kind, round(1e6 * noise), trial))
+        rng = np.random.default_rng(derive_seed(self.seed, self.kind, round(1e6 * noise), trial))
         inverse = Counts(played(simulator, start, self.sim_episodes, rng, explore=0.9).seen, "inverse_model")
         seen, rounds, converged = np.zeros(real.chances.shape), 0, False
         while rounds < self.rounds and not converged:

@@ -16,11 +16,11 @@ from gsl.core.setting import component, setting
 from gsl.core.unit import Unit
 from gsl.core.words import several
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects, evidence_of, learned
+from gsl.grounding.effects import DiagnosedEffects, evidence_of, is_learned
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
-from gsl.stages.values import ranked
+from gsl.stages.values import rank
 from gsl.storage.artifact import Artifact
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.gymnasium import try_out
@@ -150,7 +150,7 @@ class Compare:
             previous = chain.pretrained(below / "sim" / "pretrained" / name, seed, console)
         for iteration in range(1, self.iterate.iterations + 1):
             place = below / cell.world / cell.method / name / (f"iteration_{iteration:02d}" if iteration > 1 else "")
-            apart = learned(grounding) or flight is not None or iteration > 1
+            apart = is_learned(grounding) or flight is not None or iteration > 1
             spent += sum(self.iterate.budget.real) if REAL in evidence_of(grounding) else 0
             out = place if apart else below / "sim" / cell.method / name
             at = seed_of_round(seed, iteration)
@@ -176,4 +176,4 @@ class Compare:
         if not self.rank:
             return None
         simulated = chain.values(out / "values", ready, found.metrics, console)
-        return ranked(simulated, chain.values(world / "values", None, {}, console))
+        return rank(simulated, chain.values(world / "values", None, {}, console))

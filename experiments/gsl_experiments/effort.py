@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from gsl.core.interfaces import REAL, SIM, Grounding, Search, World
 from gsl.errors import ConfigError
-from gsl.grounding.effects import DiagnosedEffects, innermost, learned
+from gsl.grounding.effects import DiagnosedEffects, innermost, is_learned
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.servo import LearnedServo
 from gsl.rollout.parallel import threads
@@ -62,15 +62,15 @@ def seconds(study: Compare, *, search: bool = True) -> float:
     flights = {name: parts for name, method in study.methods.items() if (parts := _flown(method))}
     rolled = fitted = 0.0
     for name, method in study.methods.items():
-        apart = learned(method) or name in flights
+        apart = is_learned(method) or name in flights
         searches = rounds if apart else rounds - worlds + 1  # what knows no world searches first for all of them
-        rolled += searches * searched * sim * (LEARNED if learned(method) else 1.0) + rounds * measured * real
+        rolled += searches * searched * sim * (LEARNED if is_learned(method) else 1.0) + rounds * measured * real
         rolled += (worlds if apart else 1) * Values.count * sim if study.rank else 0.0
-        if learned(method):
+        if is_learned(method):
             further = rounds - worlds  # whose data are a method's own; in the first simulators with effects are
             rolled += further * collected[0] * real + (rounds if name in flights else further) * collected[1] * sim
             fitted += rounds * APART
-    if any(map(learned, study.methods.values())):
+    if any(map(is_learned, study.methods.values())):
         rolled += worlds * collected[0] * real + collected[1] * sim
     flown = len(iterate.diagnosis.excitation.motions) * iterate.diagnosis.excitation.duration if flights else 0.0
     fitted += worlds * flown * sum(FLOWN[part] for part in set(chain(*flights.values())))

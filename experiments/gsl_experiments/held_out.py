@@ -6,14 +6,14 @@ from pathlib import Path
 
 from gsl.core.console import Console
 from gsl.core.interfaces import REAL, World
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError, GslError
 from gsl.models.free_run import TICKS
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.collect import FILE, Collect
 from gsl.stages.iterate import Iterate
-from gsl.stages.link import built
+from gsl.stages.link import build_link
 from gsl.storage.trajectories import read
 from gsl.training.data import of_policy
 from gsl.validation.check import REPLAYS
@@ -53,9 +53,9 @@ def held_out(chain: Chain, place: Path, seed: int, console: Console) -> Batch:
         spread=chain.budget.spread,
         action_noise=chain.budget.real_action_noise,
         workers=chain.workers,
-        seed=derived_seed(seed, "held out"),
+        seed=derive_seed(seed, "held out"),
     )
-    return read(built(stage, place, console).folder / FILE)
+    return read(build_link(stage, place, console).folder / FILE)
 
 
 def starts(held: Batch, chain: Chain) -> list[Place]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from gsl.core.console import Console
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.setting import setting
 from gsl.errors import ArtifactError, ConfigError
 from gsl.storage.documents import text, write_json
@@ -52,7 +52,7 @@ def recipe(*parts: Any) -> str:
     Neither settings on which no result depends nor gsl's sources are part of it: rows say who made them.
     """
     files = {name: file_hash(path) for name, path in read_files(list(parts)).items()}
-    settings = text([without(described(list(parts)), _idle), files])
+    settings = text([without(describe(list(parts)), _idle), files])
     return hashlib.sha256(settings.encode()).hexdigest()[:DIGITS]
 
 

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 from gsl.errors import ArtifactError
 from gsl.storage import documents
 from gsl.storage.hashing import file_hash
-from gsl.storage.whole import explained, replacing
+from gsl.storage.whole import explain_refusal, replacing
 
 RECIPE, MADE_BY = "recipe", "made_by"
 SHOWN = 3  # of names that are wrong
@@ -52,7 +52,7 @@ def read(path: Path, kind: type[Figures]) -> dict[str, list[dict[str, Any]]]:
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write the rows; before that their hash is added to a hidden file beside them, so that a kill harms neither."""
     text = documents.pretty(rows)
-    with explained(path.parent), _seal(path).open("a") as seal:
+    with explain_refusal(path.parent), _seal(path).open("a") as seal:
         seal.write(f"{hashlib.sha256(text.encode()).hexdigest()}\n")
         seal.flush()
         os.fsync(seal.fileno())

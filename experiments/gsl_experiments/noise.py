@@ -18,10 +18,10 @@ from gsl.core.setting import component, setting
 from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
-from gsl.grounding.effects import evidence_of, learned
+from gsl.grounding.effects import evidence_of, is_learned
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.trpo import Trpo
-from gsl.policies.policy import sized
+from gsl.policies.policy import size
 from gsl.report.console import Console
 from gsl.rollout.parallel import Workers, arriving
 from gsl.stages.chain_rounds import Chain
@@ -115,7 +115,7 @@ class NoiseStudy:
             points,
             places=[Place(*one) for one in product(self.worlds, self.noises, self._rounds)],
             shown=self._shown,
-            learned=[name for name, one in self.methods.items() if learned(one)],
+            learned=[name for name, one in self.methods.items() if is_learned(one)],
             noisy=[name for name, one in self.methods.items() if isinstance(one, ActionNoise)],
             trials=self.trials,
             chosen=self.choice == REAL,
@@ -170,7 +170,7 @@ class NoiseStudy:
             at = replace(chain, real=real, optimizer=self.further, shared=shared)
             for method, grounding in self.methods.items():
                 place = below / method / name
-                first = place if learned(grounding) else alone / method / name
+                first = place if is_learned(grounding) else alone / method / name
                 of = partial(Point, world, noise, method, number)
                 points += self._carried_out(of, at, grounding, first, place, start, seed)
             of, place = partial(Point, world, noise, REFERENCE, number), below / "real" / name
@@ -234,7 +234,7 @@ class NoiseStudy:
 
     def _chain(self, sim: World) -> Chain:
         """Return the links in a simulator, for whose sizes the policy is made anew."""
-        policy = sized(self.iterate.policy, sim)
+        policy = size(self.iterate.policy, sim)
         return replace(self.iterate.chain, sim=sim, policy=policy, workers=1, accept=True)
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 from gsl.core.console import Console, Silent
 from gsl.core.interfaces import REAL, SIM, Grounding, World
 from gsl.core.layout import check_alike
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, innermost
@@ -22,7 +22,7 @@ from gsl.models.free_run import TICKS
 from gsl.rollout.rollout import Scenario
 from gsl.stages.iterate import Iterate, check_trainable
 from gsl.training.data import degrees, of_policy
-from gsl.validation.check import asked
+from gsl.validation.check import ask_reachability
 from gsl.validation.check_grounding import check_grounding
 from gsl.validation.compliance import joint_groups
 from gsl.validation.gate import Gate
@@ -125,10 +125,10 @@ class Replays:
         scenario, found = check_grounding(Scenario(chain.sim, chain.task, chain.policy, SIM, ready), gate)
         acting, reach = scenario.grounding, None
         env: Any = scenario.world.make()
-        drawn = derived_seed(seed, "replays")
+        drawn = derive_seed(seed, "replays")
         if isinstance(acting, LoadedTransformation):
             acting = acting.expected
-            reach = asked(env, acting, of_policy(held, pi0=False), drawn)
+            reach = ask_reachability(env, acting, of_policy(held, pi0=False), drawn)
         after = replayed(env, acting, begins, drawn)
         env.close()
         console.status("loading single joints in the air")

@@ -13,7 +13,7 @@ import numpy as np
 from gsl.core.console import Console
 from gsl.core.history import windows
 from gsl.core.interfaces import REAL, Grounding, World
-from gsl.core.observation import observations, sensed
+from gsl.core.observation import observations, read_sensors
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
 from gsl.errors import ConfigError
@@ -180,7 +180,7 @@ def _walked(iterate: Iterate) -> Trajectory:
 
 def _predicted(forward: Forward, walk: Trajectory, tick: int, ticks: int) -> np.ndarray:
     """Return where f, fed with its own answers, sees the joints go [rad], shape (ticks, n_joints)."""
-    x, body = walk.position.copy(), sensed(walk, forward.history.sensors)
+    x, body = walk.position.copy(), read_sensors(walk, forward.history.sensors)
     for now in range(tick, tick + ticks):
         x[now + 1] = x[now] + forward.effects(windows(forward.history, x, walk.action, body, np.array([now])))[0]
     return x[tick + 1 : tick + 1 + ticks]

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from gsl.core.impedance import closed
+from gsl.core.impedance import compute_closure
 from gsl.core.interfaces import Grounding, World
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.grounding.none import NoGrounding
 from gsl.validation.compliance import Compliance, measure
-from gsl.validation.compliance_transfer import RESOLUTION, SECTION, transferred
+from gsl.validation.compliance_transfer import RESOLUTION, SECTION, compute_transfers
 from gsl.worlds.bullet import BulletWorld
 
 
@@ -28,7 +28,7 @@ def closed_strength(sim: Compliance, grounded: Compliance, real: Compliance, gro
     """Return the share of a group's gap in strength that is closed joint by joint; None where there is none."""
     where = sim.where(group)
     before, after, robot = (place.torque[where] for place in (sim, grounded, real))
-    return closed(before, after, robot, RESOLUTION * before)
+    return compute_closure(before, after, robot, RESOLUTION * before)
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Loads:
             return Yielding()
         bare = isinstance(grounding, NoGrounding)
         grounded = self._bare(world) if bare else measure(world, grounding, self._start)
-        shares = transferred(sim, grounded, robot)
+        shares = compute_transfers(sim, grounded, robot)
         return Yielding(
             {group: share.stiffness for group, share in shares.items()},
             {group: share.torque for group, share in shares.items()},
@@ -70,7 +70,7 @@ class Loads:
 
     @property
     def _start(self) -> int:
-        return derived_seed(self.seed, SECTION)  # as optimize and iterate measure it
+        return derive_seed(self.seed, SECTION)  # as optimize and iterate measure it
 
     def _bare(self, world: World) -> Compliance:
         for measured, compliance in self.bare:

@@ -10,8 +10,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from gsl.api.overrides import overrides
-from gsl.commandline.composer import compose, opened
-from gsl.commandline.config import resolved
+from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.config import resolve
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import spoken
 from gsl.core.described import rebuilt
@@ -70,11 +70,11 @@ def _make(group: str, name: str, config_dir: Path | str | None, settings: Mappin
     own = {key: value for key, value in settings.items() if key == TRUST}
     below = {key: value for key, value in settings.items() if key not in own}
     folder, arguments = None if config_dir is None else Path(config_dir), list(overrides(own))
-    with opened(folder):
+    with open_hydra(folder):
         if folder is not None:  # effects of a world that is there already stay
             load_own_effects(folder, spoken(arguments))
         composition = compose(ROLES[group], [f"{group}={name}", *overrides(below, f"{group}."), *arguments])
-    made = rebuilt(resolved(composition)[group], trust=composition.trust, where=group)
+    made = rebuilt(resolve(composition)[group], trust=composition.trust, where=group)
     if not isinstance(made, kind):
         raise ConfigError(group, f"is no {group}", given=name)
     return made

@@ -11,7 +11,7 @@ from typing import Any
 from gsl.core.described import rebuilt
 from gsl.core.interfaces import World
 from gsl.grounding.diagnosis_file import read_diagnosis
-from gsl.grounding.effects import switched_on
+from gsl.grounding.effects import switch_on
 from gsl.report.account import account
 from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import PAGE, report_of
@@ -79,7 +79,7 @@ class Verdict(Result):
     def world(self) -> World:
         """The simulator with what it lacks."""
         sim = rebuilt(self.artifact.config["sim"], trust=self.trust, where="sim")
-        return switched_on(sim, read_diagnosis(str(self.folder), "diagnose"))
+        return switch_on(sim, read_diagnosis(str(self.folder), "diagnose"))
 
     @property
     def summary(self) -> str:

@@ -9,15 +9,15 @@ import numpy as np
 
 from gsl.api.components import make_policy, make_task
 from gsl.core.console import Silent
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.interfaces import Grounding, Policy, Task, World
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.core.validation import make
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
-from gsl.policies.policy import sized
+from gsl.policies.policy import size
 from gsl.rollout.parallel import Job, Workers, trajectories
 from gsl.rollout.rollout import Scenario
 
@@ -69,10 +69,10 @@ def roll_out(
         if not isinstance(given, kind):
             name = kind.__name__.lower()
             raise ConfigError(name, f"is no {name}; gsl.make_{name} makes one", given=str(given))
-    family = sized(family, world)
+    family = size(family, world)
     chosen = family.initial if parameters is None else _numbers(parameters, family)
     scenario = Scenario(world, task, family, how.role, grounding).prepare()
-    jobs = [Job(chosen, derived_seed(how.seed, "rollout", k)) for k in range(how.episodes)]
+    jobs = [Job(chosen, derive_seed(how.seed, "rollout", k)) for k in range(how.episodes)]
     with Silent().progress(how.episodes, "rolling out") as progress:
         done = trajectories(scenario, jobs, workers=how.workers, progress=progress)
     layout, label = world.layout, PI0 if parameters is None else "given"
@@ -81,8 +81,8 @@ def roll_out(
         "role": how.role,
         "source": "gsl.roll_out",
         "seed": how.seed,
-        "world": described(world),
-        "policy": described(family),
+        "world": describe(world),
+        "policy": describe(family),
         "grounding": f"{type(grounding).__module__}.{type(grounding).__qualname__}",
         "action_noise": 0.0,
         **({"cells": layout.cells, "choices": layout.choices} if layout.states else {}),

@@ -10,13 +10,13 @@ from typing import Any
 from gsl.api.files import write_trajectories
 from gsl.api.overrides import overrides
 from gsl.api.results import Result, Verdict
-from gsl.commandline.composer import commands, compose, opened
-from gsl.commandline.config import CommandSettings, execute, resolved
+from gsl.commandline.composer import commands, compose, open_hydra
+from gsl.commandline.config import CommandSettings, execute, resolve
 from gsl.commandline.overrides import file_of
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import spoken
 from gsl.core.console import Silent
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.interfaces import World
 from gsl.core.trajectory import Batch
 from gsl.core.trust import modules_in
@@ -51,16 +51,16 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
         if (whole := key.partition(".")[0]) in objects:
             raise ConfigError(key, f"is below {whole}, which goes as it is; set it there")
     folder, arguments = None if config_dir is None else Path(config_dir), list(overrides(plain))
-    with opened(folder):
+    with open_hydra(folder):
         if folder is not None:  # effects of a world that is there already stay
             load_own_effects(folder, spoken(arguments))
         composition = compose(command, arguments)
-        config = resolved(composition)
+        config = resolve(composition)
     trust = [*composition.trust]
     for key, value in objects.items():
         if key not in config:
             raise ConfigError(key, f"gsl {command} has no such setting")
-        config[key] = described(value)
+        config[key] = describe(value)
         trust += modules_in({key: config[key]})  # of a class that is in the user's hands already
     named = ", ".join(f"{key}={value!r}" for key, value in settings.items())
     document = execute(command, f"gsl.run({command!r}, {named})", config, Silent() if quiet else Console(), trust=trust)

@@ -16,7 +16,7 @@ def complete(ctx: typer.Context, incomplete: str) -> list[str]:
     """Return what the word under the cursor may become."""
     typed, words_of_bash = incomplete, os.environ.get("COMP_WORDS")
     if words_of_bash:
-        typed = joined(words_of_bash.split("\n"), int(os.environ.get("COMP_CWORD", "0")))
+        typed = join_words(words_of_bash.split("\n"), int(os.environ.get("COMP_CWORD", "0")))
     found = suggestions(name_of(ctx), typed, config_dir=user_folder(ctx))
     cut = len(typed) - len(incomplete.lstrip("="))
     return [word[cut:] for word in found]
@@ -33,7 +33,7 @@ def user_folder(ctx: typer.Context) -> Path | None:
     return Path(folder) if folder else None
 
 
-def joined(words: Sequence[str], cursor: int) -> str:
+def join_words(words: Sequence[str], cursor: int) -> str:
     """Return the whole word at the cursor: bash splits `world=nao` into three."""
     before = [word for word in words[: cursor + 1]]
     while len(before) > 1 and ("=" in (before[-1][:1], before[-2][-1:])) and " " not in before[-2]:
@@ -43,9 +43,9 @@ def joined(words: Sequence[str], cursor: int) -> str:
 
 def suggestions(command: str, typed: str, *, config_dir: Path | None = None) -> list[str]:
     """Return the overrides of a command that begin with what was typed."""
-    from gsl.commandline.help import explained
+    from gsl.commandline.help import explain
 
-    explanation = explained(command, config_dir=config_dir)
+    explanation = explain(command, config_dir=config_dir)
     key = typed.partition("=")[0]
     if "=" in typed:
         words = [f"{key}={name}" for name in explanation.options.get(key, ())]

@@ -20,8 +20,8 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
-from gsl.commandline.config_errors import Vocabulary, misshapen, translated, unfit, unknown_key
-from gsl.commandline.known_settings import declared, known_keys, plain
+from gsl.commandline.config_errors import Vocabulary, misshapen, translate, unfit, unknown_key
+from gsl.commandline.known_settings import list_keys, plain, read_declared
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
 from gsl.commandline.own_word import find_own_modules, spoken
 from gsl.commandline.plugins import folders, packages
@@ -82,7 +82,7 @@ def configuration_folder() -> Path:
 
 
 @contextmanager
-def opened(config_dir: Path | None) -> Iterator[None]:
+def open_hydra(config_dir: Path | None) -> Iterator[None]:
     """Open hydra on our configuration and, in front of it, the user's.
 
     Raises:
@@ -107,21 +107,21 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
     find_own_modules(typed)
     trust = (*typed, *(package for package in packages() if not is_ours(package)))
     try:
-        base = _composed(command, [], trust)
-        vocabulary = Vocabulary(known_keys(_without_hydra(base)), _choices(base), options)
+        base = _compose(command, [], trust)
+        vocabulary = Vocabulary(list_keys(_without_hydra(base)), _choices(base), options)
         overrides = rewrite(arguments, vocabulary.chosen)
         _check_grammar(overrides)
-        composition = _added_where_declared(command, overrides, trust, multirun)
+        composition = _add_declared(command, overrides, trust, multirun)
     except (CompactHydraException, OmegaConfBaseException, YAMLError) as error:
         words = _with_choices(command, arguments, vocabulary, trust)
-        raise unfit(command, arguments, unknown_key(error)) or translated(error, words) from error
+        raise unfit(command, arguments, unknown_key(error)) or translate(error, words) from error
     except ValueError as error:
         raise misshapen(arguments, error, vocabulary) from error
     _check_effects(composition)
     _check_referred(command, composition)
     _check_made(command, composition)
     config = plain(composition.config)
-    strangers = config.keys() - declared(config).keys() - plain(base).keys() - {*COMMAND_KEYS}
+    strangers = config.keys() - read_declared(config).keys() - plain(base).keys() - {*COMMAND_KEYS}
     if misfit := unfit(command, arguments, min(strangers, default=None)):
         raise misfit
     return composition
@@ -130,10 +130,10 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
 def _with_choices(command: str, arguments: Sequence[str], words: Vocabulary, trust: Sequence[str]) -> Vocabulary:
     """Return the words of a command with what is typed of choices, the same ones if these are what is wrong."""
     try:
-        chosen = _composed(command, _of_choices(_first_values(rewrite(arguments, words.chosen))[0]), trust)
+        chosen = _compose(command, _of_choices(_first_values(rewrite(arguments, words.chosen))[0]), trust)
     except (ConfigError, CompactHydraException, OmegaConfBaseException, YAMLError, ValueError):
         return words
-    return replace(words, keys=known_keys(_without_hydra(chosen)))
+    return replace(words, keys=list_keys(_without_hydra(chosen)))
 
 
 def options(group: str) -> list[str]:
@@ -174,7 +174,7 @@ def _check_referred(command: str, composition: Composition) -> None:
     for key in typed:
         if f"${{{key}}}" not in told:
             last = key.rpartition(".")[2]
-            keys = [one for one in known_keys(composition.config) if not one.startswith(REFERRED)]
+            keys = [one for one in list_keys(composition.config) if not one.startswith(REFERRED)]
             others = [one for one in keys if one.rpartition(".")[2] == last]
             hint = f"; did you mean {' or '.join(others[:3])}?" if others else ""
             raise ConfigError(key, f"nothing in gsl {command} refers to it here{hint}")
@@ -187,12 +187,12 @@ def _check_made(command: str, composition: Composition) -> None:
             raise ConfigError(key, "is made here; gsl optimize takes one that is there")
 
 
-def _added_where_declared(command: str, overrides: list[str], trust: tuple[str, ...], multirun: bool) -> Composition:
+def _add_declared(command: str, overrides: list[str], trust: tuple[str, ...], multirun: bool) -> Composition:
     """Compose, adding settings that only the class names, and what it lets the user name."""
     while True:
         first, swept = _first_values(overrides) if multirun else (overrides, ())
         try:
-            config = _composed(command, first, trust)
+            config = _compose(command, first, trust)
         except CompactHydraException as error:
             key = unknown_key(error)
             others = [override for override, one in zip(overrides, first, strict=True) if key_of(one) != key]
@@ -205,16 +205,16 @@ def _added_where_declared(command: str, overrides: list[str], trust: tuple[str, 
 
 def _declares(command: str, overrides: list[str], key: str, trust: Sequence[str]) -> bool:
     parent, _, name = key.rpartition(".")
-    config = _composed(command, _first_values(_of_choices(overrides))[0], trust)
-    if name in _declared_at(config, parent):
+    config = _compose(command, _first_values(_of_choices(overrides))[0], trust)
+    if name in _find_declared(config, parent):
         return True
     above, _, mapping = parent.rpartition(".")
-    around = _declared_at(config, above)
+    around = _find_declared(config, above)
     return mapping in around and around[mapping].named
 
 
-def _declared_at(config: DictConfig, path: str) -> Mapping[str, Setting]:
-    return declared(plain(OmegaConf.select(config, path) if path else config))
+def _find_declared(config: DictConfig, path: str) -> Mapping[str, Setting]:
+    return read_declared(plain(OmegaConf.select(config, path) if path else config))
 
 
 def _of_choices(overrides: Sequence[str]) -> list[str]:
@@ -235,7 +235,7 @@ def _first_value(override: Any) -> str:
     return f"{override.get_key_element()}={override.value().start}"
 
 
-def _composed(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:
+def _compose(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:
     """Compose; nothing that a file names is imported before it is checked here."""
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None

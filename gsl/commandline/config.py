@@ -12,12 +12,12 @@ from pydantic import AfterValidator, BeforeValidator
 
 from gsl.commandline.composer import Composition
 from gsl.commandline.config_errors import missing, resolution_error
-from gsl.commandline.known_settings import declared
+from gsl.commandline.known_settings import read_declared
 from gsl.commandline.overrides import COMMAND_KEYS, file_of
 from gsl.commandline.own_word import modules_of
 from gsl.core.budget import within
 from gsl.core.console import Console
-from gsl.core.described import described, rebuilt
+from gsl.core.described import describe, rebuilt
 from gsl.core.setting import component, setting
 from gsl.core.trust import TRUST, check_code
 from gsl.core.validation import make
@@ -75,7 +75,7 @@ def execute(
     from gsl.report.account import account
     from gsl.storage.artifact import build
 
-    stage, settings, own = prepared(config, trust)
+    stage, settings, own = prepare(config, trust)
     if getattr(stage, "only_looks", False):
         return dict(stage.look(console))
     out = own.folder(command, level)
@@ -86,14 +86,14 @@ def execute(
     return {"folder": out.as_posix(), "unchanged": artifact.unchanged, "metrics": artifact.metrics, **more(out)}
 
 
-def prepared(config: Mapping[str, Any], trust: Collection[str] = ()) -> tuple[Any, dict[str, Any], CommandSettings]:
+def prepare(config: Mapping[str, Any], trust: Collection[str] = ()) -> tuple[Any, dict[str, Any], CommandSettings]:
     """Return the stage, its settings and those of the command; the stage gets a command's setting if it has the field.
 
     Raises:
         ConfigError: A value is missing, of the wrong type or impossible.
     """
     check_code(config, trust)
-    wanted = declared(dict(config))
+    wanted = read_declared(dict(config))
     own = make(CommandSettings, {key: config[key] for key in COMMAND_KEYS if key in config})
     dropped = {*COMMAND_KEYS, "preset", "recipe"} - wanted.keys()
     settings = {key: value for key, value in config.items() if key not in dropped}
@@ -102,11 +102,11 @@ def prepared(config: Mapping[str, Any], trust: Collection[str] = ()) -> tuple[An
     if TRUST in settings:
         settings[TRUST] = list(trust)
     stage = rebuilt(settings, trust=trust)
-    described(stage)  # refuses what could not be written down afterwards
+    describe(stage)  # refuses what could not be written down afterwards
     return stage, settings, own
 
 
-def resolved(composition: Composition) -> dict[str, Any]:
+def resolve(composition: Composition) -> dict[str, Any]:
     """Return the configuration as plain values, with missing ones as `???`.
 
     Raises:

@@ -49,7 +49,7 @@ def unfit(command: str, arguments: Sequence[str], unknown: str | None) -> Config
     return ConfigError(key, f"is not for gsl {command}, which cannot take its {unknown}", given=typed[key])
 
 
-def translated(error: Exception, words: Vocabulary) -> Exception:
+def translate(error: Exception, words: Vocabulary) -> Exception:
     """Return what composition complains about as a `ConfigError`."""
     text = str(error)
     if option := _NO_OPTION.search(text):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
-from gsl.core.interruption import asked
+from gsl.core.interruption import is_interrupted
 from gsl.core.own_code import describe_own
 from gsl.errors import GslError, Waiting
 from gsl.report.console import Console
@@ -15,7 +15,7 @@ INTERRUPTED = 130
 
 def report(failure: BaseException, console: Console, *, command: str = "gsl") -> int:
     """Say what ended a command and return its exit code: 2 usage, input; 1 a stage failed; 130 interrupted; 0 waits."""
-    if isinstance(failure, KeyboardInterrupt) or asked():
+    if isinstance(failure, KeyboardInterrupt) or is_interrupted():
         return console.error("interrupted; the same command goes on from what is built", INTERRUPTED, command=command)
     if isinstance(failure, Waiting):
         console.status(str(failure))

@@ -15,11 +15,11 @@ from gsl.commandline.composer import (
     compose,
     configuration_folder,
     groups,
-    opened,
+    open_hydra,
     options,
 )
-from gsl.commandline.config import CommandSettings, resolved
-from gsl.commandline.known_settings import declared, plain
+from gsl.commandline.config import CommandSettings, resolve
+from gsl.commandline.known_settings import plain, read_declared
 from gsl.commandline.overrides import OPTIONAL_GROUPS
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import spoken
@@ -56,9 +56,9 @@ class Explanation:
         }
 
 
-def explained(command: str, typed: Sequence[str] = (), *, config_dir: Path | None = None) -> Explanation:
+def explain(command: str, typed: Sequence[str] = (), *, config_dir: Path | None = None) -> Explanation:
     """Return what the yaml files and classes of a command say about themselves, with what is typed if it is right."""
-    with opened(config_dir):
+    with open_hydra(config_dir):
         load_own_effects(config_dir, spoken(typed))
         try:
             composition = compose(command, typed)
@@ -69,7 +69,7 @@ def explained(command: str, typed: Sequence[str] = (), *, config_dir: Path | Non
         found |= {group: options(group) for group in OPTIONAL_GROUPS if group in groups() and _fits(group, composition)}
         chosen = {key: composition.chosen[choice] for key, choice in keys.items()}
         try:
-            values = resolved(composition)
+            values = resolve(composition)
         except ConfigError:
             values = plain(composition.config)
         text = OmegaConf.to_yaml(composition.config)
@@ -100,7 +100,7 @@ def _notes(group: str, name: str, config_dir: Path | None) -> dict[str, str]:
 
 def write_help(command: str, typed: Sequence[str] = (), *, config_dir: Path | None = None) -> str:
     """Return the part of a command's help that comes from its configuration, with what is typed of it."""
-    explanation = explained(command, typed, config_dir=config_dir)
+    explanation = explain(command, typed, config_dir=config_dir)
     parts = [_table("Groups (KEY=NAME, * is the default):", list(_group_lines(explanation)))]
     for paths, settings in _merge(explanation.sections):
         names = [f"{path}={name}" if (name := explanation.chosen.get(path)) else path for path in paths]
@@ -132,7 +132,7 @@ def _sections(values: Mapping[str, Any], chosen: Mapping[str, Any]) -> Iterator[
     """Yield the stage's own settings first, then those of each component."""
     own = {key: value for key, value in values.items() if key not in chosen and not _is_component(value)}
     commands = {name: known for name, known in settings_of(CommandSettings).items() if name not in own}
-    yield "", {**_described(own, values), **commands}
+    yield "", {**_describe(own, values), **commands}
     for key, value in values.items():
         if isinstance(value, Mapping) and (key in chosen or _is_component(value)):
             yield from _component_sections(key, value)
@@ -140,13 +140,13 @@ def _sections(values: Mapping[str, Any], chosen: Mapping[str, Any]) -> Iterator[
 
 def _component_sections(path: str, values: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Setting]]]:
     inner = {key: value for key, value in values.items() if _is_component(value)}
-    yield path, _described({key: value for key, value in values.items() if key not in inner}, values)
+    yield path, _describe({key: value for key, value in values.items() if key not in inner}, values)
     for key, value in inner.items():
         yield from _component_sections(f"{path}.{key}", value)
 
 
-def _described(shown: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Setting]:
-    known = declared(dict(values))
+def _describe(shown: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Setting]:
+    known = read_declared(dict(values))
     own = {**settings_of(CommandSettings), **known}
     names = [name for name in [*shown, *known] if not name.startswith("_") and name not in values.keys() - shown.keys()]
     return {

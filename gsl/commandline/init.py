@@ -21,7 +21,7 @@ from gsl.report.console import Console
 from gsl.robots.catalogue import names
 from gsl.robots.hinges import JointSettings, drivable, from_description
 from gsl.robots.urdf_xml import read_description
-from gsl.storage.whole import explained
+from gsl.storage.whole import explain_refusal
 
 ROBOT, WORLD = "robot.yaml", "world/{}.yaml"
 
@@ -102,7 +102,7 @@ def _write(folder: Path, told: Init, urdf: Path, robot: Robot) -> None:
     """Write the folder whole or not at all."""
     place = folder.with_name(f".{folder.name}.tmp-{os.getpid()}")
     world = place / WORLD.format(told.name)
-    with explained(folder):
+    with explain_refusal(folder):
         try:
             world.parent.mkdir(parents=True)
             (place / ROBOT).write_text(_robot_text(robot, Path(os.path.relpath(urdf, folder)), told), encoding="utf-8")

@@ -13,12 +13,12 @@ from gsl.core.trust import TARGET, class_of
 from gsl.errors import ConfigError
 
 
-def known_keys(config: DictConfig) -> list[str]:
+def list_keys(config: DictConfig) -> list[str]:
     """Return every dotted key that can be set, those of the command included."""
     return sorted({*COMMAND_KEYS, *_keys_below(config, "")})
 
 
-def declared(node: Mapping[str, Any]) -> Mapping[str, Setting]:
+def read_declared(node: Mapping[str, Any]) -> Mapping[str, Setting]:
     """Return the settings of the class that a checked mapping names with `_target_`, nothing if it names none."""
     name = node.get(TARGET)
     try:
@@ -34,7 +34,7 @@ def plain(config: Any) -> dict[str, Any]:
 
 
 def _keys_below(node: DictConfig, path: str) -> Iterator[str]:
-    for key in {*declared(plain(node)), *map(str, node)}:
+    for key in {*read_declared(plain(node)), *map(str, node)}:
         yield f"{path}{key}"
         below = None if OmegaConf.is_missing(node, key) or OmegaConf.is_interpolation(node, key) else node.get(key)
         if isinstance(below, DictConfig):

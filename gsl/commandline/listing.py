@@ -18,7 +18,7 @@ from gsl.storage.artifact import Artifact
 from gsl.storage.hashing import SHORT
 from gsl.storage.identity import content_hash
 from gsl.storage.lineage import out_of_date
-from gsl.storage.manifest import Manifest, Parent, damaged_file, read
+from gsl.storage.manifest import Manifest, Parent, find_damage, read
 from gsl.storage.references import RUNS, damaged_folders, find_all, resolve
 
 
@@ -28,7 +28,7 @@ def list_runs(console: Console) -> None:
     for folder in damaged_folders():
         console.status(f"{folder.as_posix()}: its manifest cannot be read; gsl verify says why")
     rows = [
-        (_named(one.folder), one.manifest.kind, _local(one.manifest.created), _span(one.manifest), headline(one))
+        (_name_run(one.folder), one.manifest.kind, _local(one.manifest.created), _span(one.manifest), headline(one))
         for one in found
     ]
     if rows:
@@ -46,7 +46,7 @@ def list_runs(console: Console) -> None:
     console.result({"artifacts": documents}, text="" if rows else "no artifacts below runs/")
 
 
-def _named(folder: Path) -> str:
+def _name_run(folder: Path) -> str:
     return (folder.relative_to(RUNS) if folder.is_relative_to(RUNS) else folder).as_posix()
 
 
@@ -59,7 +59,7 @@ def show_artifact(reference: str, console: Console) -> int:
     folder = resolve(reference)
     artifact = Artifact(folder, read(folder))
     made = dataclasses.asdict(artifact.manifest)
-    damaged = damaged_file(folder, artifact.manifest)
+    damaged = find_damage(folder, artifact.manifest)
     if damaged is None:
         console.result({"folder": folder, "manifest": made, "config": artifact.config, "metrics": artifact.metrics})
     title = f"{folder.as_posix()}: {artifact.manifest.kind}"

@@ -17,7 +17,7 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
 from gsl.commandline.composer import Composition
-from gsl.commandline.config import RUNS, execute, resolved
+from gsl.commandline.config import RUNS, execute, resolve
 from gsl.commandline.failure import describe_failure, report
 from gsl.commandline.overrides import file_of, key_of
 from gsl.report.console import Console
@@ -53,7 +53,7 @@ def run_jobs(command: str, line: str, composition: Composition, console: Console
         ],
         with_log_configuration=False,
     )
-    return _told(folder, console)
+    return _report_jobs(folder, console)
 
 
 def run_job(
@@ -65,7 +65,7 @@ def run_job(
     level = job_level(list(hydra.overrides.task), swept, int(hydra.job.num))
     console.status(f"job {hydra.job.num}: {level}")
     try:
-        values = resolved(Composition(config, (), {}, ()))
+        values = resolve(Composition(config, (), {}, ()))
         outcome = {"job": level, "exit_code": 0, **execute(command, line, values, console, trust=trust, level=level)}
     except Exception as failure:
         message, _ = describe_failure(failure)
@@ -81,7 +81,7 @@ def job_level(overrides: Sequence[str], swept: Sequence[str], number: int) -> st
     return name if 0 < len(name) <= LONGEST_LEVEL else str(number)
 
 
-def _told(folder: Path, console: Console) -> int:
+def _report_jobs(folder: Path, console: Console) -> int:
     """Say what became of the jobs and return the worst exit code; hydra's folder stays where one failed."""
     files = sorted(folder.glob(f"*/{RESULT}"), key=lambda path: int(path.parent.name))
     outcomes = [json.loads(path.read_text(encoding="utf-8")) for path in files]

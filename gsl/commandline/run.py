@@ -9,8 +9,8 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
-from gsl.commandline.composer import compose, opened
-from gsl.commandline.config import execute, prepared, resolved
+from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.config import execute, prepare, resolve
 from gsl.commandline.multirun import run_jobs
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import spoken
@@ -42,22 +42,22 @@ def run(
     console = Console(json=json)
     flags = [*(["--multirun"] if multirun else []), *([f"--config-dir={config_dir}"] if config_dir else [])]
     line = shlex.join(["gsl", *command.split(), *flags, *overrides])
-    with opened(config_dir):
+    with open_hydra(config_dir):
         for reason in load_own_effects(config_dir, spoken(overrides)):
             console.status(f"left out: {reason}")
         composition = compose(command, overrides, multirun=multirun)
         if cfg:
-            console.result(resolved(composition), text=OmegaConf.to_yaml(OmegaConf.create(resolved(composition))))
+            console.result(resolve(composition), text=OmegaConf.to_yaml(OmegaConf.create(resolve(composition))))
             return 0
         if multirun:
-            prepared(resolved(composition), composition.trust)
+            prepare(resolve(composition), composition.trust)
             return run_jobs(command, line, composition, console)
-        document = execute(command, line, resolved(composition), console, trust=composition.trust)
-        console.result(document, text=said(document))
+        document = execute(command, line, resolve(composition), console, trust=composition.trust)
+        console.result(document, text=summarise(document))
         return int(document.get("exit_code", 0))
 
 
-def said(document: Mapping[str, Any]) -> str:
+def summarise(document: Mapping[str, Any]) -> str:
     """Return the last line of a command: where its results are, or what it said without writing any."""
     if "said" in document:
         return str(document["said"])

@@ -155,7 +155,9 @@ def with_mass(link: Link, mass: float, com: np.ndarray, inertia: np.ndarray) -> 
     """Return `link` with another rigid body (mass, com, inertia about com; link axes) welded on."""
     total = link.mass + mass
     joint_com = (link.mass * link.com + mass * com) / total
-    moved = [_moved(i, m, c - joint_com) for i, m, c in ((link.inertia, link.mass, link.com), (inertia, mass, com))]
+    moved = [
+        _move_inertia(i, m, c - joint_com) for i, m, c in ((link.inertia, link.mass, link.com), (inertia, mass, com))
+    ]
     return replace(link, mass=total, com=joint_com, inertia=np.sum(moved, axis=0))
 
 
@@ -169,7 +171,7 @@ def carrier(robot: Robot, link: str, point: np.ndarray) -> tuple[str, np.ndarray
     return link, point
 
 
-def lumped(robot: Robot) -> Robot:
+def lump(robot: Robot) -> Robot:
     """Return the same robot with every fixed joint's child welded into its parent.
 
     Joints may move on a welded link if it is held at 0: its axes are then those of its parent.
@@ -179,25 +181,25 @@ def lumped(robot: Robot) -> Robot:
         if joint.fixed_at is None:
             continue
         turn, child = rotation(joint.axis, joint.fixed_at), links.pop(joint.child)
-        links[joint.parent] = _welded(links[joint.parent], child, turn, joint.origin)
+        links[joint.parent] = _weld(links[joint.parent], child, turn, joint.origin)
         joints.remove(joint)
-        joints = [_carried(other, joint) if other.parent == joint.child else other for other in joints]
+        joints = [_carry(other, joint) if other.parent == joint.child else other for other in joints]
     return replace(robot, links=links, joints=tuple(joints))
 
 
-def _carried(other: Joint, joint: Joint) -> Joint:
+def _carry(other: Joint, joint: Joint) -> Joint:
     """Return a joint that moves on the link which `joint` welds to its parent, as one of that parent."""
     if joint.fixed_at != 0.0:
         raise ValueError(f"{other.name} moves on {joint.child}, which is held at an angle")
     return replace(other, parent=joint.parent, origin=joint.origin + other.origin)
 
 
-def _welded(parent: Link, child: Link, turn: np.ndarray, origin: np.ndarray) -> Link:
+def _weld(parent: Link, child: Link, turn: np.ndarray, origin: np.ndarray) -> Link:
     whole = with_mass(parent, child.mass, origin + turn @ child.com, turn @ child.inertia @ turn.T)
     shapes = tuple(replace(s, centre=tuple(origin + turn @ np.array(s.centre))) for s in child.shapes)
     return replace(whole, shapes=parent.shapes + shapes)
 
 
-def _moved(inertia: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
+def _move_inertia(inertia: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
     """Steiner: inertia about a point `offset` away from the centre of mass."""
     return inertia + mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))

@@ -1,4 +1,4 @@
-"""`compiled`: numba's njit with a cache on disk that is thrown away whenever gsl's sources change.
+"""`compile_kernel`: numba's njit with a cache on disk that is thrown away whenever gsl's sources change.
 
 Numba looks only at the file of a compiled function itself, so an edit of another one that it calls would go unseen.
 Nor does it look whether the machine code on the disk is what it wrote, so every file begins with a hash of the rest.
@@ -22,7 +22,7 @@ _HASH = hashlib.sha256().digest_size  # [bytes]
 F = TypeVar("F", bound=Callable[..., object])
 
 
-def compiled(function: F) -> F:
+def compile_kernel(function: F) -> F:
     """Compile a function when it is first called, or take it from the cache; threads may run it side by side."""
     if "NUMBA_CACHE_DIR" not in os.environ:
         numba.config.CACHE_DIR = _folder()  # type: ignore[attr-defined]

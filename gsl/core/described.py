@@ -13,7 +13,7 @@ from gsl.errors import ConfigError
 _PLAIN = {"builtins", "numpy", "pathlib"}
 
 
-def described(thing: Any) -> Any:
+def describe(thing: Any) -> Any:
     """Return a component's settings with its class under `_target_`, its components likewise; plain data as it is.
 
     Raises:
@@ -21,12 +21,12 @@ def described(thing: Any) -> Any:
     """
     if is_dataclass(thing) and not isinstance(thing, type):
         kind = type(thing)
-        settings = {field.name: described(getattr(thing, field.name)) for field in fields(thing)}
+        settings = {field.name: describe(getattr(thing, field.name)) for field in fields(thing)}
         return {TARGET: f"{kind.__module__}.{kind.__qualname__}", **settings}
     if isinstance(thing, Mapping):
-        return {key: described(value) for key, value in thing.items()}
+        return {key: describe(value) for key, value in thing.items()}
     if isinstance(thing, list | tuple):
-        return [described(value) for value in thing]
+        return [describe(value) for value in thing]
     if type(thing).__module__.partition(".")[0] not in _PLAIN:
         problem = "is no dataclass, so that its settings, which are part of what it makes, cannot be written down"
         raise ConfigError("_target_", f"{problem}; put @dataclass above it", given=type(thing).__qualname__)
@@ -34,7 +34,7 @@ def described(thing: Any) -> Any:
 
 
 def rebuilt(told: Any, *, trust: Collection[str] = (), where: str = "") -> Any:
-    """Return what `described` told, read from a file, as components again.
+    """Return what `describe` returned, read from a file, as components again.
 
     Args:
         told: Plain data; every mapping with a `_target_` is a component.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def grounded(action: np.ndarray, inverse: np.ndarray, alpha: float | np.ndarray) -> np.ndarray:
+def ground(action: np.ndarray, inverse: np.ndarray, alpha: float | np.ndarray) -> np.ndarray:
     """Return the grounded action, shape (n,).
 
     Args:
@@ -39,7 +39,7 @@ def gain(sensitivity: np.ndarray, damping: float) -> np.ndarray:
     return found
 
 
-def solved(action: np.ndarray, correction: np.ndarray, wanted: np.ndarray, expected: np.ndarray) -> np.ndarray:
+def solve_action(action: np.ndarray, correction: np.ndarray, wanted: np.ndarray, expected: np.ndarray) -> np.ndarray:
     """Return a + K (f(s, a) - f_sim(s, a)), the action that has the wanted effect: a itself where sim = real.
 
     Args:

@@ -71,7 +71,7 @@ def window_parts(history: History, position: Any, action: Any, sensed: Any, tick
     return parts + [sensed[ticks - i] for i in range(history.sensor_ticks if history.sensors else 0)]
 
 
-def asked_at_rest(action: np.ndarray, position: np.ndarray) -> np.ndarray:
+def find_rest_action(action: np.ndarray, position: np.ndarray) -> np.ndarray:
     """Return what held a robot at rest before its first action [rad]: this, or where it is if that is farther away."""
     return np.where(np.abs(action - position) <= RESTING, action, position)
 
@@ -91,7 +91,7 @@ def with_rest(
     def after(first: np.ndarray, column: np.ndarray) -> np.ndarray:
         return np.concatenate([np.repeat(first, history.span, axis=0), column])
 
-    told = asked_at_rest(action[:1], position[:1])
+    told = find_rest_action(action[:1], position[:1])
     return after(position[:1], position), after(told, action), after(sensed[:1], sensed)
 
 
@@ -130,7 +130,7 @@ class Window:
     def complete(self, action: np.ndarray) -> np.ndarray:
         """Return the window with an action [rad], shape (n_joints,); the array is used again at the next call."""
         if self._fresh:
-            self._past_actions[:] = asked_at_rest(action, self._position)
+            self._past_actions[:] = find_rest_action(action, self._position)
             self._fresh = False
         self._action[:] = action
         np.subtract(self._raw, self._position, out=self._joints)

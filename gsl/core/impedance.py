@@ -41,7 +41,7 @@ def impedance(load: np.ndarray, deflection: np.ndarray, times: np.ndarray, frequ
     return np.where(moved, phasors(load, times, frequency) / np.where(moved, swing, 1.0), np.inf)
 
 
-def handed_over(sim: np.ndarray, grounded: np.ndarray, real: np.ndarray, noise: np.ndarray) -> float | None:
+def compute_transfer(sim: np.ndarray, grounded: np.ndarray, real: np.ndarray, noise: np.ndarray) -> float | None:
     """Return the share of the way from `sim` to `real` that `grounded` goes; None where there is no gap.
 
         sum s (sim - grounded) / sum s (sim - real)        s = sign(sim - real), over joints that differ
@@ -63,7 +63,7 @@ def handed_over(sim: np.ndarray, grounded: np.ndarray, real: np.ndarray, noise: 
     return float(way[differs].sum() / np.abs(gap)[differs].sum())
 
 
-def closed(sim: np.ndarray, grounded: np.ndarray, real: np.ndarray, noise: np.ndarray) -> float | None:
+def compute_closure(sim: np.ndarray, grounded: np.ndarray, real: np.ndarray, noise: np.ndarray) -> float | None:
     """Return the share of the gap that is closed, joint by joint; None where there is none, below 0 where it grows.
 
         1 - sum |grounded - real| / sum |sim - real|        over joints that differ, of real or complex values

@@ -27,7 +27,7 @@ def ignore() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
-def asked() -> bool:
+def is_interrupted() -> bool:
     """Whether this process was interrupted."""
     return _asked
 
@@ -39,7 +39,7 @@ def checkpoint() -> None:
 
 
 @contextmanager
-def held() -> Iterator[None]:
+def hold_interrupts() -> Iterator[None]:
     """Let an interruption wait for the end of the block: one in the middle of an import of torch aborts the process."""
     global _held
     before, _held = _held, True

@@ -19,7 +19,7 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 from numba.np.arrayobj import make_array, populate_array
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 
 LANES = 8  # a replay window by window takes 5 to 6.7 times as long; 6 x 6 products by a plain trailing axis 4.5 times
 _PLAIN = (types.Float, types.Integer)
@@ -30,7 +30,7 @@ def where(condition: bool, yes: float, no: float) -> float:
     return yes if condition else no
 
 
-@compiled
+@compile_kernel
 def zeros_in_lanes(first: int, second: int) -> np.ndarray:
     """Return zeros for `side_by_side`, shape (first, second, LANES), such that no eight lie across two cache lines."""
     raw = np.zeros(first * second * LANES + LANES - 1)
@@ -118,7 +118,7 @@ def _comparison(sign: str) -> Callable[..., Any]:
     return lambda context, builder, a, b: builder.fcmp_ordered(sign, a, b)
 
 
-def _known(name: str) -> Callable[..., Any]:
+def _find_call(name: str) -> Callable[..., Any]:
     """Return what calls a function of LLVM."""
 
     def build(context: Any, builder: Any, a: Any) -> Any:
@@ -155,9 +155,9 @@ for _plain, _in_place, _name in (
 for _compare, _sign in ((operator.gt, ">"), (operator.lt, "<"), (operator.eq, "==")):
     _define(_compare, mask, 2, _comparison(_sign))
 _define(operator.neg, lanes, 1, _operation("fneg"))
-_define(abs, lanes, 1, _known("fabs"))
-_define(np.rint, lanes, 1, _known("rint"))
-_define(np.sqrt, lanes, 1, _known("sqrt"))
+_define(abs, lanes, 1, _find_call("fabs"))
+_define(np.rint, lanes, 1, _find_call("rint"))
+_define(np.sqrt, lanes, 1, _find_call("sqrt"))
 for _function in (np.exp, np.log, np.sin, np.cos, np.tan, np.tanh, np.arctan):
     _define(_function, lanes, 1, _one_by_one(_function))
 _define(min, lanes, 2, _better("<"))

@@ -37,7 +37,7 @@ def missing(episode: Trajectory, layout: Layout) -> list[str]:
     return [part for part, columns in layout.columns.items() if not episode.sensors.keys() >= set(columns)]
 
 
-def sensed(episode: Trajectory, sensors: Iterable[str]) -> np.ndarray:
+def read_sensors(episode: Trajectory, sensors: Iterable[str]) -> np.ndarray:
     """Return the body sensors that a window names, shape (T + 1, number of entries); see `observations`."""
     columns = [
         column for name in sensors for column in _sensor(name, [episode.sensors[one] for one in SOURCES[name][1]])

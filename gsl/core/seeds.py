@@ -9,7 +9,7 @@ import numpy as np
 _STREAM = 7
 
 
-def derived_seed(*parts: int | str) -> int:
+def derive_seed(*parts: int | str) -> int:
     """Return a seed in [0, 2**31) that is a function of `parts`, such as (run seed, "optimize", generation)."""
     entropy = [crc32(part.encode()) if isinstance(part, str) else part for part in parts]
     return int(np.random.SeedSequence(entropy).generate_state(1)[0] >> 1)

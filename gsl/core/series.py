@@ -26,7 +26,7 @@ class Lag(NamedTuple):
     contrast: float
 
 
-def held(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+def hold(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Return at each time the last value that was there: zero-order hold; before the first it is the first.
 
     Args:
@@ -38,7 +38,7 @@ def held(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
     return values[np.maximum(index, 0)]
 
 
-def interpolated(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+def interpolate(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Return linear interpolations of values of shape (T, k) at some times, shape (N, k); constant beyond the ends."""
     return np.column_stack([np.interp(at, stamps, column) for column in values.T])
 
@@ -83,7 +83,7 @@ def _scores(
     reach = min(int(round(longest / step)), (len(grid) - 8) // 2)
     if reach < 1:
         return step, np.zeros(0)
-    a, b = held(time, command, grid), np.interp(grid, time, measured)
+    a, b = hold(time, command, grid), np.interp(grid, time, measured)
     return step, np.array([_correlation(a, b, shift) for shift in range(-reach, reach + 1)])
 
 

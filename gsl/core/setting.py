@@ -107,7 +107,7 @@ def settings_of(target: Callable[..., Any]) -> Mapping[str, Setting]:
     named = [
         parameter for parameter in parameters if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
     ]
-    return {parameter.name: _described(parameter, _field(target, parameter.name, fields)) for parameter in named}
+    return {parameter.name: _describe(parameter, _field(target, parameter.name, fields)) for parameter in named}
 
 
 def _field(target: Callable[..., Any], name: str, fields: Mapping[str, FieldInfo]) -> FieldInfo | None:
@@ -120,7 +120,7 @@ def _field(target: Callable[..., Any], name: str, fields: Mapping[str, FieldInfo
     return next((part for part in getattr(hint, "__metadata__", ()) if isinstance(part, FieldInfo)), None)
 
 
-def _described(parameter: inspect.Parameter, field: FieldInfo | None) -> Setting:
+def _describe(parameter: inspect.Parameter, field: FieldInfo | None) -> Setting:
     default = REQUIRED if parameter.default is parameter.empty else parameter.default
     if field is None:
         return Setting(parameter.name, default)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.history import History, windows, with_rest
-from gsl.core.observation import sensed
+from gsl.core.observation import read_sensors
 from gsl.core.trajectory import Trajectory
 
 FALLING = 25  # ticks before the end of a fall: balance is lost, the legs hit what they can
@@ -40,7 +40,11 @@ def transitions(episodes: Sequence[Trajectory], history: History, horizon: int, 
 
 
 def _of_one(episode: Trajectory, history: History, horizon: int, *, carried_out: bool) -> Transitions:
-    x, action, body = episode.position, actions(episode, carried_out=carried_out), sensed(episode, history.sensors)
+    x, action, body = (
+        episode.position,
+        actions(episode, carried_out=carried_out),
+        read_sensors(episode, history.sensors),
+    )
     last = usable(episode) - horizon + 1
     if history.rested:
         x, action, body = with_rest(history, x, action, body)

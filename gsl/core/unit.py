@@ -55,6 +55,6 @@ def telling(share: float) -> bool:
     return abs(share) <= MANY
 
 
-def gained(share: float | None) -> str:
+def format_gain(share: float | None) -> str:
     """Return a gain as a share of π0's value [%]; nothing without a share, or with one that is not telling."""
     return "" if share is None or not telling(share) else f"{100 * share:+.1f} %"

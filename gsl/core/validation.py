@@ -69,7 +69,7 @@ def config_error(error: ValidationError, target: Callable[..., Any], *, where: s
         return ConfigError(path, f"no such setting{did_you_mean(location[-1], settings_of(target))}")
     known = settings_of(target).get(location[0]) if location else None
     unit = f" ({known.unit})" if known is not None and known.unit else ""
-    return ConfigError(path or target.__name__, f"{_problems(found)}{unit}", given=_given(details["input"]))
+    return ConfigError(path or target.__name__, f"{_problems(found)}{unit}", given=_quote(details["input"]))
 
 
 def did_you_mean(word: str, known: Iterable[str], *, listed: bool = False) -> str:
@@ -101,7 +101,7 @@ def _problem(details: ErrorDetails) -> str:
     return f"must be {kind}" if kind else details["msg"][0].lower() + details["msg"][1:]
 
 
-def _given(value: object) -> str:
+def _quote(value: object) -> str:
     if isinstance(value, ArgsKwargs):
         return ""
     if value is None or isinstance(value, bool):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
@@ -49,7 +49,7 @@ def diagnose(
         reference: A log without the effect, on which the nominal is calibrated first.
     """
     nominal, baseline, shift = Nominal(plant, step), None, 0.0
-    log = _widen_floor(prepare(batch, lumped(plant.robot), options), nominal, options)
+    log = _widen_floor(prepare(batch, lump(plant.robot), options), nominal, options)
     if reference is not None:
         tick("calibrating the simulator on the reference")
         baseline = calibrate_on(cut_log(reference, log.robot), nominal, options, tick)

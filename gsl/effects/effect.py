@@ -128,13 +128,13 @@ def effect_class(name: str) -> type:
     return getattr(module, "".join(word.capitalize() for word in name.split("_")))
 
 
-def confused_with(name: str) -> str:
+def describe_confusion(name: str) -> str:
     """Return what an effect is confused with and what separates them, from its class."""
     told = " ".join((effect_class(name).__doc__ or "").split()).partition("Confused with ")[2]
     return re.split(r"\.(?:\s|$)", told, maxsplit=1)[0]
 
 
-def documented(name: str, robot: Robot) -> dict[str, Setting]:
+def list_documented(name: str, robot: Robot) -> dict[str, Setting]:
     """Return the settings of an effect with the ranges that a robot documents, where they differ from a NAO's class."""
     own = robot.ranges.get(name, {})
     known = settings_of(effect_class(name)).items()
@@ -160,7 +160,7 @@ def check_ranges(name: str, ranges: Mapping[str, tuple[float, float]]) -> None:
             raise ConfigError(f"ranges.{name}.{key}", f"{lower:g} to {upper:g} is no range that it can have{limit}")
 
 
-def built(effects: Mapping[str, Any]) -> tuple[Effect, ...]:
+def build(effects: Mapping[str, Any]) -> tuple[Effect, ...]:
     """Build every entry of an `effects:` mapping, in the order in which they are applied, whatever the mapping's."""
     made = [
         _effect(name, entry)
@@ -204,7 +204,7 @@ def together(parts: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
     return {name: entries for name, entries in whole.items() if entries}
 
 
-def applied(plant: Plant, effects: Iterable[Effect]) -> Plant:
+def apply_all(plant: Plant, effects: Iterable[Effect]) -> Plant:
     """Return the plant with all effects in it."""
     for effect in effects:
         try:

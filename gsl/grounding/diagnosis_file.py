@@ -45,10 +45,10 @@ class Diagnosis:
         if not self.causes:
             kept = "Nothing is switched on: the simulator is taken as it is, calibrated joint by joint."
             return f"{kept} {DOUBT}" if self.verdict == "unknown" else kept
-        return f"Switched on in the simulator: {named(self.causes)}."
+        return f"Switched on in the simulator: {name_causes(self.causes)}."
 
 
-def named(causes: Sequence[str]) -> str:
+def name_causes(causes: Sequence[str]) -> str:
     """Return effects by name, or only how many they are."""
     names = tuple(dict.fromkeys(causes))
     return ", ".join(names) if len(names) <= MANY else f"{len(names)} effects"

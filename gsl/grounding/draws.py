@@ -52,7 +52,7 @@ def around(world: BulletWorld | EnsembleWorld, causes: Sequence[UncertainCause])
         return world
     centre, members = (world.world, world.members) if isinstance(world, EnsembleWorld) else (world, (world,))
     drawn = drawings(causes, DRAWS)
-    made = tuple(_drawn(members[k % len(members)], causes, entries) for k, entries in enumerate(drawn))
+    made = tuple(_draw(members[k % len(members)], causes, entries) for k, entries in enumerate(drawn))
     if all(one == members[k % len(members)] for k, one in enumerate(made)):
         return world
     return EnsembleWorld(centre, made)
@@ -99,7 +99,7 @@ def _entry(cause: UncertainCause, shares: np.ndarray) -> Mapping[str, Any] | Non
     return {**cause.entry, **values}
 
 
-def _drawn(
+def _draw(
     world: BulletWorld, causes: Sequence[UncertainCause], entries: Sequence[Mapping[str, Any] | None]
 ) -> BulletWorld:
     effects = {name: list(values) for name, values in together([world.effects]).items()}

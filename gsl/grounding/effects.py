@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.interfaces import REAL, SIM, Grounding, GroundingRun, Preparable, Prepared, Trainable, World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
@@ -98,7 +98,7 @@ class DiagnosedEffects:
     def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
         """Return the world with the effects and the inner grounding in it."""
         found = self.load(read_diagnosis)
-        inside = prepare(self.inner, switched_on(world, found), settled)
+        inside = prepare(self.inner, switch_on(world, found), settled)
         return inside._replace(world=self.drawn(inside.world, found))
 
     def without_margins(self) -> DiagnosedEffects:
@@ -125,14 +125,14 @@ def having_effects(world: World) -> Any:
     return world
 
 
-def switched_on(world: World, found: Diagnosis) -> World:
+def switch_on(world: World, found: Diagnosis) -> World:
     """Return the world with what it lacks.
 
     Raises:
         ConfigError: It is not the simulator that was diagnosed.
     """
     simulator = having_effects(world)
-    settings = described(simulator)
+    settings = describe(simulator)
     if found.verdict != "given" and (settings["robot"], settings["effects"]) != (found.robot, found.simulated):
         other = f"the {found.robot} with {', '.join(found.simulated) or 'no effects'}"
         raise ConfigError("grounding.diagnosis", f"is of another simulator: {other}; take this one")
@@ -153,7 +153,7 @@ def with_innermost(grounding: Grounding, inner: Grounding) -> Grounding:
     return inner
 
 
-def learned(grounding: Grounding) -> bool:
+def is_learned(grounding: Grounding) -> bool:
     """Whether a grounding has models that learn from trajectories of a policy."""
     return isinstance(innermost(grounding), ActionTransformation | Trainable)
 

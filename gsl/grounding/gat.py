@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from gsl.core.draws import Draws
-from gsl.core.grounding import grounded
+from gsl.core.grounding import ground
 from gsl.core.history import Window
 from gsl.core.interfaces import Prepared, World
 from gsl.core.layout import Layout
@@ -234,7 +234,7 @@ class TransformationRun:
         wanted, trust = self._wanted(window)
         sim.see(position, ())
         inverse = grounding.inverse.action(sim.complete(action), action, wanted)
-        sent = grounded(action, inverse, self._alpha * trust)
+        sent = ground(action, inverse, self._alpha * trust)
         noise = grounding.noise * self._rng.standard_normal(len(every)) if grounding.noise else None
         if noise is not None:
             sent = sent + noise[self._known]

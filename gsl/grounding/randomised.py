@@ -17,7 +17,7 @@ from gsl.core.body import Robot
 from gsl.core.interfaces import GroundingRun, Prepared, World
 from gsl.core.layout import Layout
 from gsl.core.setting import Setting, component, setting, settings_of
-from gsl.effects.effect import documented, effect_class
+from gsl.effects.effect import effect_class, list_documented
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.worlds.bullet import BulletWorld
@@ -65,12 +65,12 @@ class RandomisedEffects:
 
     def check(self, world: World) -> None:
         """Refuse a world whose effects cannot be drawn."""
-        randomised(world, self, self.widths[0])
+        randomise(world, self, self.widths[0])
 
     def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
         """Return the world with effects that are drawn, as widely as was settled or set."""
         width = settled.get("width", self.widths[0])
-        return Prepared(randomised(world, self, width), NoGrounding())
+        return Prepared(randomise(world, self, width), NoGrounding())
 
     def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
         """Refuse to start: the world has to be changed first.
@@ -100,7 +100,7 @@ class Draw:
         return {name: self._entry(name, rng) for name in self.effects}
 
     def _entry(self, name: str, rng: np.random.Generator) -> dict[str, float | str]:
-        known = documented(name, self.robot)
+        known = list_documented(name, self.robot)
         place = {"link": self.robot.base} if "link" in known else {}
         return {**place, **{key: self._value(one, rng) for key, one in _strengths(known).items()}}
 
@@ -110,7 +110,7 @@ class Draw:
         return float(rng.uniform(low, high))
 
 
-def randomised(world: Any, settings: RandomisedEffects, width: float) -> RandomisedWorld:
+def randomise(world: Any, settings: RandomisedEffects, width: float) -> RandomisedWorld:
     """Return the world with effects that are drawn anew in every episode.
 
     Raises:

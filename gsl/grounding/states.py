@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsl.core.draws import Draws
-from gsl.core.grounding import grounded
+from gsl.core.grounding import ground
 from gsl.core.layout import Layout
 from gsl.core.table import Table
 from gsl.errors import ConfigError
@@ -74,7 +74,7 @@ class StateTransformationRun:
         found = grounding.inverse.action(observation, action, wanted)
         if grounding.forward.choices:
             return found
-        sent = grounded(action, found, grounding.alpha)
+        sent = ground(action, found, grounding.alpha)
         if grounding.noise:
             sent = sent + grounding.noise * self._rng.standard_normal(len(sent))
         return np.asarray(np.minimum(np.maximum(sent, -1.0), 1.0))

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.interfaces import GroundingRun, Prepared, World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
@@ -108,7 +108,7 @@ def with_torque_noise(world: Any, step: Widths | float, constant: Widths | float
         for scope in scopes
     ]
     drawn = [entry for entry in entries if entry["step"] or entry["constant"]]
-    return replace(world, effects=together([described(world)["effects"], {EFFECT: drawn}])) if drawn else world
+    return replace(world, effects=together([describe(world)["effects"], {EFFECT: drawn}])) if drawn else world
 
 
 def torque_limits(world: Any) -> Mapping[str, float]:

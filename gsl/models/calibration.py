@@ -19,7 +19,7 @@ MEMORY = 0.9  # largest
 ROUNDING = 1e-6  # of a correlation matrix that is singular, as that of one source of noise is
 
 
-def calibrated(network: Network, head: Head, episodes: Sequence[Samples]) -> tuple[Network, np.ndarray]:
+def calibrate(network: Network, head: Head, episodes: Sequence[Samples]) -> tuple[Network, np.ndarray]:
     """Return the network with standard deviations scaled, and the memory of its draws, shape (m,).
 
     Args:
@@ -27,7 +27,7 @@ def calibrated(network: Network, head: Head, episodes: Sequence[Samples]) -> tup
         head: How its outputs are read.
         episodes: Inputs, shape (T, n), and outputs, shape (T, m), of trajectories it was not fitted to.
     """
-    errors = [_standardised(network, head, *one) for one in episodes]
+    errors = [_standardise(network, head, *one) for one in episodes]
     together = np.concatenate(errors)
     scale = np.clip(np.sqrt(np.mean(together**2, axis=0)), *SCALE)
     mean, variance = together.mean(axis=0), together.var(axis=0)
@@ -51,14 +51,14 @@ def mixing(network: Network, head: Head, samples: Samples) -> np.ndarray:
         head: How its outputs are read.
         samples: Inputs, shape (N, n), and outputs, shape (N, m), that it was not fitted to.
     """
-    errors = _standardised(network, head, *samples)
+    errors = _standardise(network, head, *samples)
     moving = errors.std(axis=0) > 0.0
     together = np.eye(errors.shape[1])
     together[np.ix_(moving, moving)] = np.atleast_2d(np.corrcoef(errors[:, moving], rowvar=False))
     return np.linalg.cholesky((1.0 - ROUNDING) * together + ROUNDING * np.eye(len(together)))
 
 
-def _standardised(network: Network, head: Head, inputs: np.ndarray, outputs: np.ndarray) -> np.ndarray:
+def _standardise(network: Network, head: Head, inputs: np.ndarray, outputs: np.ndarray) -> np.ndarray:
     """Return errors in units of the standard deviation that the model has for them, shape (T, m)."""
     raw = network.predict_many(inputs)
     weights, means, sds = head.parts(raw)

@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from gsl.core.interruption import held
+from gsl.core.interruption import hold_interrupts
 from gsl.models.config import ModelConfig
 from gsl.models.free_run import Segments
 from gsl.models.head import POINT, Head
@@ -42,7 +42,7 @@ def fit_network(
         inputs, targets = map(np.concatenate, zip(training, validation, strict=True)) if whole else training
         network = fit_linear(inputs, targets, ridge=config.ridge)
         return with_spread(network, inputs, targets) if head.draws else network
-    with held():
+    with hold_interrupts():
         from gsl.models.fitting import fit_mlp
 
     return fit_mlp(training, validation, config, seed=seed, head=head, pieces=pieces)

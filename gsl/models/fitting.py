@@ -12,8 +12,8 @@ from gsl.core.scaling import scaling
 from gsl.models.config import ModelConfig
 from gsl.models.free_run import Segments
 from gsl.models.head import POINT, Head
-from gsl.models.multi_step import MultiStep, answering, travelled
-from gsl.models.network import Network, Samples, unscaled
+from gsl.models.multi_step import MultiStep, answering, measure_travel
+from gsl.models.network import Network, Samples, unscale
 
 Loss = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 LEAST_LOG_SD = -5.0  # in units of the targets' spread: where data are all but exact the likelihood has no end
@@ -41,12 +41,12 @@ def fit_mlp(
     try:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            return _fitted(training, validation, config, head, pieces)
+            return _fit(training, validation, config, head, pieces)
     finally:
         torch.set_num_threads(threads)
 
 
-def _fitted(
+def _fit(
     training: Samples, validation: Samples, config: ModelConfig, head: Head, pieces: tuple[Segments, Segments] | None
 ) -> Network:
     given, wanted = scaling(training[0]), scaling(training[1])
@@ -62,12 +62,12 @@ def _fitted(
         lambda: loss(network(unseen[0]), unseen[1]),
     )
     if pieces is not None:
-        answer, scale = answering(network, given, wanted), travelled(pieces[0])
+        answer, scale = answering(network, given, wanted), measure_travel(pieces[0])
         fitted, judging = (MultiStep(part, scale) for part in pieces)
         _descend(network, len(fitted), config, partial(fitted.loss, answer), partial(judging.loss, answer))
     affine = [layer for layer in network if isinstance(layer, torch.nn.Linear)]
     layers = [(_array(layer.weight), _array(layer.bias)) for layer in affine]
-    return unscaled(layers, given, head.scaling(wanted))
+    return unscale(layers, given, head.scaling(wanted))
 
 
 def _descend(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.history import History, windows
-from gsl.core.observation import sensed
+from gsl.core.observation import read_sensors
 from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import actions, usable
 from gsl.models.ensemble import Forward
@@ -48,14 +48,14 @@ def segments(
     """Cut trajectories into pieces of some ticks to be predicted and their past, a piece `every` so many ticks."""
     length, parts = history.span + ticks + 1, []
     for one in episodes:
-        columns = one.position, actions(one, carried_out=carried_out), sensed(one, history.sensors)
+        columns = one.position, actions(one, carried_out=carried_out), read_sensors(one, history.sensors)
         cuts = range(0, usable(one) - length + 1, every)
         parts += [tuple(column[cut : cut + length] for column in columns) for cut in cuts]
     position, action, body = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Segments(history, ticks, position, action, body, history.span + length * np.arange(len(parts)))
 
 
-def predicted_error(model: Forward, pieces: Segments) -> np.ndarray:
+def predict_error(model: Forward, pieces: Segments) -> np.ndarray:
     """Return the error of the joint positions at the end of the pieces [rad], shape (N, n_joints)."""
     x, last = pieces.position.copy(), pieces.starts + pieces.ticks
     for tick in range(pieces.ticks):
@@ -71,7 +71,7 @@ def standstill_error(pieces: Segments) -> np.ndarray:
     return error
 
 
-def recovered_error(model: InverseModel, pieces: Segments) -> np.ndarray:
+def recover_error(model: InverseModel, pieces: Segments) -> np.ndarray:
     """Return how far off the actions are that an inverse model recovers from the motion [rad], shape (.., n_joints).
 
     The past actions it sees are its own answers; the first tick of a piece, where they are not yet, does not count.

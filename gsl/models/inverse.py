@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gsl.core.angles import Encoding, decode
-from gsl.core.grounding import gain, solved
+from gsl.core.grounding import gain, solve_action
 from gsl.core.history import History
 from gsl.models.forward import ForwardModel, check_sizes, history_from
 from gsl.models.network import Network
@@ -118,7 +118,7 @@ class Solver:
 
     def action(self, window: np.ndarray, action: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the action [rad], shape (n_joints,); arguments as those of `Regression`."""
-        return solved(action, self.correction, wanted, self.simulator.effect(window))
+        return solve_action(action, self.correction, wanted, self.simulator.effect(window))
 
     def actions(self, windows: np.ndarray, actions: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the actions [rad], shape (N, n_joints), for many windows."""

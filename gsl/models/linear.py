@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsl.core.scaling import scaling
-from gsl.models.network import Network, unscaled
+from gsl.models.network import Network, unscale
 
 SMALLEST = 1e-6  # standard deviation [rad], of a change that is exact
 
@@ -22,7 +22,7 @@ def fit_linear(inputs: np.ndarray, targets: np.ndarray, *, ridge: float) -> Netw
     z, y = given.apply(inputs), wanted.apply(targets)
     square = z.T @ z / len(z) + ridge * np.eye(z.shape[1])
     weight = np.linalg.solve(square, z.T @ y / len(z)).T
-    return unscaled([(weight, np.zeros(targets.shape[1]))], given, wanted)
+    return unscale([(weight, np.zeros(targets.shape[1]))], given, wanted)
 
 
 def with_spread(network: Network, inputs: np.ndarray, targets: np.ndarray) -> Network:

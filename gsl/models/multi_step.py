@@ -26,7 +26,7 @@ def answering(network: torch.nn.Module, given: Scaling, wanted: Scaling) -> Answ
     return lambda windows: network((windows - mean) / sd) * scale + shift
 
 
-def travelled(pieces: Segments) -> np.ndarray:
+def measure_travel(pieces: Segments) -> np.ndarray:
     """Return the mean square of how far joints move from the start of pieces up to each tick [rad²], shape (ticks,).
 
     All joints count alike, as in the check's errors: one that moves little has little to be wrong by.

@@ -89,7 +89,7 @@ class Network:
         self._prepare()
 
 
-def unscaled(layers: Sequence[tuple[np.ndarray, np.ndarray]], inputs: Scaling, outputs: Scaling) -> Network:
+def unscale(layers: Sequence[tuple[np.ndarray, np.ndarray]], inputs: Scaling, outputs: Scaling) -> Network:
     """Return the network that takes and gives plain values, given one that was fitted to scaled ones."""
     first, bias = layers[0]
     folded = [(first / inputs.sd, bias - first @ (inputs.mean / inputs.sd)), *layers[1:]]

@@ -55,7 +55,7 @@ class StateForward:
 
     def encoded(self, actions: np.ndarray) -> np.ndarray:
         """Return actions as the network sees them, (N, n_entries) -> (N, actions)."""
-        return encoded(actions, self.choices)
+        return encode(actions, self.choices)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint stores."""
@@ -162,7 +162,7 @@ class NearestChoice:
         return {**self.simulator.description(), "kind": "inverse_model", "method": self.method}
 
 
-def encoded(actions: np.ndarray, choices: int) -> np.ndarray:
+def encode(actions: np.ndarray, choices: int) -> np.ndarray:
     """Return actions as a network sees them: numbers as they are, choices as rows of an identity matrix."""
     return np.eye(choices)[actions[:, 0].astype(int)] if choices else actions
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from gsl.core.interfaces import Policy, Simulator
-from gsl.core.interruption import held
+from gsl.core.interruption import hold_interrupts
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.policies.mlp import Mlp, vector_of
@@ -66,7 +66,7 @@ class Trpo:
         if not isinstance(policy, Mlp):
             raise ConfigError("optimizer", "TRPO improves a policy=mlp; cma_es is for the others")
         try:
-            with held():
+            with hold_interrupts():
                 import sb3_contrib
                 import torch
                 from stable_baselines3.common.logger import Logger
@@ -103,10 +103,10 @@ class Trpo:
             )
             model.set_logger(Logger(None, []))  # the library's own would leave a folder behind
             if not bold:
-                _put(model, policy.layers(parameters))
+                _put_layers(model, policy.layers(parameters))
             for _ in range(self.generations):
                 model.learn(max(self.steps // self.generations, 1), stepped, reset_num_timesteps=False)
-                yield vector_of(_folded(_taken(model), env.obs_rms if bold else None, float(env.epsilon)))
+                yield vector_of(_fold(_take_layers(model), env.obs_rms if bold else None, float(env.epsilon)))
         finally:
             env.close()
             torch.set_num_threads(threads)
@@ -118,18 +118,18 @@ def _affine(model: Any) -> list[Any]:
     return [*hidden, model.policy.action_net]
 
 
-def _put(model: Any, layers: list[tuple[np.ndarray, np.ndarray]]) -> None:
+def _put_layers(model: Any, layers: list[tuple[np.ndarray, np.ndarray]]) -> None:
     for layer, (weight, bias) in zip(_affine(model), layers, strict=True):
         layer.weight.data.copy_(layer.weight.new_tensor(weight))
         layer.bias.data.copy_(layer.bias.new_tensor(bias))
 
 
-def _taken(model: Any) -> list[tuple[np.ndarray, np.ndarray]]:
+def _take_layers(model: Any) -> list[tuple[np.ndarray, np.ndarray]]:
     parts = [(layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in _affine(model)]
     return [(weight.astype(float), bias.astype(float)) for weight, bias in parts]
 
 
-def _folded(
+def _fold(
     layers: list[tuple[np.ndarray, np.ndarray]], seen: Any, epsilon: float
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return the layers for observations as they are, given those for normalised ones."""

@@ -51,7 +51,7 @@ _KINDS: Mapping[Motion, _Kind] = {
     "triangle_fast": _Kind(partial(motions.triangle, frequency=1.2), 0.3),
     "chirp": _Kind(motions.chirp, 0.35),
     "poses": _Kind(motions.poses, 0.5),
-    "mirrored": _Kind(motions.mirrored, 0.4),
+    "mirrored": _Kind(motions.mirror, 0.4),
     "one_by_one": _Kind(motions.one_by_one, 0.3),
 }
 
@@ -131,7 +131,7 @@ class Excitation:
         most = getattr(bounds, kind.jump) if kind.jump else np.inf
         up, down = (self.amplitude * np.minimum(kind.share * room, most) for room in (bounds.up, bounds.down))
         way = wave * np.where(wave > 0.0, up, down)
-        return bounds.rest + (way if kind.jump else _slowed(way, bounds.speed * period))
+        return bounds.rest + (way if kind.jump else _slow_down(way, bounds.speed * period))
 
 
 def _piece(motion: Motion, variant: Variant) -> Piece:
@@ -139,7 +139,7 @@ def _piece(motion: Motion, variant: Variant) -> Piece:
     return Piece(f"{motion}_{variant}", np.array([float(number)]), {"motion": motion, "variant": variant})
 
 
-def _slowed(way: np.ndarray, most: np.ndarray) -> np.ndarray:
+def _slow_down(way: np.ndarray, most: np.ndarray) -> np.ndarray:
     """Return a way from rest, each joint's made smaller where one step of it is longer than `most` [rad]."""
     longest = np.abs(np.diff(way, axis=0, prepend=0.0)).max(axis=0)
     return way * (most / np.maximum(longest, most))

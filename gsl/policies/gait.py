@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.robots.nao import FOOT_HEIGHT, HIP_OFFSET_Y
 from gsl.robots.nao_legs import leg_angles
 
@@ -34,7 +34,7 @@ EXTRA_PERIOD = 0.05  # how much longer a step at the full sideways request takes
 SHOULDER_ROLL = math.radians(7.0)
 
 
-@compiled
+@compile_kernel
 def first_state() -> np.ndarray:
     """Return the state before the priming step, in which the left foot is lifted a little."""
     state = np.zeros(SIZE)
@@ -42,7 +42,7 @@ def first_state() -> np.ndarray:
     return state
 
 
-@compiled
+@compile_kernel
 def step(values: np.ndarray, state: np.ndarray, request: np.ndarray, sensed: np.ndarray, period: float) -> np.ndarray:
     """Move `state` on by one control period and return the joint targets.
 
@@ -73,26 +73,26 @@ def step(values: np.ndarray, state: np.ndarray, request: np.ndarray, sensed: np.
     return _targets(values, state, lift * lift_profile(s))
 
 
-@compiled
+@compile_kernel
 def ramp(u: float) -> float:
     """Acceleration-limited ramp from 0 to 1."""
     u = min(1.0, max(0.0, u))
     return 2.0 * u * u if u < 0.5 else 1.0 - 2.0 * ((1.0 - u) * (1.0 - u))
 
 
-@compiled
+@compile_kernel
 def lift_profile(s: float) -> float:
     """Height of the swing foot over the step, 0 to 1 and back."""
     return ramp(2.0 * s) if s < 0.5 else ramp(2.0 - 2.0 * s)
 
 
-@compiled
+@compile_kernel
 def crouch(values: np.ndarray) -> np.ndarray:
     """Return the joint positions of both feet under the hips at walking height [rad], shape (15,)."""
     return _targets(values, first_state(), 0.0)
 
 
-@compiled
+@compile_kernel
 def _weight_has_shifted(state: np.ndarray, sensed: np.ndarray, duration: float) -> bool:
     """The centre of pressure changed sides late in the step, or the step takes far too long."""
     load = sensed[1] + sensed[2]
@@ -103,7 +103,7 @@ def _weight_has_shifted(state: np.ndarray, sensed: np.ndarray, duration: float) 
     return (state[CLOCK] > 0.75 * duration and changed) or state[CLOCK] > 3.0 * duration
 
 
-@compiled
+@compile_kernel
 def _begin_step(values: np.ndarray, state: np.ndarray, request: np.ndarray) -> None:
     """The unloaded foot swings next; the request is followed by at most its change a step."""
     state[SWING] = 1.0 if state[PRESSURE] < 0.0 else -1.0
@@ -115,7 +115,7 @@ def _begin_step(values: np.ndarray, state: np.ndarray, request: np.ndarray) -> N
         state[FORWARD + axis] = min(state[FORWARD + axis] + change, max(state[FORWARD + axis] - change, wanted))
 
 
-@compiled
+@compile_kernel
 def _move_feet(values: np.ndarray, state: np.ndarray, forward: float, left: float, turn: float, s: float) -> None:
     """Stance foot back at constant speed, swing foot ahead; legs open in the step of the leading foot, then close."""
     swing, stance = (X_LEFT, X_RIGHT) if state[SWING] > 0.0 else (X_RIGHT, X_LEFT)
@@ -127,12 +127,12 @@ def _move_feet(values: np.ndarray, state: np.ndarray, forward: float, left: floa
     state[FEET + YAW] = _between(state[BEGAN + YAW], yaw, ramp(s))
 
 
-@compiled
+@compile_kernel
 def _between(start: float, end: float, share: float) -> float:
     return start + (end - start) * share
 
 
-@compiled
+@compile_kernel
 def _targets(values: np.ndarray, state: np.ndarray, lift: float) -> np.ndarray:
     targets = np.empty(15)
     targets[0] = -state[FEET + YAW] * math.sqrt(2.0)  # the shared axis is inclined: its yaw share is 1 / sqrt(2)

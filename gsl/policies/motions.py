@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.policies.sides import Pair
 
 RISE, GENTLE = 2.5, 1.2  # speed at which a wave, and a slow one, grows from rest and returns to it [1/s]
@@ -48,7 +48,7 @@ class Parts(NamedTuple):
 
 def parts(motion: str, variant: int, joints: int, found: tuple[Pair, ...]) -> Parts:
     """Return the parts of a motion: a function of its name, its variant and the number of joints."""
-    rng = np.random.default_rng(derived_seed("excitation", motion, variant))
+    rng = np.random.default_rng(derive_seed("excitation", motion, variant))
     phase, tempo, level = ((rng.permutation(joints) + rng.random(joints)) / joints for _ in range(3))
     return Parts(phase, tempo, level, 2.0 * (rng.permutation(joints) % 2) - 1.0, found, variant)
 
@@ -99,7 +99,7 @@ def poses(time: np.ndarray, length: float, these: Parts) -> np.ndarray:
     return 0.5 * (1.0 - np.cos(math.pi * begun)) @ jumps
 
 
-def mirrored(time: np.ndarray, length: float, these: Parts) -> np.ndarray:
+def mirror(time: np.ndarray, length: float, these: Parts) -> np.ndarray:
     """Return left and right as mirror images, then in antiphase; a joint without a counterpart goes its own way."""
     half = 0.5 * length
     cycles = SWAY * (0.8 + 0.4 * these.tempo + 0.15 * these.variant) * time[:, None] + these.phase

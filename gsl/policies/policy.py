@@ -18,7 +18,7 @@ class Sized(Protocol):
         """Return the policy for a world."""
 
 
-def sized(policy: Policy, world: World) -> Policy:
+def size(policy: Policy, world: World) -> Policy:
     """Return a policy that knows its world, if it has to; only then has the world to say what it observes."""
     return policy.sized(world.layout) if isinstance(policy, Sized) else policy
 

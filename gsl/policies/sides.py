@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.dynamics import forward_kinematics
 
 SAME_PLACE = 1e-3  # [m]
@@ -26,7 +26,7 @@ class Pair(NamedTuple):
 
 def pairs(robot: Robot) -> tuple[Pair, ...]:
     """Return the controlled joints that are mirror images of each other; an axis is a pseudo-vector."""
-    frames = forward_kinematics(lumped(robot), {})
+    frames = forward_kinematics(lump(robot), {})
     joints = [robot.joint(name) for name in robot.controlled]
     places = np.array([frames.origin[joint.child] for joint in joints])
     axes = np.array([frames.axis[joint.name] for joint in joints])
@@ -38,7 +38,7 @@ def pairs(robot: Robot) -> tuple[Pair, ...]:
 
 def inwards(robot: Robot, angles: Mapping[str, float]) -> np.ndarray:
     """Return the sign in which each controlled joint brings its limb to the middle plane, 0 for none, shape (n,)."""
-    here, masses = _centres(robot, angles), np.array([link.mass for link in lumped(robot).links.values()])
+    here, masses = _centres(robot, angles), np.array([link.mass for link in lump(robot).links.values()])
     signs = np.zeros(len(robot.controlled))
     for index, name in enumerate(robot.controlled):
         moved = _centres(robot, {**angles, name: angles.get(name, 0.0) + _ANGLE}) - here
@@ -51,6 +51,6 @@ def inwards(robot: Robot, angles: Mapping[str, float]) -> np.ndarray:
 
 def _centres(robot: Robot, angles: Mapping[str, float]) -> np.ndarray:
     """Return the links' centres of mass in base axes [m], shape (n_links, 3)."""
-    body = lumped(robot)
+    body = lump(robot)
     frames = forward_kinematics(body, angles)
     return np.array([frames.origin[name] + frames.turn[name] @ link.com for name, link in body.links.items()])

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.core.console import Console
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.interfaces import Grounding, World
 from gsl.errors import ArtifactError, ConfigError, Waiting
 from gsl.grounding.ane import ActionNoise
 from gsl.policies.programme import OpenLoopRun
-from gsl.real_robot.judging import Verdict, by_distance, judged
+from gsl.real_robot.judging import Verdict, by_distance, judge
 from gsl.rollout.parallel import Job, trajectories
 from gsl.rollout.rollout import Scenario
 from gsl.runner.guard import Guard
@@ -23,7 +23,7 @@ from gsl.runner.request import GROUND, HELD, NAME, due, stored_request
 from gsl.storage import manifest
 from gsl.storage.answer_checks import check_answers
 from gsl.storage.answers import Answered, answer_files, read_answers
-from gsl.storage.requests import restore, sealed, write_request
+from gsl.storage.requests import restore, seal, write_request
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.fits import fitting_step
@@ -65,7 +65,7 @@ def answer_parents(world: World) -> Mapping[str, Path]:
     return {f"answer.{path.relative_to(base).as_posix()}": path for one in folders for path in answer_files(one)}
 
 
-def asked(
+def ask(
     scenario: Scenario, orders: Sequence[Order], errand: Errand, *, workers: int, console: Console
 ) -> list[Verdict | None]:
     """Return the episodes of all orders, None for those that nobody wants after a fall of their policy.
@@ -75,7 +75,7 @@ def asked(
         ArtifactError: An answer does not fit.
     """
     folder, request = _folder(scenario, errand), _request(scenario, orders, errand)
-    if not _written(folder, request):
+    if not _write_request(folder, request):
         warnings = foreseen(scenario, orders, request, workers=workers, console=console)
         write_request(folder, request, warnings)
     elif restore(folder, request):
@@ -84,14 +84,14 @@ def asked(
     for line in check_answers(request, answers):
         console.status(f"warning: {folder.as_posix()}: {line}")
     verdicts = {
-        episode["name"]: judged(scenario, answers[episode["name"]], episode["steps"])
+        episode["name"]: judge(scenario, answers[episode["name"]], episode["steps"])
         for episode in request["episodes"]
         if episode["name"] in answers
     }
     done = {name: one for name, one in verdicts.items() if one is not None and (one.trajectory or not errand.logs)}
     missing = [one["name"] for one in due(request, done, {name for name, one in done.items() if one.episode.fell})]
     if missing:
-        raise Waiting(_told(folder, request, missing, answers), folder, missing)
+        raise Waiting(_describe_errand(folder, request, missing, answers), folder, missing)
     for path in sorted({one.path.parent for one in answers.values()}):
         if (path / manifest.NAME).is_file() and manifest.read(path).kind == REHEARSAL:
             console.status(f"{path.as_posix()}: this is a rehearsal: no real robot has acted")
@@ -132,7 +132,7 @@ def _folder(scenario: Scenario, errand: Errand) -> Path:
     return Path(world.requests) / errand.name
 
 
-def _written(folder: Path, request: Mapping[str, Any]) -> bool:
+def _write_request(folder: Path, request: Mapping[str, Any]) -> bool:
     """Tell whether a folder holds this very request."""
     if not folder.exists() or (folder.is_dir() and not (folder / NAME).exists() and not answer_files(folder)):
         return False
@@ -150,7 +150,7 @@ def _request(scenario: Scenario, orders: Sequence[Order], errand: Errand) -> dic
         so_far[order.policy] += 1
         name = f"{order.policy}_{so_far[order.policy]:02d}" if wanted[order.policy] > 1 else order.policy
         episodes.append({"name": name, **_episode(scenario, order)})
-    return sealed(
+    return seal(
         {
             "about": errand.about,
             "robot": world.robot,
@@ -160,9 +160,9 @@ def _request(scenario: Scenario, orders: Sequence[Order], errand: Errand) -> dic
             "observes": layout.sizes,
             "limits": world.limits,
             "ramp": {"seconds": world.ramp, "speed": world.ramp_speed, "within": world.within},
-            "policy": described(scenario.policy),
+            "policy": describe(scenario.policy),
             "action_noise": _noise(scenario.grounding),
-            "task": described(scenario.task),
+            "task": describe(scenario.task),
             "until_fall": errand.until_fall,
             "distance": by_distance(scenario.task, layout),
             "episodes": episodes,
@@ -189,7 +189,9 @@ def _noise(grounding: Grounding) -> float:
     return grounding.sd if isinstance(grounding, ActionNoise) else 0.0
 
 
-def _told(folder: Path, request: Mapping[str, Any], missing: list[str], answers: Mapping[str, Answered]) -> str:
+def _describe_errand(
+    folder: Path, request: Mapping[str, Any], missing: list[str], answers: Mapping[str, Answered]
+) -> str:
     """Return what a person has to do, in two lines."""
     names = ", ".join(missing[:SHOWN]) + (f" and {len(missing) - SHOWN} more" if len(missing) > SHOWN else "")
     seconds = sum(e["steps"] for e in request["episodes"] if e["name"] in missing) * request["control_period"]

@@ -26,7 +26,7 @@ class Verdict(NamedTuple):
     trajectory: Trajectory | None
 
 
-def observed(layout: Layout, trajectory: Trajectory) -> Layout:
+def observe(layout: Layout, trajectory: Trajectory) -> Layout:
     """Return a layout with all that a log knows of the base."""
     known = {
         part: size
@@ -41,7 +41,7 @@ def by_distance(task: Task, layout: Layout) -> bool:
     return isinstance(task, ByDistance) and "base.position" not in layout.sizes
 
 
-def judged(scenario: Scenario, answer: Answered, steps: int) -> Verdict | None:
+def judge(scenario: Scenario, answer: Answered, steps: int) -> Verdict | None:
     """Return what an answer is worth, None where it does not say enough: a distance or a value is missing.
 
     A stop for safety counts as a fall, and a fall without a measured distance as one on the spot.
@@ -55,15 +55,15 @@ def judged(scenario: Scenario, answer: Answered, steps: int) -> Verdict | None:
     trajectory = None if answer.trajectory is None else _fallen(answer.trajectory, fell=down)
     length = steps if trajectory is None else len(trajectory)
     if answer.value is not None:
-        return Verdict(Episode(answer.value, down, length, {}), _paid(trajectory, answer.value))
+        return Verdict(Episode(answer.value, down, length, {}), _pay(trajectory, answer.value))
     distance = 0.0 if answer.distance is None and down else answer.distance
     if isinstance(task, ByDistance) and distance is not None and (trajectory is None or not _sees_itself(trajectory)):
         found = task.measured(distance, fell=down)
-        return Verdict(Episode(found.value, down, length, found.outcome), _paid(trajectory, found.value))
+        return Verdict(Episode(found.value, down, length, found.outcome), _pay(trajectory, found.value))
     if trajectory is None or (isinstance(task, ByDistance) and not _sees_itself(trajectory)):
         return None
-    layout = observed(scenario.world.layout, trajectory)
-    whole = _rewarded(scenario, layout, trajectory)
+    layout = observe(scenario.world.layout, trajectory)
+    whole = _reward(scenario, layout, trajectory)
     return Verdict(Episode(whole.value, down, len(whole), task.outcome(layout, whole)), whole)
 
 
@@ -80,12 +80,12 @@ def _fallen(trajectory: Trajectory, *, fell: bool) -> Trajectory:
     return replace(trajectory, fell=down)
 
 
-def _paid(trajectory: Trajectory | None, value: float) -> Trajectory | None:
+def _pay(trajectory: Trajectory | None, value: float) -> Trajectory | None:
     """Let the last step earn all: nobody knows when it was earned."""
     return None if trajectory is None else replace(trajectory, reward=np.r_[np.zeros(len(trajectory) - 1), value])
 
 
-def _rewarded(scenario: Scenario, layout: Layout, trajectory: Trajectory) -> Trajectory:
+def _reward(scenario: Scenario, layout: Layout, trajectory: Trajectory) -> Trajectory:
     """Let the task judge every step as it does in a rollout; what comes after its end is cut off."""
     seen, rewards = observations(trajectory, layout), []
     task = scenario.task.start(layout, seen[0], scenario.role)

@@ -138,14 +138,14 @@ def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     found = [(one, f"{one['name']}{purpose}") for phase, purpose in phases.items() for one in document[phase]]
     told = list(dict.fromkeys(name for one, _ in found for name in one["outcome"]))
     rows = [tuple(cells(one | {"interval": _bounds(one["interval"])}, name, unit, told)) for one, name in found]
-    return Told("policies in the real world", tuple(columns(told, unit)), rows, returned(metrics, unit))
+    return Told("policies in the real world", tuple(columns(told, unit)), rows, describe_choice(metrics, unit))
 
 
 def _bounds(interval: list[float | None]) -> list[float]:
     return [math.inf if bound is None else bound for bound in interval]
 
 
-def returned(metrics: Mapping[str, Any], unit: Unit) -> str:
+def describe_choice(metrics: Mapping[str, Any], unit: Unit) -> str:
     """Return in a line what an evaluation chose, what that is worth beside π0, and what it cost."""
     spent = f"{metrics['real_episodes']} real episodes"
     if not metrics["best_generation"]:

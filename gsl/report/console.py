@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from gsl.core.console import LiveTable, Progress
 from gsl.core.interruption import checkpoint
 from gsl.core.visible import visible
-from gsl.report.tables import LineTable, RichLiveTable, drawn, fitting, total
+from gsl.report.tables import LineTable, RichLiveTable, draw_table, fitting, total
 
 if TYPE_CHECKING:
     import rich.console
@@ -67,7 +67,7 @@ class Console:
         widths = fitting(columns, rows, place.width, leave_out=place.is_terminal)
         if not place.is_terminal:
             place.width = max(WIDTH_WITHOUT_TERMINAL, total(widths))
-        place.print(drawn(columns, rows, widths))
+        place.print(draw_table(columns, rows, widths))
         left = columns[len(widths) :]
         more = f"{len(left)} more in a wider window: {', '.join(left)}" if left else ""
         if below := "\n".join(filter(None, [more, caption])):

@@ -79,11 +79,11 @@ def table(folds: Sequence[Fold], by: str) -> str:
     rows.append(("all", *(_mean(every[way]) for way in ways), "", "", ""))
     below = "Mean absolute error of the joints in open-loop replays of whole trajectories that no fit has seen."
     return "\n".join(
-        [markdown(columns, rows), below, *_lost(folds), *_compared(folds, every), *_on_top(folds, every), ""]
+        [markdown(columns, rows), below, *_list_lost(folds), *_compare(folds, every), *_on_top(folds, every), ""]
     )
 
 
-def _lost(folds: Sequence[Fold]) -> Iterator[str]:
+def _list_lost(folds: Sequence[Fold]) -> Iterator[str]:
     """Tell how many trajectories are in no mean, and why."""
     every = {way: np.concatenate([one.errors[way] for one in folds]) for way in folds[0].errors}
     lost = {way: ~np.isfinite(np.asarray(values, dtype=float)) for way, values in every.items()}
@@ -96,7 +96,7 @@ def _lost(folds: Sequence[Fold]) -> Iterator[str]:
         )
 
 
-def _compared(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterator[str]:
+def _compare(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterator[str]:
     after = every[DIAGNOSED]
     if not len(after):
         return

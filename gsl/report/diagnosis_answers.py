@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gsl.report.diagnosis_html import Html, Part, bullets, element, joined, prose
+from gsl.report.diagnosis_html import Html, Part, bullets, element, join, prose
 from gsl.report.diagnosis_next import Step, steps
 from gsl.report.diagnosis_verdict import (
     alternatives,
@@ -32,7 +32,7 @@ def answers(document: Document) -> Html:
         ),
         _card("What next?", element("ol", *(_step(step) for step in steps(document)))),
     ]
-    return joined(_head(document), element("div", *cards, class_="answers"))
+    return join(_head(document), element("div", *cards, class_="answers"))
 
 
 def _head(document: Document) -> Html:
@@ -60,7 +60,7 @@ def _cause(document: Document) -> Html:
     causes = [_one(cause) for cause in entries(document, "causes")]
     groups = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
     if causes or groups:
-        return joined(*causes, bullets(groups))
+        return join(*causes, bullets(groups))
     return element("p", prose(_nothing(document)))
 
 
@@ -91,6 +91,4 @@ def _parameter(key: str, found: Document) -> tuple[Part, ...]:
 def _step(step: Step) -> Html:
     lines = [element("code", f"{line}\n") for line in step.command.splitlines()]
     command = element("pre", *lines) if lines else None
-    return element(
-        "li", joined(step.why, " ", element("span", step.more, class_="note") if step.more else None), command
-    )
+    return element("li", join(step.why, " ", element("span", step.more, class_="note") if step.more else None), command)

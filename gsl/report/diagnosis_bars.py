@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from gsl.report.diagnosis_curves import ticks
-from gsl.report.diagnosis_html import Html, Part, element, joined
+from gsl.report.diagnosis_html import Html, Part, element, join
 
 THICK, ROOM = 11, 3  # of a bar and around it [px]
 
@@ -106,6 +106,6 @@ def _upright(place: str, height: int, kind: str) -> Html:
 
 
 def _row(label: Part, shapes: Sequence[Html], height: int, text: Part) -> Html:
-    track = element("svg", joined(*shapes), width="100%", height=height, aria_hidden="true")
+    track = element("svg", join(*shapes), width="100%", height=height, aria_hidden="true")
     parts = (("label", label), ("track", track), ("number", text))
     return element("div", *(element("div", part, class_=kind) for kind, part in parts), class_="row")

@@ -21,19 +21,19 @@ Part = str | None
 """Text, which is escaped, markup, or nothing."""
 
 
-def escaped(text: str) -> Html:
+def escape(text: str) -> Html:
     """Return text as markup that shows it; marks that no reader sees, or that turn the text round, are shown as �."""
     return text if isinstance(text, Html) else Html(html.escape(_UNPRINTABLE.sub("\ufffd", text)))
 
 
 def prose(text: str) -> Html:
     """Return a sentence as markup that keeps numbers and their units in one line; not for what is to be copied."""
-    return escaped(_BEFORE_UNIT.sub("\u00a0", text))
+    return escape(_BEFORE_UNIT.sub("\u00a0", text))
 
 
-def joined(*parts: Part) -> Html:
+def join(*parts: Part) -> Html:
     """Return parts one after the other."""
-    return Html("".join(escaped(part) for part in parts if part is not None))
+    return Html("".join(escape(part) for part in parts if part is not None))
 
 
 def element(name: str, *parts: Part, **attributes: str | float | None) -> Html:
@@ -46,10 +46,9 @@ def element(name: str, *parts: Part, **attributes: str | float | None) -> Html:
     """
     given = {key.rstrip("_").replace("_", "-"): value for key, value in attributes.items() if value not in (None, "")}
     shown = "".join(
-        f' {key}="{escaped(f"{value:.6g}" if isinstance(value, float) else str(value))}"'
-        for key, value in given.items()
+        f' {key}="{escape(f"{value:.6g}" if isinstance(value, float) else str(value))}"' for key, value in given.items()
     )
-    return Html(f"<{name}{shown}>{joined(*parts)}</{name}>")
+    return Html(f"<{name}{shown}>{join(*parts)}</{name}>")
 
 
 def table(columns: Sequence[Part], rows: Sequence[Sequence[Part]], *, kind: str = "") -> Html:

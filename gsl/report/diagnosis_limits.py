@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gsl.report.diagnosis_html import Html, element, section, table
-from gsl.report.diagnosis_words import Document, entries, finite, in_unit, listed, name, said
+from gsl.report.diagnosis_words import Document, entries, finite, in_unit, list_words, name, read_word
 
 TOLD = 4  # in a terminal
 
@@ -11,7 +11,12 @@ TOLD = 4  # in a terminal
 def limits(document: Document) -> Html | None:
     """Return the effects of which there is little or none."""
     rows = [
-        (name(said(one, "effect")), element("code", said(one, "parameter")), _at(one, "most"), _at(one, "documented"))
+        (
+            name(read_word(one, "effect")),
+            element("code", read_word(one, "parameter")),
+            _at(one, "most"),
+            _at(one, "documented"),
+        )
         for one in entries(document, "limits")
     ]
     note = (
@@ -26,10 +31,10 @@ def limits(document: Document) -> Html | None:
 def limits_sentence(document: Document) -> str | None:
     """Return the tightest limits in a sentence, None if there are none."""
     found = entries(document, "limits")
-    told = [f"{name(said(one, 'effect'))} {_at(one, 'most')}" for one in found[:TOLD]]
+    told = [f"{name(read_word(one, 'effect'))} {_at(one, 'most')}" for one in found[:TOLD]]
     more = [f"{len(found) - TOLD} more, in the report"] if len(found) > TOLD else []
     given = "If these causes are right, all" if entries(document, "causes") else "All"
-    return f"{given} joints alike have at most: {listed([*told, *more], most=99)}." if told else None
+    return f"{given} joints alike have at most: {list_words([*told, *more], most=99)}." if told else None
 
 
 def _at(one: Document, key: str) -> str:

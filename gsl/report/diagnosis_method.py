@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from gsl.report.diagnosis_html import Html, Part, bullets, element, section, table
-from gsl.report.diagnosis_words import NONE, Document, entries, finite, level, listed, name, part, said, short
+from gsl.report.diagnosis_words import NONE, Document, entries, finite, level, list_words, name, part, read_word, short
 
 _ENGINES = {"chain": "chain model, robot in the air", "bullet": "Bullet, with the ground"}
 
@@ -16,7 +16,7 @@ def caveats(document: Document) -> Html | None:
     told: list[Part] = [str(caveat) for caveat in entries(document, "caveats")]
     unseen = entries(document, "invisible")
     if unseen:
-        told.append(f"This log cannot show: {listed([name(effect) for effect in unseen], most=99)}.")
+        told.append(f"This log cannot show: {list_words([name(effect) for effect in unseen], most=99)}.")
     return section("Caveats", bullets(told))
 
 
@@ -24,13 +24,13 @@ def calibration(document: Document) -> Html | None:
     """Return every joint's own small deviations."""
     rows = [
         (
-            said(one, "joint"),
-            _scaled(one.get("kp"), 1.0, decimals=3),
-            _scaled(one.get("kd"), 1.0, decimals=3),
-            _scaled(one.get("coulomb"), 1.0, decimals=4),
-            _scaled(one.get("viscous"), 1.0, decimals=4),
-            _scaled(one.get("zero"), 180.0 / math.pi, decimals=2),
-            _scaled(one.get("inertia"), 1000.0, decimals=2),
+            read_word(one, "joint"),
+            _scale(one.get("kp"), 1.0, decimals=3),
+            _scale(one.get("kd"), 1.0, decimals=3),
+            _scale(one.get("coulomb"), 1.0, decimals=4),
+            _scale(one.get("viscous"), 1.0, decimals=4),
+            _scale(one.get("zero"), 180.0 / math.pi, decimals=2),
+            _scale(one.get("inertia"), 1000.0, decimals=2),
         )
         for one in entries(document, "calibration")
     ]
@@ -50,7 +50,7 @@ def noise_floor(document: Document) -> Html | None:
     """Return the noise of each joint's log."""
     found = part(document, "floor")
     rows = [
-        (str(joint), _scaled(sd, 1000.0, decimals=2), _scaled(sd, 180.0 / math.pi, decimals=3))
+        (str(joint), _scale(sd, 1000.0, decimals=2), _scale(sd, 180.0 / math.pi, decimals=3))
         for joint, sd in part(found, "sd").items()
     ]
     pairs = found.get("pairs")
@@ -61,7 +61,7 @@ def noise_floor(document: Document) -> Html | None:
     return section("Noise floor", table(("joint", "sd [mrad]", "sd [°]"), rows) if rows else None, note=note)
 
 
-def _scaled(value: object, factor: float, *, decimals: int) -> str:
+def _scale(value: object, factor: float, *, decimals: int) -> str:
     number = finite(value)
     return NONE if number is None else f"{round(factor * number, decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
@@ -70,8 +70,8 @@ def self_test(document: Document) -> Html | None:
     """Return how the diagnosis did on simulated logs whose cause it was not told."""
     found = part(document, "self_test")
     rows = [
-        (name(one.get("truth") or NONE), _answer(one), said(one, "count"))
-        for one in sorted(entries(found, "confusions"), key=lambda one: said(one, "truth"))
+        (name(one.get("truth") or NONE), _answer(one), read_word(one, "count"))
+        for one in sorted(entries(found, "confusions"), key=lambda one: read_word(one, "truth"))
     ]
     gain = finite(found.get("null_gain"))
     null = (
@@ -96,7 +96,7 @@ def _answer(one: Document) -> Html:
 def method(document: Document) -> Html | None:
     """Return the data, the split and the command."""
     data = part(document, "data")
-    told = [*_data(data), *_made(document)]
+    told = [*_data(data), *_describe_make(document)]
     shown = [(title, entry) for title, entry in told if entry]
     pairs = [part for title, entry in shown for part in (element("dt", title), element("dd", entry))]
     note = (
@@ -110,14 +110,14 @@ def _data(data: Document) -> Iterable[tuple[str, Part]]:
     yield "robot", str(data.get("robot") or "")
     yield "simulator", str(data.get("sim") or "")
     yield "real data", _budget(data)
-    yield "split", _counted(data, (("train", "records to fit"), ("held_out", "held out"), ("windows", "windows")))
+    yield "split", _count(data, (("train", "records to fit"), ("held_out", "held out"), ("windows", "windows")))
     yield "recorded in", str(data.get("source") or "")
     yield "reference", str(data.get("reference") or "")
     engine = str(data.get("engine") or "")
     yield "replayed by", _ENGINES.get(engine, engine)
 
 
-def _verified(found: Document) -> str:
+def _describe_verified(found: Document) -> str:
     if not found:
         return ""
     windows, apart = found.get("windows"), short(found.get("chain_rms_mrad"), 2)
@@ -126,18 +126,18 @@ def _verified(found: Document) -> str:
 
 def _budget(data: Document) -> str:
     seconds = finite(data.get("seconds"))
-    told = _counted(data, (("records", "records"),))
+    told = _count(data, (("records", "records"),))
     return ", ".join(filter(None, [told, f"{seconds:.0f} s of motion" if seconds is not None else ""]))
 
 
-def _counted(data: Document, keys: Sequence[tuple[str, str]]) -> str:
+def _count(data: Document, keys: Sequence[tuple[str, str]]) -> str:
     return ", ".join(f"{data[key]} {words}" for key, words in keys if data.get(key) is not None)
 
 
-def _made(document: Document) -> Iterable[tuple[str, Part]]:
+def _describe_make(document: Document) -> Iterable[tuple[str, Part]]:
     seconds, command = finite(document.get("seconds")), document.get("command")
     yield "command", element("code", str(command)) if command else None
-    yield "the answer in Bullet", _verified(part(document, "verified"))
+    yield "the answer in Bullet", _describe_verified(part(document, "verified"))
     yield "took", f"{seconds:.0f} s" if seconds is not None else ""
     world = document.get("world_file")
     yield "corrected simulator", element("code", str(world)) if world else None

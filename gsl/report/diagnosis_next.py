@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from gsl.report.diagnosis_verdict import verdict
-from gsl.report.diagnosis_words import Document, entries, listed, name, part, said
+from gsl.report.diagnosis_words import Document, entries, list_words, name, part, read_word
 
 NOTHING = "no effect"  # as a document has it, beside an effect that the log cannot show
 
@@ -31,7 +31,9 @@ def steps(document: Document) -> list[Step]:
     given = entries(document, "commands")
     if given:
         return [Step(str(one.get("why") or ""), str(one.get("command") or "")) for one in given]
-    first = {"no_gap": _as_it_is, "causes": _corrected, "inseparable": _either, "unknown": _learned}[verdict(document)]
+    first = {"no_gap": _as_it_is, "causes": _advise_correction, "inseparable": _either, "unknown": _advise_learning}[
+        verdict(document)
+    ]
     experiment = _experiment(document)
     if verdict(document) == "inseparable":
         return [*experiment, first(document)]
@@ -43,9 +45,9 @@ def _as_it_is(document: Document) -> Step:
     return Step(told) if _own(document) else Step(told, "gsl optimize grounding=none")
 
 
-def _corrected(document: Document) -> Step:
+def _advise_correction(document: Document) -> Step:
     told = f"Train in the simulator with the effects switched on{_place(document)}{_yours(document)}"
-    far = [said(one, "part") for one in entries(document, "unexplained")]
+    far = [read_word(one, "part") for one in entries(document, "unexplained")]
     mind = f", not where it is still far from the robot: {', '.join(far)}" if far else ""
     return Step(f"{told}{mind}.", _training(document))
 
@@ -88,7 +90,7 @@ def _training(document: Document) -> str:
     return f"gsl optimize {chosen} grounding=none name=diagnosed" if folder and not _own(document) else ""
 
 
-def _learned(document: Document) -> Step:
+def _advise_learning(document: Document) -> Step:
     if _own(document):
         return Step("Let a grounding learn what no effect explains: `gsl iterate` with your worlds, task and policy.")
     return Step("Let a grounding learn what no effect explains, and check it.", "gsl iterate grounding=gat")
@@ -104,12 +106,12 @@ def _experiment(document: Document) -> list[Step]:
     if not wanted:
         return []
     groups = wanted.get("separates") or []
-    pairs = [listed([name(effect) for effect in group], "from") for group in groups if NOTHING not in group]
+    pairs = [list_words([name(effect) for effect in group], "from") for group in groups if NOTHING not in group]
     unseen = [name(effect) for group in groups if NOTHING in group for effect in group if effect != NOTHING]
     aim = (
-        f" to tell {listed(pairs)}"
+        f" to tell {list_words(pairs)}"
         if pairs
-        else f" to see {listed(unseen)}, which this log cannot show"
+        else f" to see {list_words(unseen)}, which this log cannot show"
         if unseen
         else ""
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 from gsl.report.diagnosis_html import Html, bullets, element, prose, section, table
 from gsl.report.diagnosis_scatter import Pair, Span, scatter
-from gsl.report.diagnosis_words import NONE, Document, between, entries, finite, part, said, short
+from gsl.report.diagnosis_words import NONE, Document, between, entries, finite, part, read_word, short
 
 _COLUMNS = {"sim": "simulator", "diagnosed": "", "real": "real"}  # the second is named by the document
 
@@ -15,13 +15,13 @@ _COLUMNS = {"sim": "simulator", "diagnosed": "", "real": "real"}  # the second i
 def policies(document: Document) -> Html | None:
     """Return the table, the plot and what is to be said of them."""
     found = part(document, "policy_gap")
-    rows, unit = entries(found, "rows"), said(found, "unit")
+    rows, unit = entries(found, "rows"), read_word(found, "unit")
     if not rows:
         return None
     told = _values(found)
     titles = [f"{words or _second(found)} [{unit}]" for words in _COLUMNS.values()]
     columns = ["policy", *(title for one in titles for title in (one, "95 % interval")), "falls"]
-    cells = [[said(row, "name"), *_cells(row, told), _falls(row)] for row in rows]
+    cells = [[read_word(row, "name"), *_cells(row, told), _falls(row)] for row in rows]
     note = (
         "Returns of the same policies in three worlds, counted as in real. Both simulators play the same seeds. A "
         "simulator in which policies can be chosen has its dots on the thin line, or at least in the right order."
@@ -39,15 +39,17 @@ def policies(document: Document) -> Html | None:
 def policy_lines(document: Document) -> list[str]:
     """Return gap and rank correlation before and after, a sentence each; nothing if no policies were given."""
     found = part(document, "policy_gap")
-    gap, order, unit = part(found, "gap"), part(found, "correlation"), said(found, "unit")
+    gap, order, unit = part(found, "gap"), part(found, "correlation"), read_word(found, "unit")
     if not gap:
         return []
-    count, told, second = said(found, "policies"), _values(found), _second(found)
-    before, after = (_told(part(gap, when), told) for when in ("before", "after"))
+    count, told, second = read_word(found, "policies"), _values(found), _second(found)
+    before, after = (_format_bounds(part(gap, when), told) for when in ("before", "after"))
     many = "policy" if count == "1" else "policies"
     lines = [f"{count} {many}: returns are {before} {unit} from real in the simulator, {after} in the {second} one."]
     if any(part(order, when) for when in ("before", "after")):
-        before, after = (_told(part(order, when), lambda value: short(value, 2)) for when in ("before", "after"))
+        before, after = (
+            _format_bounds(part(order, when), lambda value: short(value, 2)) for when in ("before", "after")
+        )
         line = f"Rank correlation with real: {before} in the simulator, {after} in the {second} one."
         low = finite(part(order, "after").get("low"))
         lines.append(line + ("" if low is None or low > 0.0 else " So few policies do not show an order."))
@@ -69,7 +71,7 @@ def _values(found: Document) -> Callable[[Any], str]:
     return told
 
 
-def _told(bounds: Document, form: Callable[[Any], str]) -> str:
+def _format_bounds(bounds: Document, form: Callable[[Any], str]) -> str:
     interval = between(bounds, form)
     return form(bounds.get("value")) + (f" ({interval})" if interval else "")
 
@@ -84,18 +86,18 @@ def _falls(row: Document) -> str:
     sides = [part(row, key) for key in _COLUMNS]
     if not any(side.get("falls") for side in sides):
         return ""
-    return ", ".join(f"{said(side, 'falls')} of {said(side, 'episodes')}" for side in sides)
+    return ", ".join(f"{read_word(side, 'falls')} of {read_word(side, 'episodes')}" for side in sides)
 
 
 def _plot(found: Document, rows: list[Any]) -> Html | None:
-    factor, unit = finite(found.get("shown")) or 1.0, said(found, "unit")
+    factor, unit = finite(found.get("shown")) or 1.0, read_word(found, "unit")
     legend = {"before": "simulator as it was", "after": f"{_second(found)} simulator"}
     pairs = []
     for key, kind in (("sim", "before"), ("diagnosed", "after")):
         for row in rows:
             across, up = (_span(part(row, side), factor) for side in ("real", key))
             if across and up:
-                pairs.append(Pair(said(row, "name"), kind, across, up))
+                pairs.append(Pair(read_word(row, "name"), kind, across, up))
     return scatter(pairs, legend, x=f"real [{unit}]", y=f"simulated [{unit}]")
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from gsl.report.diagnosis_bars import Dot, dot_chart
-from gsl.report.diagnosis_html import Html, Part, element, joined, prose, section, table
+from gsl.report.diagnosis_html import Html, Part, element, join, prose, section, table
 from gsl.report.diagnosis_verdict import cause_name
 from gsl.report.diagnosis_words import (
     NONE,
@@ -18,7 +18,7 @@ from gsl.report.diagnosis_words import (
     name,
     part,
     probability,
-    said,
+    read_word,
     share,
     short,
 )
@@ -55,7 +55,7 @@ def ranking(document: Document) -> Html | None:
     least = finite(document.get("least_gain")) or 20.0
     shares = all(abs(finite(part(one, "gain").get("value")) or 0.0) <= 1.5 for one in found)
     form = share if shares else short
-    chosen = sorted((str(cause.get("effect")), said(cause, "scope")) for cause in entries(document, "causes"))
+    chosen = sorted((str(cause.get("effect")), read_word(cause, "scope")) for cause in entries(document, "causes"))
     dots = [_dot(one, form, chosen=_what(one) == chosen) for one in found[:SHOWN]]
     share_of = "the share of what a calibration of each joint leaves that it explains (outliers count for less)"
     measure = share_of if shares else "the cost that it saves"
@@ -97,7 +97,7 @@ def _label(one: Document) -> Html:
         cause_name({"effect": effect, "joints": scope}) for effect, scope in zip(effects, scopes, strict=False)
     )
     fitted = str(one.get("parameters") or "")
-    return joined(
+    return join(
         element("strong", name(told) or "calibration alone"),
         element("span", f" {fitted}", class_="note") if fitted else None,
     )

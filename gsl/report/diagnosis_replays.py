@@ -8,7 +8,7 @@ from typing import Any
 
 from gsl.report.diagnosis_curves import Curve, line_chart
 from gsl.report.diagnosis_html import Html, element, section
-from gsl.report.diagnosis_words import Document, entries, finite, said, short
+from gsl.report.diagnosis_words import Document, entries, finite, read_word, short
 
 SHOWN = 6
 _LINES = (
@@ -29,7 +29,7 @@ def replays(document: Document) -> Html | None:
 def _replay(one: Document) -> Html | None:
     time, real = one.get("time") or [], _degrees(one.get("real"))
     curves = [Curve(label, kind, time, _degrees(one.get(key))) for key, label, kind in _LINES if one.get(key)]
-    chart = line_chart(curves, x="time [s]", y=f"{said(one, 'joint')} [°]")
+    chart = line_chart(curves, x="time [s]", y=f"{read_word(one, 'joint')} [°]")
     if chart is None:
         return None
     distances = [
@@ -37,7 +37,9 @@ def _replay(one: Document) -> Html | None:
         for key, label in (("before", "from the robot as it was"), ("after", "with the effects"))
         if (distance := _rms(_degrees(one.get(key)), real)) is not None
     ]
-    title = f"{said(one, 'joint')} in {said(one, 'record')}" + (f": {', '.join(distances)}" if distances else "")
+    title = f"{read_word(one, 'joint')} in {read_word(one, 'record')}" + (
+        f": {', '.join(distances)}" if distances else ""
+    )
     return element("div", element("h3", title), chart, class_="replay")
 
 

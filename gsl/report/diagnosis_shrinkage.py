@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 from gsl.report.diagnosis_bars import Bar, bar_chart
-from gsl.report.diagnosis_html import Html, element, joined, prose, section
+from gsl.report.diagnosis_html import Html, element, join, prose, section
 from gsl.report.diagnosis_verdict import shrinkage_sentence
-from gsl.report.diagnosis_words import Document, entries, finite, level, part, regime, said, share
+from gsl.report.diagnosis_words import Document, entries, finite, level, part, read_word, regime, share
 
 FLOOR = 1.0
 
@@ -53,9 +53,9 @@ def _ceiling(found: Document) -> float | None:
 def parts(document: Document) -> Html | None:
     """Return the gap before and after, joint by joint and regime by regime."""
     found = part(document, "shrinkage")
-    by_joint = [(said(one, "joint"), one) for one in entries(found, "by_joint")]
+    by_joint = [(read_word(one, "joint"), one) for one in entries(found, "by_joint")]
     kinds = [one for one in entries(found, "by_regime") if one.get("regime") != "all"]
-    by_regime = [(regime(said(one, "regime")), one) for one in kinds]
+    by_regime = [(regime(read_word(one, "regime")), one) for one in kinds]
     drawn = [_pairs(title, rows) for title, rows in (("By joint", by_joint), ("By what the joint did", by_regime))]
     note = "Gap / noise of the simulator as it was (above) and with the effects (below), the worst first."
     return section("Before and after", *drawn, note=note)
@@ -72,4 +72,4 @@ def _pairs(title: str, rows: Sequence[tuple[str, Document]]) -> Html | None:
         for label, one in ordered
     ]
     drawn = bar_chart(bars, mark=FLOOR)
-    return joined(element("h3", title), drawn) if drawn else None
+    return join(element("h3", title), drawn) if drawn else None

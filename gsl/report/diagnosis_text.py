@@ -50,7 +50,7 @@ def summary_lines(document: Document) -> list[Told]:
 
 def _causes(document: Document) -> Told:
     summary = "\n".join(filter(None, [str(document.get("summary") or ""), *policy_lines(document)])) or None
-    rows = [*_found(document)]
+    rows = [*_list_causes(document)]
     if not rows:
         alike = [("either", alternatives(group)) for group in entries(document, "inseparable")]
         alike += [("nearest", nearest(document))] if nearest(document) else []
@@ -62,7 +62,7 @@ def _causes(document: Document) -> Told:
     return Told(headline(document), columns, rows[:CAUSES], told or None)
 
 
-def _found(document: Document) -> Iterator[tuple[str, ...]]:
+def _list_causes(document: Document) -> Iterator[tuple[str, ...]]:
     for cause in entries(document, "causes"):
         first = cause_name(cause)
         last = probability(cause.get("probability")), share(part(cause, "gain").get("value"))

@@ -12,12 +12,12 @@ from gsl.report.diagnosis_words import (
     entries,
     finite,
     level,
-    listed,
+    list_words,
     name,
     part,
     probability,
+    read_word,
     regime,
-    said,
     scope,
     share,
 )
@@ -47,15 +47,15 @@ def _causes(document: Document) -> str:
     if not found:
         return "There is a gap, and its cause was found"
     if document.get("sure", True):
-        return f"{'Cause' if len(found) == 1 else f'{len(found)} causes'} found: {listed(found)}"
+        return f"{'Cause' if len(found) == 1 else f'{len(found)} causes'} found: {list_words(found)}"
     how = "possible" if document.get("doubt") == "possibly" else "probable"
-    return f"{f'{how.capitalize()} cause' if len(found) == 1 else f'{len(found)} {how} causes'}: {listed(found)}"
+    return f"{f'{how.capitalize()} cause' if len(found) == 1 else f'{len(found)} {how} causes'}: {list_words(found)}"
 
 
 def _inseparable(document: Document) -> str:
     groups = [alternatives(group) for group in entries(document, "inseparable")]
     told = "There is a gap, but this log cannot tell its possible causes apart"
-    return f"{told}: {listed(groups, most=3)}" if groups else told
+    return f"{told}: {list_words(groups, most=3)}" if groups else told
 
 
 def _unknown(document: Document) -> str:
@@ -77,12 +77,12 @@ def cause_name(cause: Document) -> str:
 
 def nearest(document: Document) -> str:
     """Return the effects that come nearest where none explains the gap; nothing if there are none."""
-    return listed([cause_name(cause) for cause in entries(document, "suspects")])
+    return list_words([cause_name(cause) for cause in entries(document, "suspects")])
 
 
 def alternatives(group: Sequence[str]) -> str:
     """Return effects of which one log cannot say which it is."""
-    return listed([name(effect) for effect in group], "or")
+    return list_words([name(effect) for effect in group], "or")
 
 
 def sureness(cause: Document) -> str:
@@ -116,12 +116,12 @@ def places(document: Document) -> list[Place]:
     """Return the joints that stand out of the noise, as a whole or in some regime, worst first."""
     cells = sorted(entries(document, "where"), key=lambda cell: -(finite(cell.get("share")) or 0.0))
     found = []
-    for joint in dict.fromkeys(said(cell, "joint") for cell in cells):
-        own = [cell for cell in cells if said(cell, "joint") == joint]
+    for joint in dict.fromkeys(read_word(cell, "joint") for cell in cells):
+        own = [cell for cell in cells if read_word(cell, "joint") == joint]
         whole = next((cell for cell in own if cell.get("regime") == "all"), own[0])
         named = [cell for cell in own if cell.get("named")]
         worst = next((cell for cell in named if cell is not whole), None)
-        when = f"{regime(said(worst, 'regime'))}, {level(worst.get('rms'))}" if worst else ""
+        when = f"{regime(read_word(worst, 'regime'))}, {level(worst.get('rms'))}" if worst else ""
         found += [Place(joint, whole, when)] if named else []
     return sorted(found, key=lambda place: -(finite(place.cell.get("share")) or 0.0))
 
@@ -131,17 +131,17 @@ def where_sentence(document: Document) -> str:
     found = places(document)
     if not found:
         return "No joint stands out of the noise."
-    of = len({said(cell, "joint") for cell in entries(document, "where")})
+    of = len({read_word(cell, "joint") for cell in entries(document, "where")})
     whole = [place for place in found if place.cell.get("named")]
     parts = [f"{place.joint} when {place.when}" for place in found if place not in whole]
     within = " The others are not surely beyond the noise." if of > len(found) else ""
-    only = f" Surely beyond the noise only at times: {listed(parts)}." if parts else ""
+    only = f" Surely beyond the noise only at times: {list_words(parts)}." if parts else ""
     if not whole:
         return f"No joint stands out as a whole.{only}{within}"
     first, *others = (f"{place.joint} {share(place.cell.get('share'))}" for place in whole)
     when = f" (most when {whole[0].when})" if whole[0].when else ""
     count = f"In {len(whole)} of {of} joints: " if of > 1 else ""
-    return f"{count}{listed([f'{first} of the excess{when}', *others])}.{only}{within}"
+    return f"{count}{list_words([f'{first} of the excess{when}', *others])}.{only}{within}"
 
 
 def shrinkage_sentence(document: Document) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gsl.report.diagnosis_curves import Curve, line_chart
-from gsl.report.diagnosis_html import Html, element, joined, section, table
+from gsl.report.diagnosis_html import Html, element, join, section, table
 from gsl.report.diagnosis_verdict import Place, places
 from gsl.report.diagnosis_words import (
     REGIMES,
@@ -17,8 +17,8 @@ from gsl.report.diagnosis_words import (
     level,
     part,
     probability,
+    read_word,
     regime,
-    said,
     share,
 )
 
@@ -28,10 +28,10 @@ DRAWN = 4  # joints with a colour of their own
 
 def where(document: Document) -> Html | None:
     """Return the map and the list of its named cells."""
-    cells = {(said(one, "joint"), said(one, "regime")): one for one in entries(document, "where")}
+    cells = {(read_word(one, "joint"), read_word(one, "regime")): one for one in entries(document, "where")}
     if not cells:
         return None
-    named = [_named(place) for place in places(document)]
+    named = [_name_place(place) for place in places(document)]
     columns = ("joint", "share of the excess", "95 % interval", "gap / noise", "most when")
     note = (
         "Share of the excess, the part of the gap that noise does not explain, by joint and by what the joint did; a "
@@ -45,7 +45,7 @@ def where(document: Document) -> Html | None:
     )
 
 
-def _named(place: Place) -> Sequence[str]:
+def _name_place(place: Place) -> Sequence[str]:
     cell = place.cell
     return place.joint, share(cell.get("share")), between(cell, share), level(cell.get("rms")), place.when
 
@@ -105,7 +105,7 @@ def _last(values: Sequence[Any]) -> float:
 def sides(document: Document) -> Html | None:
     """Return the joints of the left side against those of the right."""
     rows = [
-        (said(one, "pair"), level(one.get("left")), level(one.get("right")), probability(one.get("p")), _side(one))
+        (read_word(one, "pair"), level(one.get("left")), level(one.get("right")), probability(one.get("p")), _side(one))
         for one in sorted(entries(document, "sides"), key=_milder)
     ]
     columns = ("pair", "left", "right", "chance alone", "so")
@@ -123,7 +123,7 @@ def _milder(one: Document) -> float:
 def _side(one: Document) -> Html:
     left, right, p = (finite(one.get(key)) for key in ("left", "right", "p"))
     if left is None or right is None or p is None or p >= 0.05:
-        return joined("alike")
+        return join("alike")
     if max(left, right) < 1.0:
-        return joined("both within the noise")
+        return join("both within the noise")
     return element("strong", "worse on the left" if left > right else "worse on the right")

@@ -42,7 +42,7 @@ def finite(value: Any) -> float | None:
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
 
 
-def said(document: Document, key: str) -> str:
+def read_word(document: Document, key: str) -> str:
     """Return a word of a document, a dash if it is absent or None."""
     given = document.get(key)
     return NONE if given is None else str(given)
@@ -96,7 +96,7 @@ def name(effect: str) -> str:
     return str(effect).replace("_", " ")
 
 
-def listed(words: Sequence[Any], last: str = "and", *, most: int = 4) -> str:
+def list_words(words: Sequence[Any], last: str = "and", *, most: int = 4) -> str:
     """Return words with commas, those beyond `most` only counted."""
     told = [str(word) for word in words]
     if len(told) > most:
@@ -107,7 +107,7 @@ def listed(words: Sequence[Any], last: str = "and", *, most: int = 4) -> str:
 def scope(joints: Any) -> str:
     """Return where an effect acts, in words; nothing if that is nowhere in particular."""
     found = [joints] if isinstance(joints, str) else list(joints or [])
-    return listed(["all joints" if joint == "all" else joint for joint in found if joint])
+    return list_words(["all joints" if joint == "all" else joint for joint in found if joint])
 
 
 def regime(kind: str) -> str:

@@ -22,7 +22,7 @@ def ends(unit: Unit) -> str:
     return "falls" if unit.falls else "episodes"
 
 
-def ended(one: Mapping[str, Any], unit: Unit) -> str:
+def format_ends(one: Mapping[str, Any], unit: Unit) -> str:
     """Return a cell for people: falls of episodes, or episodes alone."""
     return f"{one['falls']} of {one['episodes']}" if unit.falls else str(one["episodes"])
 
@@ -32,4 +32,4 @@ def cells(one: Mapping[str, Any], name: str, unit: Unit, outcomes: Sequence[str]
     interval = unit.interval(one["interval"]) if np.isfinite(one["interval"]).all() and not one["falls"] else ""
     simulated = "" if one["value_sim"] is None else unit.bare(one["value_sim"])
     outcome = [f"{one['outcome'][name]:.1f}" if name in one["outcome"] else "" for name in outcomes]
-    return [name, simulated, unit.bare(one["value"]), interval, ended(one, unit), *outcome]
+    return [name, simulated, unit.bare(one["value"]), interval, format_ends(one, unit), *outcome]

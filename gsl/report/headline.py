@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from gsl.core.unit import Unit, gained
+from gsl.core.unit import Unit, format_gain
 from gsl.core.words import falls, several
 from gsl.errors import ArtifactError
-from gsl.grounding.diagnosis_file import named
+from gsl.grounding.diagnosis_file import name_causes
 from gsl.storage.artifact import Artifact
 
 Metrics = Mapping[str, Any]
@@ -89,7 +89,7 @@ def _optimize(metrics: Metrics, unit: Unit) -> str:
     best = unit.shown(metrics["best_value_sim"])
     told = f"{several(metrics['generations'], 'generation')}, best {best} in simulation"
     if "effects" in metrics:
-        told += f"; {named(metrics['effects'])} switched on" if metrics["effects"] else "; joints calibrated"
+        told += f"; {name_causes(metrics['effects'])} switched on" if metrics["effects"] else "; joints calibrated"
     alpha, passed = metrics.get("alpha"), metrics.get("grounding_acceptable", True)
     if alpha is None and passed:
         return told
@@ -101,7 +101,7 @@ def _optimize(metrics: Metrics, unit: Unit) -> str:
 def _evaluate(metrics: Metrics, unit: Unit) -> str:
     after, gain = metrics["returned"], metrics["gain"]
     told = f"{metrics['best']} {unit.shown(after['value'])}, {unit.ended(after)}"
-    share = gained(gain["share"]) if gain["share"] else ""
+    share = format_gain(gain["share"]) if gain["share"] else ""
     return f"{told}; {share} over the start" if share else told
 
 

@@ -9,7 +9,16 @@ import numpy as np
 
 from gsl.core.series import Lag
 from gsl.storage.importers.assembly import Episode
-from gsl.storage.importers.suspicions import MOVES, STUCK, Suspicion, is_clear, lags_of, saturated, stopped, suspicions
+from gsl.storage.importers.suspicions import (
+    MOVES,
+    STUCK,
+    Suspicion,
+    is_clear,
+    lags_of,
+    measure_saturation,
+    measure_stops,
+    suspicions,
+)
 from gsl.storage.trajectory_contract import UNITS
 
 UNEVEN = 0.5  # of a period, by which a row may be early or late before a diagnosis refuses it
@@ -70,7 +79,7 @@ def _channels(found: Sequence[Episode]) -> Iterator[Document]:
     for name, parts, commands in _columns(found):
         values = np.concatenate(parts).astype(float)
         group = name.partition(".")[0]
-        at_end = stopped if group == "position" else saturated
+        at_end = measure_stops if group == "position" else measure_saturation
         moving = [at_end(*pair) for pair in zip(parts, commands, strict=True)] if commands else []
         yield {
             "column": name,

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from gsl.core.interfaces import Task
-from gsl.core.unit import Unit, gained
-from gsl.report.evaluation_cells import ended, ends
+from gsl.core.unit import Unit, format_gain
+from gsl.report.evaluation_cells import ends, format_ends
 from gsl.report.flight import Flight
 from gsl.report.learning_curve import Search, learning_curve, search
 from gsl.report.markdown import table
@@ -184,7 +184,7 @@ class Rounds:
     def _added(self, label: str, metrics: Mapping[str, Any], cost: str, *, first: bool) -> list[tuple[str, ...]]:
         simulated, gain = metrics["returned_value_sim"], metrics["gain"]
         expected = "" if simulated is None else self._unit.bare(simulated)
-        told = gained(gain["share"]) or self._unit.shown(gain["value"], sign=True)
+        told = format_gain(gain["share"]) or self._unit.shown(gain["value"], sign=True)
         zero: tuple[str, ...] = ("0", "π0", "", *self._measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
         name = BEGUN.get(metrics["best"], metrics["best"])
@@ -193,7 +193,11 @@ class Rounds:
         return rows
 
     def _measured(self, summary: Mapping[str, Any]) -> tuple[str, str, str]:
-        return self._unit.bare(summary["value"]), self._unit.interval(summary["interval"]), ended(summary, self._unit)
+        return (
+            self._unit.bare(summary["value"]),
+            self._unit.interval(summary["interval"]),
+            format_ends(summary, self._unit),
+        )
 
 
 def write_table(folder: Path, rounds: Rounds, remarks: Sequence[str] = ()) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.trajectory import Trajectory
 from gsl.worlds.camera import Camera, View
 from gsl.worlds.start import extent
@@ -18,7 +18,7 @@ FAR_ENOUGH = 2.5  # of the camera, in diagonals of the robot
 
 def portrait(robot: Robot, path: Path, *, width: int = 800, height: int = 900) -> None:
     """Write a picture of the robot standing in its stance."""
-    body = lumped(robot)
+    body = lump(robot)
     positions = np.array([robot.stance.get(name, 0.0) for name in robot.motors])
     low, high = extent(body, positions)
     place = (0.0, 0.0, -low[2])

@@ -62,10 +62,10 @@ class RichLiveTable:
     def _draw(self) -> None:
         """Draw it anew: which columns there is room for depends on what is in them."""
         widths = fitting(self._columns, self._rows, self._live.console.width)
-        self._live.update(drawn(self._columns, self._rows, widths, self._title, self._caption), refresh=True)
+        self._live.update(draw_table(self._columns, self._rows, widths, self._title, self._caption), refresh=True)
 
 
-def drawn(
+def draw_table(
     columns: Sequence[str],
     rows: Sequence[Sequence[object]],
     widths: Sequence[int],

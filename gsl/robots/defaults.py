@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gsl.core.body import Joint, Link, Robot, lumped
+from gsl.core.body import Joint, Link, Robot, lump
 from gsl.core.dynamics import mass_matrix
 from gsl.core.setting import settings_of
 from gsl.effects.effect import effect_class
@@ -46,7 +46,7 @@ def with_gains(robot: Robot, given: Mapping[str, tuple[float | None, float | Non
         robot: With everything else.
         given: kp [N·m/rad] and kd [N·m·s/rad] by motor, None where it is left open.
     """
-    body = lumped(robot)
+    body = lump(robot)
     carried = np.diag(mass_matrix(body, robot.stance))[6:]
     gains = {}
     for name, inertia in zip(robot.motors, carried.tolist(), strict=True):

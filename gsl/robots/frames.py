@@ -43,7 +43,7 @@ def rpy(turn: np.ndarray) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def aligned(links: Mapping[str, Link], mounts: Iterable[Mount]) -> tuple[dict[str, Link], tuple[Joint, ...]]:
+def align(links: Mapping[str, Link], mounts: Iterable[Mount]) -> tuple[dict[str, Link], tuple[Joint, ...]]:
     """Return the same tree in frames parallel to the base's.
 
     Args:
@@ -55,16 +55,16 @@ def aligned(links: Mapping[str, Link], mounts: Iterable[Mount]) -> tuple[dict[st
         above = turns[joint.parent]
         turns[joint.child] = here = above @ turn
         joints.append(replace(joint, origin=above @ joint.origin, axis=here @ joint.axis))
-    return {name: turned(links[name], turn) for name, turn in turns.items()}, tuple(joints)
+    return {name: turn_link(links[name], turn) for name, turn in turns.items()}, tuple(joints)
 
 
-def turned(link: Link, turn: np.ndarray) -> Link:
+def turn_link(link: Link, turn: np.ndarray) -> Link:
     """Return a link in other axes, `turn` leading from its own to those, shape (3, 3)."""
     if np.array_equal(turn, np.eye(3)):
         return link
-    shapes = tuple(_turned_shape(shape, turn) for shape in link.shapes)
+    shapes = tuple(_turn_shape(shape, turn) for shape in link.shapes)
     return replace(link, com=turn @ link.com, inertia=turn @ link.inertia @ turn.T, shapes=shapes)
 
 
-def _turned_shape(shape: Shape, turn: np.ndarray) -> Shape:
+def _turn_shape(shape: Shape, turn: np.ndarray) -> Shape:
     return replace(shape, centre=tuple(turn @ np.array(shape.centre)), turn=rpy(turn @ euler(*shape.turn)))

@@ -72,7 +72,7 @@ def go2() -> Robot:
 
 
 def _joints(leg: str) -> list[Joint]:
-    x, y = HIP_X * _front(leg), _left(leg)
+    x, y = HIP_X * _front(leg), _left_sign(leg)
     across, along, down = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -SHANK])
     rows = (
         ("hip", "base", np.array([x, HIP_Y * y, 0.0]), along, LIMITS["hip"]),
@@ -100,9 +100,9 @@ def _joints(leg: str) -> list[Joint]:
 def _link(leg: str, part: str) -> Link:
     """Return a part of a leg: that of the front left one, mirrored left to right, the hip front to rear as well."""
     mass, com, six = _PARTS[part]
-    mirror = np.diag([_front(leg) if part == "hip" else 1.0, _left(leg), 1.0])
+    mirror = np.diag([_front(leg) if part == "hip" else 1.0, _left_sign(leg), 1.0])
     return Link(
-        f"{leg}_{part}", mass, mirror @ np.array(com), mirror @ _inertia(six) @ mirror, _shapes(part, _left(leg))
+        f"{leg}_{part}", mass, mirror @ np.array(com), mirror @ _inertia(six) @ mirror, _shapes(part, _left_sign(leg))
     )
 
 
@@ -129,7 +129,7 @@ def _front(leg: str) -> float:
     return 1.0 if leg[0] == "F" else -1.0
 
 
-def _left(leg: str) -> float:
+def _left_sign(leg: str) -> float:
     return 1.0 if leg[1] == "L" else -1.0
 
 

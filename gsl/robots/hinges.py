@@ -9,12 +9,12 @@ from typing import Annotated
 
 import numpy as np
 
-from gsl.core.body import Joint, Robot, lumped, rotation
+from gsl.core.body import Joint, Robot, lump, rotation
 from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
 from gsl.robots.defaults import armature_of, lone_servos, unknown_loads, with_gains
-from gsl.robots.frames import Mount, aligned
+from gsl.robots.frames import Mount, align
 from gsl.robots.joint_limits import is_range, limits_problem
 from gsl.robots.mimic import Follows, leader_of, limits_like_leader
 from gsl.robots.urdf_xml import TURNING, Description, Hinge
@@ -74,16 +74,16 @@ def from_description(
             way = follows[hinge.name]
             own, missing = limits_like_leader(hinge, way, driven[way.leader])
             remarks += [f"joint {hinge.name} follows {way.leader} and takes over its {missing}"] if missing else []
-            mounts.append(_coupled(own, way, chosen[way.leader]))
+            mounts.append(_couple(own, way, chosen[way.leader]))
             soft |= _soft(hinge, mounts[-1].joint, way)
         elif hinge.name in chosen:
             mounts.append(Mount(driven[hinge.name], hinge.turn))
             soft |= _soft(hinge, driven[hinge.name], Follows(hinge.name, 1.0, 0.0))
         else:
-            mounts.append(_held(hinge, place := _place(hinge, held, follows, known)))
+            mounts.append(_hold(hinge, place := _place(hinge, held, follows, known)))
             if hinge.kind != "fixed" and hinge.name not in held:
                 remarks.append(_remark(hinge, place, follows.get(hinge.name), known))
-    links, placed = aligned(told.links, mounts)
+    links, placed = align(told.links, mounts)
     robot = Robot(
         told.name, links, placed, tuple(chosen), coupled, stance=dict(stance), remarks=tuple(remarks), soft=soft,
         torque_constant=_torque_constants(chosen, coupled),
@@ -177,7 +177,7 @@ def _soft(hinge: Hinge, joint: Joint, follows: Follows) -> dict[str, tuple[float
     return {hinge.name: (lower, upper)}
 
 
-def _coupled(hinge: Hinge, follows: Follows, leader: JointSettings) -> Mount:
+def _couple(hinge: Hinge, follows: Follows, leader: JointSettings) -> Mount:
     """Return a joint that follows another, turned and shifted such that its angle is that of the leader."""
     joint = _driven(hinge, replace(leader, lower=None, upper=None))
     lower, upper = sorted(follows.ratio * (end - follows.offset) for end in (joint.lower, joint.upper))
@@ -185,7 +185,7 @@ def _coupled(hinge: Hinge, follows: Follows, leader: JointSettings) -> Mount:
     return Mount(replace(joint, axis=follows.ratio * joint.axis, lower=lower, upper=upper), shifted)
 
 
-def _held(hinge: Hinge, place: float) -> Mount:
+def _hold(hinge: Hinge, place: float) -> Mount:
     """Return a joint that does not move, its frames those that it has where it is held."""
     turn, origin = hinge.turn, hinge.origin
     if hinge.kind in TURNING:
@@ -226,7 +226,7 @@ def _torque_constants(chosen: Mapping[str, JointSettings], coupled: Mapping[str,
 
 
 def _check_masses(robot: Robot) -> None:
-    body = lumped(robot)
+    body = lump(robot)
     for joint in body.joints:
         if body.links[joint.child].mass <= 0.0:
             problem = f"it moves the link '{joint.child}', which has no mass; give that an <inertial>"

@@ -91,9 +91,9 @@ CONTROLLED = (
 def nao() -> Robot:
     """Return the NAO: 15 controlled joints (the paper's section 6.1), the others held."""
     links = [_link(*row) for row in _LINKS]
-    joints = [_driven(*row) for row in _JOINTS] + [_held(*row) for row in _HELD]
-    links += [_mirrored_link(link) for link in links if link.name.startswith("L")]
-    joints += [_mirrored_joint(joint) for joint in joints if joint.name.startswith("L")]
+    joints = [_driven(*row) for row in _JOINTS] + [_hold(*row) for row in _HELD]
+    links += [_mirror_link(link) for link in links if link.name.startswith("L")]
+    joints += [_mirror_joint(joint) for joint in joints if joint.name.startswith("L")]
     legs = tuple(j.name for j in joints if j.fixed_at is None and "Shoulder" not in j.name)
     arms = tuple(name for name in CONTROLLED if "Shoulder" in name)
     return Robot(
@@ -128,19 +128,19 @@ def _driven(
     return Joint(name, parent, child, np.array(origin), np.array(axis), lower, upper, speed, effort, ARMATURE[motor])
 
 
-def _held(name: str, parent: str, child: str, origin: Triple, axis: Triple, angle: float) -> Joint:
+def _hold(name: str, parent: str, child: str, origin: Triple, axis: Triple, angle: float) -> Joint:
     return Joint(name, parent, child, np.array(origin), np.array(axis), angle, angle, 0.0, 0.0, fixed_at=angle)
 
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])  # in the plane y = 0; an axis is a pseudo-vector and changes sign besides
 
 
-def _mirrored_link(link: Link) -> Link:
+def _mirror_link(link: Link) -> Link:
     shapes = tuple(replace(shape, centre=tuple(_MIRROR @ np.array(shape.centre))) for shape in link.shapes)
     return Link(_right(link.name), link.mass, _MIRROR @ link.com, _MIRROR @ link.inertia @ _MIRROR, shapes)
 
 
-def _mirrored_joint(joint: Joint) -> Joint:
+def _mirror_joint(joint: Joint) -> Joint:
     """Mirror a left joint: the same angle mirrors a pitch or yaw-pitch motion, the opposite one a roll or yaw."""
     axis = -_MIRROR @ joint.axis
     mirrored = replace(

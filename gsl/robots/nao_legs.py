@@ -10,13 +10,13 @@ import math
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.robots.nao import THIGH, TIBIA
 
 _DIAGONAL = 0.5**0.5
 
 
-@compiled
+@compile_kernel
 def leg_angles(ankle: np.ndarray, hip_yaw_pitch: float, side: float, angles: np.ndarray) -> None:
     """Fill `angles` with the five leg joints that put the ankle at a point with the sole parallel to the torso's xy.
 

@@ -78,12 +78,12 @@ def from_file(path: Path) -> Robot:
             robot = from_description(read_description(path.parent / told.urdf), joints, told.held, told.stance)
         else:
             robot = lone(told.name or path.stem, joints or {})
-        return _completed(robot, told)
+        return _complete(robot, told)
     except ConfigError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def _completed(robot: Robot, told: RobotSettings) -> Robot:
+def _complete(robot: Robot, told: RobotSettings) -> Robot:
     for group, members in told.groups.items():
         for name in members:
             _check_motor(robot, name, f"groups.{group}")

@@ -42,7 +42,7 @@ import numpy as np
 
 from gsl.core.body import Joint, Link, Robot
 from gsl.robots.defaults import torque_unit
-from gsl.robots.frames import Mount, aligned, euler
+from gsl.robots.frames import Mount, align, euler
 from gsl.robots.so101_shapes import SHAPES
 
 GAIN = 16.0  # register P, E
@@ -99,7 +99,7 @@ RANGES = {  # where they differ from those of a NAO's class
 def so101() -> Robot:
     """Return the arm: six joints, the base fixed."""
     links = {name: Link(name, mass, np.array(com), _inertia(*six), SHAPES[name]) for name, mass, com, six in _LINKS}
-    frames, joints = aligned(links, [_mount(*row) for row in _JOINTS])
+    frames, joints = align(links, [_mount(*row) for row in _JOINTS])
     names = tuple(joint.name for joint in joints)
     return Robot(
         name="so101",

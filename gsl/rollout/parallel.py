@@ -125,14 +125,14 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
     try:
         with processes_starting():
             found = parallel(
-                joblib.delayed(_numbered)(function, frozen, jobs[index], index, parent) for index in missing
+                joblib.delayed(_run_numbered)(function, frozen, jobs[index], index, parent) for index in missing
             )
         yield from found
     except TerminatedWorkerError:
         return
 
 
-def _numbered(function: Any, frozen: bytes, job: Any, index: int, parent: int) -> tuple[int, Any]:
+def _run_numbered(function: Any, frozen: bytes, job: Any, index: int, parent: int) -> tuple[int, Any]:
     if parent:
         _end_with_parent(parent)
     with name_failures():

@@ -88,15 +88,13 @@ def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed
         rewards.append(own if judged.reward is None else judged.reward)
         if ended or cut or judged.ended:
             break
-    record = _recorded_states if layout.states else _recorded
+    record = _record_states if layout.states else _record
     trajectory = record(layout, np.array(observations), np.array(actions), np.array(rewards), ended=ended)
     grounded = np.array(sent)
     return trajectory if np.array_equal(grounded, actions) else replace(trajectory, grounded_action=grounded)
 
 
-def _recorded(
-    layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, ended: bool
-) -> Trajectory:
+def _record(layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, ended: bool) -> Trajectory:
     sensors = {
         column: states[:, layout[part].start + index]
         for part, columns in layout.columns.items()
@@ -115,7 +113,7 @@ def _recorded(
     )
 
 
-def _recorded_states(
+def _record_states(
     layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, ended: bool
 ) -> Trajectory:
     nothing, over = np.zeros((len(states), 0)), np.zeros(len(states), dtype=bool)

@@ -27,14 +27,14 @@ class Actor:
         self._table = np.array(episode["commands"], dtype=float) if "commands" in episode else None
         self._episode, self._next, layout = episode, 0, layout_of(request)
         if self._table is None:
-            with _told(episode):
+            with _name_episode(episode):
                 self._run = policy_of(request).start(np.array(episode["parameters"], dtype=float), layout)
         self._noise = ActionNoiseRun(request["action_noise"], grounding_generator(episode["seed"]))
 
     def act(self, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what the policy wants and what is to be sent: with noise [rad], shape (n_joints,) each."""
         if self._table is None:
-            with _told(self._episode):
+            with _name_episode(self._episode):
                 action = self._run.act(observation)
         else:
             action = self._table[min(self._next, len(self._table) - 1)]
@@ -43,7 +43,7 @@ class Actor:
 
 
 @contextmanager
-def _told(episode: Mapping[str, Any]) -> Iterator[None]:
+def _name_episode(episode: Mapping[str, Any]) -> Iterator[None]:
     """Turn whatever a policy raises into one line that names its episode."""
     try:
         yield

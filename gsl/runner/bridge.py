@@ -12,7 +12,7 @@ SIMULATED = True
 TIME_LIMIT = 600.0  # of a call [s]: the surrogate may have to compile first
 
 
-def _opened() -> tuple[Any, Any]:
+def _open_pipes() -> tuple[Any, Any]:
     numbers = os.environ.get(PIPES, "").split(",")
     if len(numbers) != 2:
         raise OSError("there is no surrogate to talk to; gsl rehearse starts this")
@@ -47,4 +47,4 @@ def end() -> None:
 
 
 if PIPES in os.environ:
-    _IN, _OUT = _opened()
+    _IN, _OUT = _open_pipes()

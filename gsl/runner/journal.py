@@ -19,7 +19,7 @@ RETURN_COLUMNS = ("episode", "distance", "fell")
 YES = ("true", "yes", "1")
 
 
-def marked(path: Path) -> str:
+def read_mark(path: Path) -> str:
     """Return the hash of the request that a file says it answers, nothing if it says none."""
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         first = file.readline(200)
@@ -32,7 +32,7 @@ def check_marked(path: Path, request: str, *, by_hand: bool = False) -> None:
     Raises:
         ArtifactError: It does.
     """
-    if path.exists() and (marked(path) or ("" if not by_hand else request)) != request:
+    if path.exists() and (read_mark(path) or ("" if not by_hand else request)) != request:
         raise ArtifactError(path, "answers another request; move it away or choose another --log")
 
 
@@ -92,7 +92,7 @@ def table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
     return columns, rows
 
 
-def returned(path: Path) -> dict[str, dict[str, str]]:
+def read_returns(path: Path) -> dict[str, dict[str, str]]:
     """Return the rows of a file of returns by the name of the episode.
 
     Raises:
@@ -111,8 +111,8 @@ def add_return(path: Path, request: str, episode: str, distance: str, *, fell: b
         ArtifactError: The file answers another request.
     """
     check_marked(path, request, by_hand=True)
-    mark = not path.exists() or bool(marked(path))
-    rows = returned(path)
+    mark = not path.exists() or bool(read_mark(path))
+    rows = read_returns(path)
     rows[episode] = {"episode": episode, "distance": distance, "fell": "yes" if fell else "no"}
     columns = list(dict.fromkeys([*(table(path)[0] if path.exists() else ()), *RETURN_COLUMNS]))
     _write_returns(path, request if mark else "", columns, rows.values())
@@ -120,10 +120,10 @@ def add_return(path: Path, request: str, episode: str, distance: str, *, fell: b
 
 def forget(path: Path, episode: str) -> None:
     """Take out what a person measured in an earlier run of an episode; all else stays."""
-    rows = returned(path)
+    rows = read_returns(path)
     if episode not in rows:
         return
-    first, columns = marked(path), table(path)[0]
+    first, columns = read_mark(path), table(path)[0]
     _write_returns(path, first, columns, [row for name, row in rows.items() if name != episode])
 
 

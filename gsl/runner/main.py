@@ -17,7 +17,7 @@ from gsl.errors import GslError
 from gsl.runner import bounds, journal
 from gsl.runner.clock import Simulated, Wall
 from gsl.runner.episode import Lies, Played, Player
-from gsl.runner.preflight import alone, check_writable, mended
+from gsl.runner.preflight import alone, check_writable, mend
 from gsl.runner.request import due, read_request
 from gsl.runner.robots import PerfectRobot, robot_of
 from gsl.runner.senses import RobotError
@@ -122,7 +122,7 @@ class Sitting:
     def run(self) -> int:
         """Run the episodes that are missing, or those that were named."""
         say(self._request["about"])
-        if told := mended(self._asked.log, self._request):
+        if told := mend(self._asked.log, self._request):
             say(told)
         log = self._asked.log
         self._watched(self._player.begin, log, journal.table(log)[0] if log.exists() else None)
@@ -151,7 +151,7 @@ class Sitting:
         log, episodes = self._asked.log, self._request["episodes"]
         if not self._request["distance"] or not log.exists() or "base.position.x" in journal.table(log)[0]:
             return []
-        told = journal.returned(self._returns)
+        told = journal.read_returns(self._returns)
         known = {name for name, row in told.items() if row.get("distance") or row.get("value") or _fell(row)}
         standing = [episodes[number] for number, down in sorted(journal.ends(log).items()) if not down]
         return [one for one in standing if one["name"] not in known]
@@ -258,7 +258,7 @@ class Sitting:
     def _due(self) -> list[Mapping[str, Any]]:
         episodes = self._request["episodes"]
         ends = {episodes[number]["name"]: down for number, down in journal.ends(self._asked.log).items()}
-        fallen = {name for name, row in journal.returned(self._returns).items() if _fell(row)}
+        fallen = {name for name, row in journal.read_returns(self._returns).items() if _fell(row)}
         return list(due(self._request, {*ends, *fallen}, {name for name, down in ends.items() if down} | fallen))
 
     def _ask(self, question: str) -> bool:

@@ -59,7 +59,7 @@ def check_writable(log: Path) -> None:
         raise ArtifactError(log.parent, f"cannot be written ({error.strerror}); choose another --log") from error
 
 
-def mended(log: Path, request: Mapping[str, Any]) -> str:
+def mend(log: Path, request: Mapping[str, Any]) -> str:
     """Check an answer to the end, drop a last episode that was cut off from it, and return what was done, if anything.
 
     Raises:
@@ -90,16 +90,16 @@ def _complete(log: Path, request: Mapping[str, Any], names: Sequence[str], rows:
     episodes, done, now, whole = request["episodes"], set[int](), None, 0
     for at, cells in enumerate(rows):
         if len(cells) != len(names):
-            raise _damaged(log, at, "has another number of cells than there are columns")
+            raise _damage(log, at, "has another number of cells than there are columns")
         row = dict(zip(names, cells, strict=True))
         _check_cells(log, at, row)
         text = row["episode"]
         if not text.isdecimal() or int(text) >= len(episodes):
-            raise _damaged(log, at, f"there is no episode '{text[:20]}', only 0 to {len(episodes) - 1}")
+            raise _damage(log, at, f"there is no episode '{text[:20]}', only 0 to {len(episodes) - 1}")
         number = int(text)
         if number in done or now not in (None, number):
             name = episodes[number if number in done else now]["name"]
-            raise _damaged(log, at, f"{name} {'is there twice' if number in done else 'has no last row'}")
+            raise _damage(log, at, f"{name} {'is there twice' if number in done else 'has no last row'}")
         now = number
         if not row[f"action.{request['joints'][0]}"]:  # nothing was sent any more
             done.add(number)
@@ -111,9 +111,9 @@ def _check_cells(log: Path, at: int, row: Mapping[str, str]) -> None:
     for name, cell in row.items():
         if name in _YES_NO:
             if cell.lower() not in ("true", "false"):
-                raise _damaged(log, at, f"{name} is '{cell[:20]}', not true or false")
+                raise _damage(log, at, f"{name} is '{cell[:20]}', not true or false")
         elif name != "episode" and cell and not _is_finite(cell):
-            raise _damaged(log, at, f"{name} is '{cell[:20]}', not a number")
+            raise _damage(log, at, f"{name} is '{cell[:20]}', not a number")
 
 
 def _is_finite(text: str) -> bool:
@@ -123,5 +123,5 @@ def _is_finite(text: str) -> bool:
         return False
 
 
-def _damaged(log: Path, at: int, problem: str) -> ArtifactError:
+def _damage(log: Path, at: int, problem: str) -> ArtifactError:
     return ArtifactError(log, f"line {at + 3}: {problem}; remove the rows of that episode, or choose another --log")

@@ -14,7 +14,7 @@ from gsl.core.console import Console
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ArtifactError, TrajectoryError
-from gsl.runner.journal import RETURNS, marked
+from gsl.runner.journal import RETURNS, read_mark
 from gsl.runner.request import NAME, read_request
 from gsl.storage import trajectories
 from gsl.storage.answer_checks import check_answers
@@ -24,8 +24,8 @@ from gsl.storage.answers import (
     check_marked,
     check_rate,
     csv_episodes,
-    named,
     read_log,
+    read_named,
     read_returns,
 )
 from gsl.storage.references import resolve
@@ -82,7 +82,7 @@ class Answer:
         known, found = _csv(source, request) if source.suffix == ".csv" else _parquet(source, request)
         asked = {episode["name"]: episode for episode in request["episodes"]}
         names = self.episodes or known or tuple(asked)
-        for name, episode in named(source, names, found, request).items():
+        for name, episode in read_named(source, names, found, request).items():
             check_rate(source, name, episode, request)
         about = {"robot": request["robot"], "role": "real", "source": source.name, "request": request["hash"]}
         told = [{"name": name, "policy": asked[name]["policy"]} for name in names]
@@ -92,7 +92,7 @@ class Answer:
 
 def _csv(source: Path, request: Mapping[str, Any]) -> tuple[tuple[str, ...], list[Trajectory]]:
     """Return the names, if it is the runner's own, and the episodes of a file; a stop for safety is a fall."""
-    if told := marked(source):
+    if told := read_mark(source):
         check_marked(source, told, request)
     by_name = list(csv_episodes(source, request))
     names, found = tuple(name for name, _ in by_name) if told else (), [episode for _, episode in by_name]

@@ -18,7 +18,7 @@ from gsl.core.interfaces import (
 from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.diagnosis_file import read_diagnosis
-from gsl.grounding.effects import DiagnosedEffects, evidence_of, innermost, switched_on, with_innermost
+from gsl.grounding.effects import DiagnosedEffects, evidence_of, innermost, switch_on, with_innermost
 from gsl.grounding.gat import ActionTransformation, check_known
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.preparation import check_own
@@ -26,7 +26,7 @@ from gsl.grounding.servo import LearnedServo
 from gsl.stages.chain import Links
 from gsl.stages.chain_training import train_own, train_transformation
 from gsl.stages.evaluate import Evaluate
-from gsl.stages.link import built
+from gsl.stages.link import build_link
 from gsl.stages.optimize import BEST, Optimize
 from gsl.stages.values import Values
 from gsl.storage.artifact import Artifact
@@ -137,7 +137,7 @@ class Chain(Links):
     def ready(self, home: Path, grounding: Grounding, previous: str | None, seed: int, console: Console) -> Grounding:
         """Return a grounding that has its models, trained below `home`; those inside of effects know their world."""
         if isinstance(grounding, DiagnosedEffects):
-            inside = replace(self, sim=switched_on(self.sim, grounding.load(read_diagnosis)))
+            inside = replace(self, sim=switch_on(self.sim, grounding.load(read_diagnosis)))
             return replace(grounding, inner=inside.ready(home, grounding.inner, previous, seed, console))
         if isinstance(grounding, ActionTransformation):
             return train_transformation(self, home, grounding, previous, seed, console)
@@ -155,7 +155,7 @@ class Chain(Links):
             found={key: found[key] for key in ("alpha", "x", "width") if key in found},
             workers=self.workers,
         )
-        return built(stage, out, console)
+        return build_link(stage, out, console)
 
     def search(self, out: Path, grounding: Grounding, previous: str | None, seed: int, console: Console) -> Artifact:
         """Optimise in the simulator with a grounding that is ready."""
@@ -174,7 +174,7 @@ class Chain(Links):
             workers=self.workers,
             seed=seed,
         )
-        return built(stage, out, console)
+        return build_link(stage, out, console)
 
     def measure(self, out: Path, found: Artifact, seed: int, console: Console, only: str = "") -> Artifact:
         """Measure what a search found in the real world, or one file of it only."""
@@ -190,4 +190,4 @@ class Chain(Links):
             workers=self.workers,
             seed=seed,
         )
-        return built(stage, out, console)
+        return build_link(stage, out, console)

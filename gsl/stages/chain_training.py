@@ -12,7 +12,7 @@ from gsl.core.interfaces import REAL, SIM, Grounding, Trainable
 from gsl.grounding.gat import ActionTransformation
 from gsl.stages.chain import Links
 from gsl.stages.collect import Collect
-from gsl.stages.link import built
+from gsl.stages.link import build_link
 from gsl.stages.train_forward import TrainForward
 from gsl.stages.train_grounding import TrainGrounding
 from gsl.stages.train_inverse import TrainInverse
@@ -28,7 +28,7 @@ def train_own(
     data = collect(chain, home, previous, seed, console, roles=grounding.needs)
     real, sim = (str(data[role]) if role in data else None for role in (REAL, SIM))
     stage = TrainGrounding(grounding, real, sim, seed=seed, earlier=chain.earlier if real else ())
-    made = built(stage, home / stage.kind, console)
+    made = build_link(stage, home / stage.kind, console)
     settings: Any = grounding  # a frozen dataclass, as every component
     trained: Grounding = replace(settings, model=str(made.folder))
     return trained
@@ -57,7 +57,7 @@ def collect(
             workers=chain.workers,
             seed=seed,
         )
-        built(stage, data[role], console)
+        build_link(stage, data[role], console)
     return data
 
 
@@ -76,11 +76,11 @@ def train_transformation(
         console.status(f"actions show late in the simulator: {looking}")
     inverse = TrainInverse(str(data[SIM]), inverse_model, method=method, seed=seed)
     alike = method == chain.inverse_method
-    f_inverse = built(inverse, (data[SIM].parent if alike else home) / inverse.kind, console)
+    f_inverse = build_link(inverse, (data[SIM].parent if alike else home) / inverse.kind, console)
     needed = looking_ahead(needed, extra)
     if grounding.residual:
         needed = replace(needed, history=f_inverse.metrics["history"], horizon=inverse_model.horizon)
         base = str(f_inverse.folder)
     forward = TrainForward(str(data[REAL]), needed, base, seed=seed, earlier=chain.earlier)
-    f = built(forward, home / forward.kind, console)
+    f = build_link(forward, home / forward.kind, console)
     return replace(grounding, forward_model=str(f.folder), inverse_model=str(f_inverse.folder))

@@ -10,16 +10,16 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from gsl.core.console import Console
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.interfaces import SIM, Policy, Task, World
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ConfigError
 from gsl.grounding.random_choice import exploration
-from gsl.policies.policy import neighbour, sized
+from gsl.policies.policy import neighbour, size
 from gsl.policies.programme import Piece, Programmed
-from gsl.real_robot.errand import Errand, Order, answer_parents, asked
+from gsl.real_robot.errand import Errand, Order, answer_parents, ask
 from gsl.rollout.parallel import Job, Workers, trajectories
 from gsl.rollout.programme import command_file, playing
 from gsl.rollout.rollout import Scenario
@@ -55,7 +55,7 @@ class Collect:
 
     def __post_init__(self) -> None:
         """Tell the policy its world."""
-        object.__setattr__(self, "policy", sized(self.policy, self.world))
+        object.__setattr__(self, "policy", size(self.policy, self.world))
         if self.role == SIM and isinstance(self.world, ExternalRobot):
             raise ConfigError("world", "is a real robot, which cannot play the simulator's part")
         if self.world.layout.choices and self.action_noise > 1.0:
@@ -79,8 +79,8 @@ class Collect:
             "role": self.role,
             "source": "gsl collect",
             "seed": self.seed,
-            "world": described(self.world),
-            "policy": described(self.policy),
+            "world": describe(self.world),
+            "policy": describe(self.policy),
             "action_noise": self.action_noise,
             **({"cells": layout.cells, "choices": layout.choices} if layout.states else {}),
             "episodes": [
@@ -101,20 +101,20 @@ class Collect:
 
     def _played(self, scenario: Scenario, pieces: Sequence[Piece], console: Console) -> list[Trajectory]:
         """Return the episodes, of a robot somewhere else from its answer."""
-        seeds = [derived_seed(self.seed, self.kind, self.role, index) for index in range(len(pieces))]
+        seeds = [derive_seed(self.seed, self.kind, self.role, index) for index in range(len(pieces))]
         jobs = [Job(piece.parameters, seed) for piece, seed in zip(pieces, seeds, strict=True)]
         if not isinstance(self.world, ExternalRobot):
             with console.progress(len(jobs), f"collecting in the {self.role} world") as progress:
                 return trajectories(scenario, jobs, workers=self.workers, progress=progress)
         orders = [Order(piece.label, job) for piece, job in zip(pieces, jobs, strict=True)]
         errand = Errand("", f"Trajectories to learn from: {len(jobs)} episodes.", until_fall=False, logs=True)
-        found = asked(scenario, orders, errand, workers=self.workers, console=console)
+        found = ask(scenario, orders, errand, workers=self.workers, console=console)
         return [one.trajectory for one in found if one is not None and one.trajectory is not None]
 
     def _pieces(self) -> tuple[Piece, ...]:
         """Return the episodes of the policy itself, then those of its neighbours."""
         parameters = PolicyChoice(self.policy, self.initial).parameters()
-        rng = np.random.default_rng(derived_seed(self.seed, self.kind, self.role))
+        rng = np.random.default_rng(derive_seed(self.seed, self.kind, self.role))
         near = [neighbour(self.policy, parameters, self.spread, rng) for _ in range(self.neighbours)]
         itself = [Piece("pi0", parameters, {})] * self.episodes
         return (*itself, *(Piece(f"neighbour_{index + 1:02d}", theta, {}) for index, theta in enumerate(near)))

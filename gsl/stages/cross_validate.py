@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.console import Console
 from gsl.core.labels import alike
 from gsl.core.setting import component, setting
@@ -97,7 +97,7 @@ class CrossValidate:
         refuse_hook(self.sim.plant)
         if not self.usual:
             raise ConfigError("usual", "names at least one effect to compare with")
-        everywhere = {one.effect for one in library(lumped(self.sim.plant.robot)) if one.on_joints}
+        everywhere = {one.effect for one in library(lump(self.sim.plant.robot)) if one.on_joints}
         for name in self.usual:
             effect_class(name)
             if name in self.without or name not in everywhere:
@@ -111,7 +111,7 @@ class CrossValidate:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the table and every fold."""
         log = read_logs(self.real)
-        check_log(log, lumped(self.sim.plant.robot), self.real)
+        check_log(log, lump(self.sim.plant.robot), self.real)
         if on_ground(log):
             raise InputError(f"{self.real}: whole replays are for logs in the air")
         if caveat := clock_caveat(log, self.clocks):
@@ -161,14 +161,14 @@ class CrossValidate:
             self.without, self.most, self.duels, self.nulls, threads(self.workers), share_clock(log, self.clocks),
             seed=self.seed, tolerance=self.tolerance, held_out={self.by: inner} if inner else {},
         )  # fmt: skip
-        plant, robot = self.sim.plant, lumped(self.sim.plant.robot)
+        plant, robot = self.sim.plant, lump(self.sim.plant.robot)
         found = diagnose(self._rest(log, values), plant, self.sim.step, options, PhaseReporter(console))
         exp, chosen = prepare(log, robot, replace(options, held_out={self.by: values})), found.selection.chosen
         before = found.simulator.simulate({}, no_shifts(len(exp.joints)), exp.pieces)
         after = found.simulator.simulate(chosen.effects, chosen.fit.shifts, exp.pieces)
         causes = [chosen.names[one.index] for one in found.verdict.causes]
         console.status(f"{told}: {' '.join([found.verdict.word, *causes])}")
-        errors, servos = self._errors(found, _checked(exp))
+        errors, servos = self._errors(found, _check(exp))
         return Fold(
             values=values,
             verdict=found.verdict.word,
@@ -176,7 +176,7 @@ class CrossValidate:
             parameters=chosen.effects,
             removed=removed_share(exp, exp.residual(before), exp.residual(after))[0],
             ceiling=ceiling(exp, before, seed=self.seed),
-            names=[one.name for one in _checked(exp)],
+            names=[one.name for one in _check(exp)],
             errors=errors,
             servos=servos,
         )
@@ -213,7 +213,7 @@ class CrossValidate:
         return errors, servos
 
 
-def _checked(exp: Log) -> list[Record]:
+def _check(exp: Log) -> list[Record]:
     """Return the trajectories that are held out, those too short for a window left out."""
     return [exp.records[k] for k in np.unique(exp.pieces.record[exp.held_out])]
 

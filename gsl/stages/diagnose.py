@@ -11,9 +11,9 @@ from typing import Annotated, Any, ClassVar
 
 import yaml
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.console import Console
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.design.next_experiment import write_next_experiment
@@ -101,12 +101,12 @@ class Diagnose:
 
     def _read(self, role: str) -> Batch:
         batch = read_logs(getattr(self, role))
-        check_log(batch, lumped(self.sim.plant.robot), getattr(self, role))
+        check_log(batch, lump(self.sim.plant.robot), getattr(self, role))
         return batch
 
     def _stranger(self, batch: Batch) -> str | None:
         """Return a warning if the log says that it is of another robot, whose joints have the same names."""
-        said, ours = str(batch.metadata.get("robot") or ""), lumped(self.sim.plant.robot).name
+        said, ours = str(batch.metadata.get("robot") or ""), lump(self.sim.plant.robot).name
         if said.lower() in ("", ours.lower(), self.sim.robot.lower()):
             return None
         return f"The log says that it is of the robot {said}, the simulator is {ours}: only the joints' names agree."
@@ -153,7 +153,7 @@ class Diagnose:
         (folder / WORLD).parent.mkdir()
         (folder / WORLD).write_text(self._world(findings, report["summary"]), encoding="utf-8")
         if report["own"]:
-            plain = yaml.safe_dump(documents.plain(described(self.sim)), sort_keys=False, allow_unicode=True)
+            plain = yaml.safe_dump(documents.plain(describe(self.sim)), sort_keys=False, allow_unicode=True)
             (folder / SIMULATOR).write_text(
                 f"# The simulator that was diagnosed, as it was.\n{plain}", encoding="utf-8"
             )
@@ -186,7 +186,7 @@ class Diagnose:
         said += [f"reference={self.reference}"] if self.reference else []
         said += [f"without=[{','.join(self.without)}]"] if self.without else []
         said += [f"tolerance={self.tolerance:g}"] if self.tolerance else []
-        held = ", ".join(f"{key}: {_typed(value)}" for key, value in self.held_out.items())
+        held = ", ".join(f"{key}: {_format_typed(value)}" for key, value in self.held_out.items())
         said += [f"held_out={{{held}}}"] if held else []
         said += [f"clocks={self.clocks}"] if self.clocks else []
         return shlex.join(["gsl", "diagnose", *said])
@@ -211,15 +211,15 @@ class Diagnose:
 
     def _effects(self, findings: Findings) -> dict[str, Any]:
         """Return all effects of the diagnosed simulator, those that it had before included."""
-        return join_effects(described(self.sim)["effects"], findings.effects)
+        return join_effects(describe(self.sim)["effects"], findings.effects)
 
     def _world(self, findings: Findings, summary: str) -> str:
-        config = described(self.sim) | {"effects": self._effects(findings)}
+        config = describe(self.sim) | {"effects": self._effects(findings)}
         text = yaml.safe_dump(documents.plain(config), sort_keys=False, allow_unicode=True)
         how = "with it switched on, and calibrated" if findings.answer.candidates else "calibrated"
         return f"# {summary}\n# The simulator {how} joint by joint.\n{text}"
 
 
-def _typed(value: Any) -> str:
+def _format_typed(value: Any) -> str:
     """Return a value, or several, as it is typed."""
     return f"[{', '.join(map(str, value))}]" if isinstance(value, list | tuple) else str(value)

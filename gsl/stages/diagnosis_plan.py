@@ -12,14 +12,14 @@ from gsl.core.setting import component, setting
 from gsl.diagnosis.options import Without
 from gsl.errors import ConfigError
 from gsl.grounding.diagnosis_file import Diagnosis, read_diagnosis
-from gsl.grounding.effects import DiagnosedEffects, innermost, switched_on
+from gsl.grounding.effects import DiagnosedEffects, innermost, switch_on
 from gsl.grounding.servo import LearnedServo
 from gsl.policies.excitation import Excitation
 from gsl.report.flight import Flight
 from gsl.stages.collect import Collect
 from gsl.stages.diagnose import Diagnose
 from gsl.stages.identify import Identify
-from gsl.stages.link import built
+from gsl.stages.link import build_link
 from gsl.stages.train_servo import TrainServo
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
@@ -70,7 +70,7 @@ class DiagnosisPlan:
                 workers=workers,
                 seed=seed,
             )
-        return built(stage, home / method, console)
+        return build_link(stage, home / method, console)
 
     def servo(
         self, real: World, sim: World, effects: Diagnosis | None, home: Path, *,
@@ -85,11 +85,11 @@ class DiagnosisPlan:
             raise ConfigError("grounding", ROBOTS_ONLY)
         check_servos(sim.motors)
         log = self.flown(real, home, workers=workers, seed=seed, console=console)
-        below = sim if effects is None else switched_on(sim, effects)
+        below = sim if effects is None else switch_on(sim, effects)
         assert isinstance(below, BulletWorld), "effects leave a world what it is"
         stage = TrainServo(real=str(log.folder), sim=below, members=members, workers=workers, seed=seed)
         name = stage.kind if effects is None else f"{stage.kind}_on_effects"
-        return built(stage, home / (name if members == 1 else f"{name}_members"), console)
+        return build_link(stage, home / (name if members == 1 else f"{name}_members"), console)
 
     def flown(self, real: World, home: Path, *, workers: int, seed: int, console: Console) -> Artifact:
         """Return the log of an excitation of the real robot in the air, built below `home`.
@@ -108,7 +108,7 @@ class DiagnosisPlan:
             workers=workers,
             seed=seed,
         )
-        return built(played, home / EXCITATION, console)
+        return build_link(played, home / EXCITATION, console)
 
 
 def flown(home: Path, asked: Grounding, ready: Grounding) -> Flight | None:

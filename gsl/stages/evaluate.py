@@ -12,14 +12,14 @@ from scipy import stats
 
 from gsl.core.console import Console
 from gsl.core.interfaces import REAL, Policy, Task, World
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import difference_interval
 from gsl.core.unit import Unit
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
-from gsl.policies.policy import sized
-from gsl.real_robot.errand import Errand, Order, answer_parents, asked
+from gsl.policies.policy import size
+from gsl.real_robot.errand import Errand, Order, answer_parents, ask
 from gsl.rollout.parallel import Episode, Job, Workers, episodes
 from gsl.rollout.promise import promise
 from gsl.rollout.returns import falls, gain, mean, row, summary
@@ -73,7 +73,7 @@ class Evaluate:
     def __post_init__(self) -> None:
         """Tell the policy its world; refuse a single episode as the check of a policy that may fall."""
         check_tolerated(self.tolerated, self.check)
-        object.__setattr__(self, "policy", sized(self.policy, self.world))
+        object.__setattr__(self, "policy", size(self.policy, self.world))
 
     def parents(self) -> Mapping[str, Path]:
         """Return where the policies come from, and what a robot somewhere else has answered."""
@@ -150,7 +150,7 @@ class Evaluate:
         """Return the episodes of some policies; but for a report, none after a fall that is not tolerated."""
         scenario = Scenario(self.world, self.task, self.policy, REAL, NoGrounding())
         jobs = [
-            Job(vector(self.policy, theta), derived_seed(self.seed, self.kind, purpose, theta.name, n))
+            Job(vector(self.policy, theta), derive_seed(self.seed, self.kind, purpose, theta.name, n))
             for theta in thetas
             for n in range(count)
         ]
@@ -161,7 +161,7 @@ class Evaluate:
             name = f"{purpose}_{thetas[0].name}" if purpose == _CHECK else purpose
             words = (_TO_THE_END if to_the_end else _UNTIL_FALL)[purpose].format(len(thetas), count)
             errand = Errand(name, words, not to_the_end, logs=False)
-            found = asked(scenario, orders, errand, workers=self.workers, console=console)
+            found = ask(scenario, orders, errand, workers=self.workers, console=console)
             done = [None if one is None else one.episode for one in found]
         else:
             with console.progress(len(jobs), f"{purpose} in the real world") as progress:

@@ -10,9 +10,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import yaml
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.console import Console
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.diagnosis.log.files import log_parents, read_motions
@@ -60,7 +60,7 @@ class Identify:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json and the identified world."""
-        log = read_motions(self.real, lumped(self.sim.plant.robot))
+        log = read_motions(self.real, lump(self.sim.plant.robot))
         options = Options(self.without, threads=threads(self.workers))
         problem = Nominal(self.sim.plant, self.sim.step).problem(log, options, lambda phase: checkpoint())
         with console.progress(self.evaluations, "fitting all parameters at once") as progress:
@@ -77,7 +77,7 @@ class Identify:
             "shrinkage": {"before": before, "after": after},
         }
         documents.write_json(folder / REPORT, report)
-        world = described(replace(self.sim, effects=join_effects(described(self.sim)["effects"], effects)))
+        world = describe(replace(self.sim, effects=join_effects(describe(self.sim)["effects"], effects)))
         (folder / WORLD).parent.mkdir()
         text = yaml.safe_dump(documents.plain(world), sort_keys=False, allow_unicode=True)
         (folder / WORLD).write_text(f"# {summary}\n{text}", encoding="utf-8")

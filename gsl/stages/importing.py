@@ -13,9 +13,9 @@ from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError, InputError, TrajectoryError
 from gsl.report.importing import report, tables
 from gsl.storage import documents
-from gsl.storage.importers.assembly import Episode, episodes, unmatched
+from gsl.storage.importers.assembly import Episode, episodes, list_unmatched
 from gsl.storage.importers.mapping import Mapping as LogMapping
-from gsl.storage.importers.places import Place, located, places
+from gsl.storage.importers.places import Place, locate, places
 from gsl.storage.importers.reading import raw_episodes
 from gsl.storage.importers.signal import KNOWN
 from gsl.storage.importers.sizes import GB
@@ -103,7 +103,7 @@ class Import:
         source = self.source or self.mapping.source
         if not source:
             raise ConfigError("source", "has no value yet; say source=... (a file, a folder or a pattern)")
-        return located(source)
+        return locate(source)
 
     def _places(self) -> list[Place]:
         return places(self._source(), self.mapping.files)
@@ -135,7 +135,7 @@ class Import:
         which = "" if derived in (0, len(found)) else f" in {derived} of {len(found)} episodes"
         velocity = f"derived from positions{which}" if derived else "as logged"
         told = report(found, files, period)
-        warnings = [*told["warnings"], *unmatched(found, self.mapping)]
+        warnings = [*told["warnings"], *list_unmatched(found, self.mapping)]
         return {**told, "warnings": warnings, "time": kept, "velocity": velocity}
 
     def _batch(self, found: list[Episode], told: Mapping[str, Any]) -> Batch:

@@ -13,12 +13,12 @@ from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
 from gsl.core.words import in_unit
 from gsl.errors import ConfigError, Refused
-from gsl.grounding.effects import evidence_of, innermost, learned
+from gsl.grounding.effects import evidence_of, innermost, is_learned
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.preparation import MAKER, without_margins
 from gsl.models.config import ModelConfig
 from gsl.optimizers.objective import Objective, Quantile, check_objective
-from gsl.policies.policy import sized
+from gsl.policies.policy import size
 from gsl.report.iteration import Rounds, write_curve, write_table
 from gsl.rollout.parallel import Workers
 from gsl.rollout.rollout import Scenario
@@ -80,7 +80,7 @@ class Iterate:
         if isinstance(self.sim, ExternalRobot):
             raise ConfigError("sim", "is a real robot, which cannot play the simulator's part")
         check_objective(self.objective, self.optimizer)
-        object.__setattr__(self, "policy", sized(self.policy, self.sim))
+        object.__setattr__(self, "policy", size(self.policy, self.sim))
         layout = self.sim.layout
         check_alike(layout, self.real.layout)
         for name, model in {"forward_model": self.forward_model, "inverse_model": self.inverse_model}.items():
@@ -142,7 +142,7 @@ class Iterate:
     @property
     def learned(self) -> bool:
         """Whether the grounding has models to train."""
-        return learned(self.grounding)
+        return is_learned(self.grounding)
 
     @property
     def chain(self) -> Chain:
@@ -204,7 +204,7 @@ def check_aggregate(iterate: Iterate, groundings: Iterable[Grounding], name: str
     Raises:
         ConfigError: Under the name of the setting.
     """
-    if iterate.aggregate and not (any(map(learned, groundings)) and iterate.iterations > 1):
+    if iterate.aggregate and not (any(map(is_learned, groundings)) and iterate.iterations > 1):
         problem = "is for a grounding that learns from real trajectories, in two iterations or more"
         raise ConfigError(name, problem, given="true")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gsl.core.console import Console
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.errors import ArtifactError
 from gsl.report.headline import headline
 from gsl.storage import manifest
@@ -14,10 +14,10 @@ from gsl.storage.artifact import Artifact, Stage, build
 COMMAND = "gsl iterate"
 
 
-def built(stage: Stage, out: Path, console: Console) -> Artifact:
+def build_link(stage: Stage, out: Path, console: Console) -> Artifact:
     """Build one link; what a chain built otherwise in its place, or is damaged, is replaced, nobody else's work is."""
     command, before = f"{COMMAND} ({stage.kind})", _before(out)
-    made = build(stage, config=described(stage), out=out, command=command, force=bool(before), console=console)
+    made = build(stage, config=describe(stage), out=out, command=command, force=bool(before), console=console)
     if before and not made.unchanged:
         console.status(f"{out.as_posix()}: in the place of {before}")
     console.status(f"{out.as_posix()}: {headline(made)}{' (unchanged)' if made.unchanged else ''}")
@@ -32,4 +32,4 @@ def _before(out: Path) -> str:
         return "a damaged artifact" if manifest.resembles(out) else ""
     if not there.command.startswith(COMMAND):
         return ""
-    return "a damaged artifact" if manifest.damaged_file(out, there) else "what a chain with other settings had built"
+    return "a damaged artifact" if manifest.find_damage(out, there) else "what a chain with other settings had built"

@@ -11,14 +11,14 @@ import numpy as np
 
 from gsl.core.console import Console, Progress
 from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, World
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.preparation import parents_of, without_margins
 from gsl.optimizers.candidates import check_candidates
 from gsl.optimizers.objective import CVAR, Objective, Quantile, check_objective, objective_values
-from gsl.policies.policy import sized
+from gsl.policies.policy import size
 from gsl.rollout.parallel import Job, Workers, episodes
 from gsl.rollout.rl_env import GroundedSimulator
 from gsl.rollout.rollout import Scenario
@@ -76,7 +76,7 @@ class Optimize:
     def __post_init__(self) -> None:
         """Tell the policy its world; refuse an objective that the optimiser does not know."""
         check_objective(self.objective, self.optimizer)
-        object.__setattr__(self, "policy", sized(self.policy, self.world))
+        object.__setattr__(self, "policy", size(self.policy, self.world))
 
     def parents(self) -> Mapping[str, Path]:
         """Return the start policy and what the grounding is made of."""
@@ -115,7 +115,7 @@ class Optimize:
         self, optimizer: Search, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Console
     ) -> Iterator[Winner]:
         """Yield the best candidate of each generation of a search."""
-        search = optimizer.start(first, self.policy.scale, derived_seed(self.seed, self.kind))
+        search = optimizer.start(first, self.policy.scale, derive_seed(self.seed, self.kind))
         total = optimizer.generations * optimizer.candidates * self.rollouts
         with console.progress(total, "optimising in simulation") as progress:
             for index in range(optimizer.generations):
@@ -133,7 +133,7 @@ class Optimize:
 
     def _learned(self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Console) -> Iterator[Winner]:
         """Yield what a learner has come to after each generation."""
-        seed, simulator = derived_seed(self.seed, self.kind), GroundedSimulator(scenario, first)
+        seed, simulator = derive_seed(self.seed, self.kind), GroundedSimulator(scenario, first)
         total = optimizer.taken + optimizer.generations * self.rollouts
         with console.progress(total, "learning in simulation") as progress:
             bold = self.initial is None
@@ -150,7 +150,7 @@ class Optimize:
             return winners, {}
         scenario = replace(bare, grounding=without_margins(self.grounding)).prepare(checked)
         parameters = {winner.policy.name: vector(self.policy, winner.policy) for winner in winners}
-        seed = derived_seed(self.seed, self.kind)
+        seed = derive_seed(self.seed, self.kind)
         results = screen(scenario, parameters, self.screening, seed, workers=self.workers, console=console)
         kept = passing(results)
         if len(kept) < len(winners):
@@ -175,7 +175,7 @@ class Optimize:
         self, scenario: Scenario, candidates: Sequence[np.ndarray], index: int, progress: Progress
     ) -> Generation:
         jobs = [
-            Job(candidate, derived_seed(self.seed, self.kind, index, number, rollout))
+            Job(candidate, derive_seed(self.seed, self.kind, index, number, rollout))
             for number, candidate in enumerate(candidates)
             for rollout in range(self.rollouts)
         ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from gsl.core.console import Console
 from gsl.core.interfaces import REAL, Policy, Search, Task, World
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import rank_correlation
 from gsl.grounding.none import NoGrounding
@@ -97,7 +97,7 @@ class Survey:
 
     def _episodes(self, world: World, thetas: Sequence[np.ndarray], label: str, console: Console) -> list[Episode]:
         scenario = Scenario(world, self.task, self.policy, REAL, NoGrounding())
-        jobs = [Job(theta, derived_seed(self.seed, self.kind, label, index)) for index, theta in enumerate(thetas)]
+        jobs = [Job(theta, derive_seed(self.seed, self.kind, label, index)) for index, theta in enumerate(thetas)]
         with console.progress(len(jobs), label) as progress:
             return episodes(scenario, jobs, workers=self.workers, progress=progress)
 

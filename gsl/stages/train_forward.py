@@ -26,8 +26,8 @@ from gsl.training.data import (
     FALLS,
     HELDOUT,
     VALIDATION,
-    aggregated,
-    checked,
+    aggregate,
+    check_lengths,
     earlier_batch,
     of_policy,
     parts,
@@ -76,7 +76,7 @@ class TrainForward:
         path = data_file(self.data)
         newest = parts(path, other=SIM, share=self.heldout, seed=self.seed)
         earlier = {one: earlier_batch(one, newest.training) for one in map(data_file, self.earlier)}
-        data = aggregated(newest, list(earlier.values()))
+        data = aggregate(newest, list(earlier.values()))
         console.status(f"fitting a forward model to {len(data.training)} trajectories")
         if data.training.states:
             if self.residual_to is not None:
@@ -126,7 +126,7 @@ class TrainForward:
     def _check(self, path: Path, batches: Sequence[Batch]) -> None:
         try:
             for part in batches:
-                long = checked(path, part.episodes, shortest(self.model.of_body, self.model.horizon))
+                long = check_lengths(path, part.episodes, shortest(self.model.of_body, self.model.horizon))
                 model_rows(self.model, long)
         except KeyError as error:
             raise TrajectoryError(

@@ -16,7 +16,7 @@ from gsl.errors import ConfigError
 from gsl.grounding.preparation import KIND, MAKER, MODEL, check_own
 from gsl.storage.checkpoints import write_checkpoint
 from gsl.storage.trajectories import data_file, read, write
-from gsl.training.data import FALLS, HELDOUT, aggregated, earlier_batch, of_policy, parts
+from gsl.training.data import FALLS, HELDOUT, aggregate, earlier_batch, of_policy, parts
 
 
 @component
@@ -59,7 +59,7 @@ class TrainGrounding:
         real, count = None, 0
         if self.real is not None:
             newest = parts(data_file(self.real), other=SIM, share=self.heldout, seed=self.seed)
-            data = aggregated(newest, [earlier_batch(data_file(one), newest.training) for one in self.earlier])
+            data = aggregate(newest, [earlier_batch(data_file(one), newest.training) for one in self.earlier])
             episodes = (*data.training.episodes, *data.validation.episodes)
             labels = [one for part in (data.training, data.validation) for one in part.metadata["episodes"]]
             real = replace(data.training, episodes=episodes, metadata={**data.training.metadata, "episodes": labels})

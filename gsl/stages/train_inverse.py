@@ -11,10 +11,10 @@ from gsl.core.interfaces import REAL
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.models.config import ModelConfig
-from gsl.models.free_run import recovered_error, segments, shortest
+from gsl.models.free_run import recover_error, segments, shortest
 from gsl.storage.models import write_model
 from gsl.storage.trajectories import data_file
-from gsl.training.data import checked, degrees, degrees_by_joint, parts, summary
+from gsl.training.data import check_lengths, degrees, degrees_by_joint, parts, summary
 from gsl.training.inverse import Damping, Method, fit_inverse
 from gsl.training.states import inverse_of_states
 
@@ -52,10 +52,10 @@ class TrainInverse:
             return inverse_of_states(folder, data, self.model, self.seed)
         data = data.only(self.model.joints_of_interest(data.training.joints, "model"))
         for part in data:
-            checked(path, part.episodes, shortest(self.model.of_joints, self.model.horizon))
+            check_lengths(path, part.episodes, shortest(self.model.of_joints, self.model.horizon))
         model, choice = fit_inverse(self.model, data, self.seed, self.method, self.damping)
         write_model(folder, model)
-        errors = recovered_error(model, segments(data.heldout.episodes, self.model.of_joints, carried_out=True))
+        errors = recover_error(model, segments(data.heldout.episodes, self.model.of_joints, carried_out=True))
         by_joint = degrees_by_joint(errors, model.joints)
         measured = {"recovered_action_deg": degrees(errors), "recovered_action_by_joint_deg": by_joint}
         return {**summary(choice, data), "method": self.method, "heldout": measured}

@@ -10,9 +10,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import yaml
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.console import Console
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.setting import component, setting
 from gsl.diagnosis.log.files import check_log, log_parents, on_ground, read_logs, read_motions
 from gsl.diagnosis.log.log import Log
@@ -73,7 +73,7 @@ class TrainServo:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the checkpoint, the world that it makes and what it has learned as curves."""
-        exp = read_motions(self.real, lumped(self.sim.plant.robot), self.held_out)
+        exp = read_motions(self.real, lump(self.sim.plant.robot), self.held_out)
         if len(exp.held_out) < 2:
             raise InputError(f"{self.real}: one window is held out; a servo needs two, to stop by and to check by")
         exp = exp.with_model_error(np.full(len(exp.joints), self.tolerance))
@@ -121,7 +121,7 @@ class TrainServo:
     def _write_world(self, folder: Path, learned: LearnedServo) -> None:
         place = destination(folder) / FILE
         text = yaml.safe_dump(
-            documents.plain(described(replace(self.sim)) | {"servo": place.as_posix()}),
+            documents.plain(describe(replace(self.sim)) | {"servo": place.as_posix()}),
             sort_keys=False,
             allow_unicode=True,
         )

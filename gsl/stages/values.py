@@ -11,7 +11,7 @@ import numpy as np
 
 from gsl.core.console import Console
 from gsl.core.interfaces import REAL, Grounding, Policy, Task, World
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import rank_correlation
 from gsl.grounding.preparation import parents_of
@@ -50,16 +50,16 @@ class Values:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the values."""
         scenario = Scenario(self.world, self.task, self.policy, REAL, self.grounding).prepare(self.found)
-        rng = np.random.default_rng(derived_seed(self.seed, self.kind))
+        rng = np.random.default_rng(derive_seed(self.seed, self.kind))
         thetas = [neighbour(self.policy, self.policy.initial, self.spread, rng) for _ in range(self.count)]
-        jobs = [Job(theta, derived_seed(self.seed, self.kind, index)) for index, theta in enumerate(thetas)]
+        jobs = [Job(theta, derive_seed(self.seed, self.kind, index)) for index, theta in enumerate(thetas)]
         with console.progress(len(jobs), "measuring a fixed set of policies") as progress:
             done = episodes(scenario, jobs, workers=self.workers, progress=progress)
         write_json(folder / FILE, [one.value for one in done])
         return {"policies": self.count, "falls": sum(one.fell for one in done)}
 
 
-def ranked(simulated: Artifact, real: Artifact) -> float | None:
+def rank(simulated: Artifact, real: Artifact) -> float | None:
     """Return Spearman's correlation of two artifacts of the same policies, None if one of them ranks nothing."""
     values = [np.array(json.loads((one.folder / FILE).read_text(encoding="utf-8"))) for one in (simulated, real)]
     found = rank_correlation(*values)

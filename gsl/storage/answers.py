@@ -15,7 +15,7 @@ from gsl.core.layout import Layout
 from gsl.core.trajectory import Trajectory
 from gsl.core.validation import did_you_mean
 from gsl.errors import ArtifactError, TrajectoryError
-from gsl.runner.journal import MARK, YES, marked, table
+from gsl.runner.journal import MARK, YES, read_mark, table
 from gsl.runner.request import layout_of
 from gsl.runner.senses import BODY, JOINTS
 from gsl.storage import trajectories
@@ -74,7 +74,7 @@ def read_answers(folder: Path, request: Mapping[str, Any]) -> dict[str, Answered
         for name, one in read_returns(path, request).items():
             _once(told.get(name), path, name)
             told[name] = one
-    merged = {name: _merged(found.get(name), told.get(name)) for name in {**found, **told}}
+    merged = {name: _merge(found.get(name), told.get(name)) for name in {**found, **told}}
     check_lengths(folder, request, merged, set())
     return merged
 
@@ -85,19 +85,19 @@ def read_log(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
         batch = trajectories.read(path, joints=tuple(request["joints"]))
         check_marked(path, str(batch.metadata.get("request", "")), request)
         labels = [str(one.get("name", "")) for one in batch.metadata.get("episodes", [])]
-        episodes = named(path, labels, batch.episodes, request)
+        episodes = read_named(path, labels, batch.episodes, request)
     else:
-        check_marked(path, marked(path), request)
+        check_marked(path, read_mark(path), request)
         episodes = dict(csv_episodes(path, request))
-    return {name: _logged(path, name, one, request) for name, one in episodes.items()}
+    return {name: _read_log(path, name, one, request) for name, one in episodes.items()}
 
 
-def named(
+def read_named(
     path: Path, names: Sequence[str], episodes: Sequence[Trajectory], request: Mapping[str, Any]
 ) -> dict[str, Trajectory]:
     """Return the episodes of a file by their names: as many as there are, of the request, none of them twice."""
     for name in names:
-        _known(path, name, request)
+        _match(path, name, request)
         if names.count(name) > 1:
             raise ArtifactError(path, f"{name} is named twice; every episode is one of its own")
     if len(episodes) != len(names):
@@ -136,7 +136,7 @@ def csv_episodes(path: Path, request: Mapping[str, Any]) -> Iterator[tuple[str, 
 
 def read_returns(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
     """Return what a person measured: rows of `episode`, `distance` [m] or `value`, and `fell` (yes or no)."""
-    if told := marked(path):
+    if told := read_mark(path):
         check_marked(path, told, request)
     found: dict[str, Answered] = {}
     names, rows = table(path)
@@ -144,13 +144,13 @@ def read_returns(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
         needed = "needs the columns episode, distance (or value) and fell"
         raise ArtifactError(path, f"{needed}; it has {', '.join(names)[:80] or 'none'}")
     for number, row in enumerate(rows, start=1):
-        name = _known(path, row["episode"].strip(), request)
+        name = _match(path, row["episode"].strip(), request)
         _once(found.get(name), path, name)
-        found[name] = _measured(path, number, row)
+        found[name] = _read_measured(path, number, row)
     return found
 
 
-def _measured(path: Path, number: int, row: Mapping[str, Any]) -> Answered:
+def _read_measured(path: Path, number: int, row: Mapping[str, Any]) -> Answered:
     fell = str(row.get("fell") or "").strip().lower()
     if fell not in (*YES, *NO):
         raise ArtifactError(path, f"row {number}: fell is '{fell}'; write yes or no")
@@ -168,7 +168,7 @@ def _measured(path: Path, number: int, row: Mapping[str, Any]) -> Answered:
     return Answered(path, fell=fell in YES, distance=numbers["distance"], value=numbers["value"])
 
 
-def _merged(log: Answered | None, told: Answered | None) -> Answered:
+def _merge(log: Answered | None, told: Answered | None) -> Answered:
     """Return what log and measurement say together: who says that it fell is right."""
     if log is None or told is None:
         merged = log or told
@@ -187,7 +187,7 @@ def check_rate(path: Path, name: str, episode: Trajectory, request: Mapping[str,
         raise TrajectoryError(path, f"{name}: {told}; run it again at the rate that was asked for")
 
 
-def _logged(path: Path, name: str, episode: Trajectory, request: Mapping[str, Any]) -> Answered:
+def _read_log(path: Path, name: str, episode: Trajectory, request: Mapping[str, Any]) -> Answered:
     check_rate(path, name, episode, request)
     sensors = dict(episode.sensors)
     stopped = bool(sensors.pop(STOPPED, np.zeros(1, dtype=bool))[-1])
@@ -230,7 +230,7 @@ def check_lengths(
             raise ArtifactError(path, problem)
 
 
-def _known(path: Path, name: str, request: Mapping[str, Any]) -> str:
+def _match(path: Path, name: str, request: Mapping[str, Any]) -> str:
     names = [episode["name"] for episode in request["episodes"]]
     if name not in names:
         raise ArtifactError(path, f"the request has no episode '{name}'{did_you_mean(name, names)}")

@@ -30,7 +30,7 @@ from gsl.storage.manifest import Manifest, Parent
 from gsl.storage.read_files import own_effects, read_files
 from gsl.storage.versions import commit, versions
 from gsl.storage.whole import explained_work, flush_tree, remove_temporary
-from gsl.storage.workplace import KEY, complete, install, locked, logged, stoppable, workplace
+from gsl.storage.workplace import KEY, complete, install, locked, log_to, stoppable, workplace
 
 CONFIG = "config.yaml"
 METRICS = "metrics.json"
@@ -156,7 +156,7 @@ def _intact(folder: Path, key: str) -> Manifest | None:
         found = manifest.read(folder)
     except ArtifactError:
         return None
-    return found if found.key == key and manifest.damaged_file(folder, found) is None else None
+    return found if found.key == key and manifest.find_damage(folder, found) is None else None
 
 
 def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force: bool, forced: str) -> Artifact | None:
@@ -171,7 +171,7 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
                 return None
             raise
         raise ArtifactError(out, "exists and is no artifact of gsl; move it away or choose another out=") from error
-    damaged = manifest.damaged_file(out, found.manifest)
+    damaged = manifest.find_damage(out, found.manifest)
     wrong = f"changed since: {damaged}" if damaged else broken_link(out, found.manifest)
     if found.manifest.key == identity.key and wrong is None:
         return found
@@ -189,7 +189,7 @@ def _work(
     created = datetime.now(UTC).isoformat(timespec="seconds")
     settings = yaml.safe_dump(documents.plain(config), sort_keys=False, allow_unicode=True)
     (folder / CONFIG).write_text(settings, encoding="utf-8")
-    with logged(folder) as logger:
+    with log_to(folder) as logger:
         logger.info("%s begins: %s", identity.kind, command)
         links: dict[Path, Artifact] = {}
         token = _built.set(links)

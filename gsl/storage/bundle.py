@@ -16,7 +16,7 @@ _STAND_INS["gsl"] = "gsl.runner.stand_in.face"
 _THERE = {*sys.stdlib_module_names, "numpy"}
 
 
-def bundled(modules: tuple[str, ...]) -> dict[str, bytes]:
+def bundle(modules: tuple[str, ...]) -> dict[str, bytes]:
     """Return the sources that some modules need, by path below the bundle.
 
     Raises:
@@ -32,11 +32,11 @@ def bundled(modules: tuple[str, ...]) -> dict[str, bytes]:
         path = _source(_STAND_INS.get(name, name), modules[-1])
         below = "/__init__.py" if path.name == "__init__.py" or name == "gsl" else ".py"
         files[name.replace(".", "/") + below] = path.read_bytes()
-        waiting += [*_needed(path, name), *([name.rpartition(".")[0]] if "." in name else [])]
+        waiting += [*_find_imports(path, name), *([name.rpartition(".")[0]] if "." in name else [])]
     return dict(sorted(files.items()))
 
 
-def _needed(path: Path, module: str) -> Iterator[str]:
+def _find_imports(path: Path, module: str) -> Iterator[str]:
     """Yield the modules that a source imports, those that are there anyway left out."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):

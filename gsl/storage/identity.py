@@ -101,7 +101,7 @@ def content_hash(path: Path) -> str:
     if path.is_file():
         return file_hash(path)
     found = manifest.read(path)
-    if damaged := manifest.damaged_file(path, found):
+    if damaged := manifest.find_damage(path, found):
         raise ArtifactError(path / damaged, "is not as the manifest says; build the artifact again with force=true")
     return found.contents
 
@@ -123,7 +123,7 @@ def changes(old: Manifest, old_config: Any, new: Identity, new_config: Any) -> s
         return f"it holds {old.kind}, not {new.kind}"
     hidden = flat(documents.plain(new_config)).keys() - new.settings.keys()
     before = {name: value for name, value in flat(documents.plain(old_config)).items() if name not in hidden}
-    words = _changed_settings(before, new.settings)
+    words = _list_changes(before, new.settings)
     hashes = {parent.role: parent.hash for parent in old.parents}
     roles = sorted(hashes.keys() | new.parents.keys())
     words += [f"the data of {role}" for role in roles if hashes.get(role) != new.parents.get(role)]
@@ -132,13 +132,13 @@ def changes(old: Manifest, old_config: Any, new: Identity, new_config: Any) -> s
     return "changed: " + ", ".join(words)
 
 
-def _changed_settings(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    names = [name for name in [*new, *sorted(old.keys() - new.keys())] if _shown(old, name) != _shown(new, name)]
-    words = [f"{name} {_short(_shown(old, name))} -> {_short(_shown(new, name))}" for name in names[:SHOWN_CHANGES]]
+def _list_changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    names = [name for name in [*new, *sorted(old.keys() - new.keys())] if _show(old, name) != _show(new, name)]
+    words = [f"{name} {_short(_show(old, name))} -> {_short(_show(new, name))}" for name in names[:SHOWN_CHANGES]]
     return [*words, f"{len(names) - SHOWN_CHANGES} more settings"] if len(names) > SHOWN_CHANGES else words
 
 
-def _shown(settings: Mapping[str, Any], name: str) -> str:
+def _show(settings: Mapping[str, Any], name: str) -> str:
     return str(settings[name]).replace("\n", " ") if name in settings else "(none)"
 
 

@@ -65,7 +65,7 @@ def _file_problem(place: Path, expected: str | None) -> str:
 
 
 def _problem(folder: Path, stored: Manifest, expected: str | None) -> str:
-    if damaged := manifest.damaged_file(folder, stored):
+    if damaged := manifest.find_damage(folder, stored):
         return f"{damaged} is not as the manifest says"
     if strange := manifest.strange_file(folder, stored):
         return f"{strange} is no file of the artifact"
@@ -80,7 +80,7 @@ def broken_link(folder: Path, stored: Manifest) -> str | None:
             found = manifest.read(place)
         except ArtifactError as error:
             return f"gone or damaged: {error.path.as_posix()}"
-        if damaged := manifest.damaged_file(place, found):
+        if damaged := manifest.find_damage(place, found):
             return f"changed since: {(place / damaged).as_posix()}"
         if found.contents != link.hash:
             return f"built anew since: {place.as_posix()}"

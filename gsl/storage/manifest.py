@@ -94,7 +94,7 @@ def inventory(folder: Path) -> dict[str, File]:
     return {path.relative_to(folder).as_posix(): File(file_hash(path), path.stat().st_size) for path in paths}
 
 
-def damaged_file(folder: Path, manifest: Manifest) -> str | None:
+def find_damage(folder: Path, manifest: Manifest) -> str | None:
     """Return the first file that is missing or not what the manifest says, None when the artifact's own are intact."""
     place, total = folder.resolve(), sum(file.bytes for file in manifest.files.values())
     if total > ARTIFACT_BYTES:
@@ -152,7 +152,7 @@ def read(folder: Path) -> Manifest:
     try:
         if version == SCHEMA_VERSION and stored.pop(HASH) != _hash(stored):
             raise ArtifactError(folder / NAME, f"is damaged: it is not as it was written; {_DAMAGED}")
-        parsed = _parsed(stored)
+        parsed = _parse(stored)
     except (TypeError, AttributeError, KeyError, ValueError, RecursionError) as error:
         raise ArtifactError(folder / NAME, f"is damaged: its entries do not fit; {_DAMAGED}") from error
     if missing := sorted({*_ALWAYS, parsed.metrics} - parsed.files.keys()):
@@ -165,7 +165,7 @@ def resembles(folder: Path) -> bool:
     return all((folder / name).is_file() for name in (NAME, *_ALWAYS))
 
 
-def _parsed(stored: dict[str, Any]) -> Manifest:
+def _parse(stored: dict[str, Any]) -> Manifest:
     files = {name: File(**file) for name, file in stored.pop("files").items()}
     parents = tuple(Parent(**parent) for parent in stored.pop("parents"))
     links = tuple(Parent(**link) for link in stored.pop("links", ()))

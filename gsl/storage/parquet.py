@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 MOST = 16e9  # bytes of a trajectory file in memory; hours of a humanoid are some 0.1e9
 
 
-def declared_bytes(metadata: pq.FileMetaData, names: Sequence[str] | None = None) -> float:
+def count_bytes(metadata: pq.FileMetaData, names: Sequence[str] | None = None) -> float:
     """Return the memory that columns take [bytes], all if `names` is None: 8 a value, or what they unpack to."""
     total = 0.0
     for group in range(metadata.num_row_groups):
@@ -32,7 +32,7 @@ def check_declared(path: Path, metadata: pq.FileMetaData) -> None:
     Raises:
         TrajectoryError: It says how much it is.
     """
-    need = declared_bytes(metadata)
+    need = count_bytes(metadata)
     if need > MOST:
         problem = f"declares {metadata.num_rows:,} rows, {need / 1e9:.3g} GB of memory; a log this long has to be cut"
         raise TrajectoryError(path, problem)

@@ -61,7 +61,7 @@ def write_policies(path: Path, policies: Policies) -> None:
     """
     entries = [{**vars(record), "parameters": dict(record.parameters)} for record in policies.records]
     stored = {"schema_version": SCHEMA_VERSION, "policy": policies.policy, "task": policies.task, "policies": entries}
-    _checked(path, policies)
+    _check(path, policies)
     documents.write_json(path, stored)
 
 
@@ -85,10 +85,10 @@ def read_policies(path: Path) -> Policies:
         policies = Policies(stored["policy"], stored["task"], records)
     except (KeyError, TypeError) as error:
         raise ArtifactError(path, f"an entry is missing or unknown: {error}") from error
-    return _checked(path, policies)
+    return _check(path, policies)
 
 
-def _checked(path: Path, policies: Policies) -> Policies:
+def _check(path: Path, policies: Policies) -> Policies:
     if not policies.records:
         raise ArtifactError(path, "there is no policy in it")
     if not isinstance(policies.policy, Mapping) or "_target_" not in policies.policy:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.described import described
+from gsl.core.described import describe
 from gsl.core.interfaces import Policy
 from gsl.errors import ArtifactError
 from gsl.storage import manifest
@@ -54,8 +54,8 @@ def records(policy: Policy, reference: str) -> tuple[PolicyRecord, ...]:
     """
     path = resolve(reference)
     found = read_policies(_file(path))
-    if found.policy != described(policy):
-        raise ArtifactError(path, f"its policies are others: {_difference(found.policy, described(policy))}")
+    if found.policy != describe(policy):
+        raise ArtifactError(path, f"its policies are others: {_difference(found.policy, describe(policy))}")
     for name in found.records[0].parameters.keys() ^ set(policy.names):
         raise ArtifactError(path, f"parameter {name}: not both the file and the policy know it; choose another policy=")
     return found.records
@@ -88,4 +88,4 @@ def record(policy: Policy, name: str, parameters: np.ndarray, **more: Any) -> Po
 
 def policies(policy: Policy, task: Any, found: list[PolicyRecord]) -> Policies:
     """Return what a policy file holds."""
-    return Policies(described(policy), described(task), tuple(found))
+    return Policies(describe(policy), describe(task), tuple(found))

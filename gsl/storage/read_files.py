@@ -17,7 +17,7 @@ from gsl.effects.effect import own
 
 def read_files(thing: Any) -> dict[str, Path]:
     """Return the `read_files` of a component and of all components in it, by dotted name of the setting."""
-    return dict(_found(thing, ""))
+    return dict(_find(thing, ""))
 
 
 def own_effects() -> dict[str, Path]:
@@ -25,7 +25,7 @@ def own_effects() -> dict[str, Path]:
     return {f"effect.{name}{k or ''}": path for name, kind in own().items() for k, path in enumerate(_sources(kind))}
 
 
-def _found(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
+def _find(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
     if isinstance(thing, Mapping):
         parts = {str(key): value for key, value in thing.items()}
     elif isinstance(thing, list | tuple):
@@ -39,7 +39,7 @@ def _found(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
     else:
         return
     for name, part in parts.items():
-        yield from _found(part, f"{where}{name}.")
+        yield from _find(part, f"{where}{name}.")
 
 
 def _sources(kind: type) -> list[Path]:

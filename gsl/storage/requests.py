@@ -14,8 +14,8 @@ from gsl.errors import ArtifactError
 from gsl.runner.request import NAME, SCHEMA_VERSION, hash_of, stored_request
 from gsl.storage import documents
 from gsl.storage.answers import answer_files
-from gsl.storage.bundle import RUNNER, bundled
-from gsl.storage.whole import explained, flush_tree
+from gsl.storage.bundle import RUNNER, bundle
+from gsl.storage.whole import explain_refusal, flush_tree
 
 MODULES, README, ROBOT = "modules", "README.txt", "robot.py"
 _ENTRY = '''"""Plays the episodes of request.json on a robot; needs Python 3.10 or newer and numpy."""
@@ -68,11 +68,11 @@ def files_of(request: Mapping[str, Any]) -> dict[str, bytes]:
     """
     tables = all("commands" in episode for episode in request["episodes"])
     policy = () if tables else (str(request["policy"]["_target_"]).rpartition(".")[0],)
-    modules = {f"{MODULES}/{name}": source for name, source in bundled((RUNNER, *policy)).items()}
+    modules = {f"{MODULES}/{name}": source for name, source in bundle((RUNNER, *policy)).items()}
     return {"runner.py": _ENTRY.encode(), **modules}
 
 
-def sealed(request: Mapping[str, Any]) -> dict[str, Any]:
+def seal(request: Mapping[str, Any]) -> dict[str, Any]:
     """Return a request in the types of JSON with its version and its hash."""
     plain = documents.plain({**request, "schema_version": SCHEMA_VERSION})
     return {**plain, "hash": hash_of(plain)}
@@ -94,14 +94,14 @@ def write_request(folder: Path, request: Mapping[str, Any], warnings: Sequence[s
         stored_request(folder)
         raise ArtifactError(found[0], "answers another request, which has changed since; move it away")
     files = files_of(request)
-    with explained(folder.parent):
+    with explain_refusal(folder.parent):
         temporary = folder.with_name(f".{folder.name}.tmp-{os.getpid()}")
         shutil.rmtree(temporary, ignore_errors=True)
         try:
             _write(temporary, request, files, warnings)
             _check_ours(folder, temporary)
             flush_tree(temporary)
-            _put(temporary, folder)
+            _put_in_place(temporary, folder)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
 
@@ -111,7 +111,7 @@ def restore(folder: Path, request: Mapping[str, Any]) -> bool:
     files = files_of(request)
     if all((folder / name).is_file() for name in files):
         return False
-    with explained(folder):
+    with explain_refusal(folder):
         for name, content in files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_bytes(content)
@@ -129,7 +129,7 @@ def _check_ours(folder: Path, new: Path) -> None:
             raise ArtifactError(old, "is in the way of a request, and not gsl's; move it, or choose another folder")
 
 
-def _put(new: Path, folder: Path) -> None:
+def _put_in_place(new: Path, folder: Path) -> None:
     """Move a folder to its place: as a whole, or file by file into one that is there, the request itself last."""
     if not folder.exists():
         os.rename(new, folder)

@@ -73,14 +73,14 @@ def read(path: Path, *, joints: tuple[str, ...] | None = None) -> Batch:
         TrajectoryError: Names the file, the column and the row (counted from 0) that break the contract.
     """
     table = _table(path)
-    metadata = _stored_metadata(path, table)
+    metadata = _read_metadata(path, table)
     check_metadata(path, metadata, joints)
     check_names(path, table.column_names, metadata)
     columns = {field.name: _values(path, table, field) for field in table.schema}
     return batch_of(columns, metadata, check_rows(path, columns))
 
 
-def imported(path: Path) -> str:
+def suggest_import(path: Path) -> str:
     """Return what to type to make a trajectory file of foreign logs."""
     return f"gsl import source={path} mapping=... (docs/howto/own-logs.md)"
 
@@ -100,11 +100,11 @@ def _table(path: Path) -> pa.Table:
     except (pa.ArrowException, OSError) as error:
         problem = "is not a parquet file, or truncated or damaged; copy or collect it again"
         if path.suffix != ".parquet":
-            problem = f"is no trajectory file; make one of a log first: {imported(path)}"
+            problem = f"is no trajectory file; make one of a log first: {suggest_import(path)}"
         raise TrajectoryError(path, problem) from error
 
 
-def _stored_metadata(path: Path, table: pa.Table) -> Any:
+def _read_metadata(path: Path, table: pa.Table) -> Any:
     stored = (table.schema.metadata or {}).get(METADATA_KEY)
     if stored is None:
         raise TrajectoryError(
@@ -119,7 +119,7 @@ def _stored_metadata(path: Path, table: pa.Table) -> Any:
 def _values(path: Path, table: pa.Table, field: pa.Field) -> np.ndarray:
     import pyarrow as pa
 
-    expected, fits = _expected(field.name, pa.types)
+    expected, fits = _expect(field.name, pa.types)
     if not fits(field.type):
         raise TrajectoryError(path, f"is of type {field.type}, not {expected}; convert it", column=field.name)
     column = table.column(field.name)
@@ -131,7 +131,7 @@ def _values(path: Path, table: pa.Table, field: pa.Field) -> np.ndarray:
     return np.asarray(column.to_numpy())
 
 
-def _expected(name: str, types: Any) -> tuple[str, Callable[[Any], bool]]:
+def _expect(name: str, types: Any) -> tuple[str, Callable[[Any], bool]]:
     if name in INTEGERS:
         return "int32", types.is_integer
     if name in BOOLEANS:

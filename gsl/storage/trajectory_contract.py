@@ -52,7 +52,7 @@ def state_columns(group: str, states: int) -> list[str]:
     return [f"{group}.{index}" for index in range(states)]
 
 
-def required_columns(joints: Iterable[str], states: int = 0) -> list[str]:
+def list_required(joints: Iterable[str], states: int = 0) -> list[str]:
     """Return the columns without which there is no trajectory; `states` is 0 where the state is joints."""
     groups = ("action",) if states else ("action", "position", "velocity")
     named = [name for group in groups for name in joint_columns(group, joints)]
@@ -100,11 +100,11 @@ def _check_units(path: Path, units: Any) -> None:
     if not isinstance(units, Mapping):
         raise TrajectoryError(path, "units must map groups of columns to units in the metadata")
     for group, unit in units.items():
-        if group in UNITS and _spelled(str(unit)) != _spelled(UNITS[group]):
+        if group in UNITS and _spell(str(unit)) != _spell(UNITS[group]):
             raise TrajectoryError(path, f"the unit is {unit}, not {UNITS[group]}; convert the column", column=group)
 
 
-def _spelled(unit: str) -> str:
+def _spell(unit: str) -> str:
     return unit.replace("·", "").replace("*", "").replace(" ", "").replace("^2", "²")
 
 
@@ -114,7 +114,7 @@ def check_names(path: Path, names: list[str], metadata: Mapping[str, Any]) -> No
     for name in names:
         if names.count(name) > 1:
             raise TrajectoryError(path, f"there are {names.count(name)} columns of this name; keep one", column=name)
-    required = required_columns(joints, states)
+    required = list_required(joints, states)
     if any(name.startswith("grounded_action.") for name in names):
         required += joint_columns("grounded_action", joints)
     for name in required:
@@ -126,12 +126,12 @@ def check_names(path: Path, names: list[str], metadata: Mapping[str, Any]) -> No
     else:
         known.update((*SENSORS, "fell", *(name for group in JOINT_SENSORS for name in joint_columns(group, joints))))
     for name in names:
-        if name not in known and not _declared(name, units):
+        if name not in known and not _declares(name, units):
             advice = f"is unknown{suggestion(name, known)}; a column of your own needs a unit under `units`"
             raise TrajectoryError(path, advice, column=name)
 
 
-def _declared(name: str, units: Mapping[str, Any]) -> bool:
+def _declares(name: str, units: Mapping[str, Any]) -> bool:
     own = set(units) - set(UNITS)
     return name in own or name.rpartition(".")[0] in own
 

@@ -26,7 +26,7 @@ _HERE, _EXCHANGE = -100, 2  # AT_FDCWD, RENAME_EXCHANGE: linux/fcntl.h, linux/fs
 
 
 @contextmanager
-def explained(folder: Path) -> Iterator[None]:
+def explain_refusal(folder: Path) -> Iterator[None]:
     """Turn an operating system's refusal to write (full, read-only, not a folder) into one line that names `folder`."""
     try:
         yield
@@ -49,7 +49,7 @@ def explained_work(folder: Path) -> Iterator[None]:
         refused = error.errno in (errno.EACCES, errno.EPERM) and error.filename is None
         if not (refused or error.errno in _FULL or _is_hidden_in(folder, error.filename)):
             raise
-        with explained(folder):
+        with explain_refusal(folder):
             raise
 
 
@@ -65,7 +65,7 @@ def _is_hidden_in(folder: Path, path: object) -> bool:
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary name beside `path` that takes its place when the block ends well and vanishes when not."""
     temporary = path.with_name(f".{path.name}.tmp-{os.getpid()}")
-    with explained(path.parent):
+    with explain_refusal(path.parent):
         try:
             yield temporary
             flush(temporary)

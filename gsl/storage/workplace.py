@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gsl.errors import ArtifactError
-from gsl.storage.whole import exchange, explained, flush, remove_temporary
+from gsl.storage.whole import exchange, explain_refusal, flush, remove_temporary
 
 KEY = ".key"
 LOG = "log.txt"
@@ -30,10 +30,10 @@ def locked(out: Path) -> Iterator[None]:
         GslError: The folder around it cannot be written.
     """
     lock = out.with_name(f".{out.name}.lock")
-    with explained(out.parent):
+    with explain_refusal(out.parent):
         made = [folder for folder in (out.parent, *out.parent.parents) if not folder.exists()]
         out.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = _taken(out, lock)
+        descriptor = _take(out, lock)
     try:
         recover(out)
         yield
@@ -46,7 +46,7 @@ def locked(out: Path) -> Iterator[None]:
                 folder.rmdir()  # of a command that was refused; what holds something stays
 
 
-def _taken(out: Path, lock: Path) -> int:
+def _take(out: Path, lock: Path) -> int:
     while True:
         descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -63,7 +63,7 @@ def recover(out: Path) -> None:
     """Put right what a killed or stopped process left: an artifact moved aside comes back, temporary folders go."""
     aside = _aside(out)
     temporary = re.compile(rf"\.{re.escape(out.name)}\.tmp-\d+")  # the name may hold a star
-    with explained(out.parent):
+    with explain_refusal(out.parent):
         if aside.exists() and not out.exists():
             os.rename(aside, out)
         for leftover in [aside, *(path for path in out.parent.iterdir() if temporary.fullmatch(path.name))]:
@@ -81,7 +81,7 @@ def workplace(out: Path, key: str, *, progress: str, kept: Collection[str] = ())
         kept: Files and folders that it goes on from as well; whatever else a kill left goes.
     """
     folder = _partial(out) if progress else out.with_name(f".{out.name}.tmp-{os.getpid()}")
-    with explained(out.parent):
+    with explain_refusal(out.parent):
         if folder.exists() and not _belongs(folder, key):
             shutil.rmtree(folder)
         folder.mkdir(exist_ok=True)
@@ -154,7 +154,7 @@ class _LogFile(logging.FileHandler):
 
 
 @contextmanager
-def logged(folder: Path) -> Iterator[logging.Logger]:
+def log_to(folder: Path) -> Iterator[logging.Logger]:
     """Write what gsl logs to the folder's log file, too; resumed work goes on in the same file."""
     logger = logging.getLogger("gsl")
     handler = _LogFile(folder / LOG, encoding="utf-8")

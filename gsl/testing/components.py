@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.described import described, rebuilt
+from gsl.core.described import describe, rebuilt
 from gsl.core.setting import settings_of
 from gsl.core.trust import modules_in
 from gsl.errors import ConfigError
@@ -42,13 +42,13 @@ def check_component(component: Any) -> None:
         again = pickle.loads(pickle.dumps(component))  # noqa: S301  our own bytes
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise AssertionError(f"{type(component).__name__}: cannot go to a worker process ({error})") from error
-    require(component, alike(described(again), described(component)), "is another one after pickling")
+    require(component, alike(describe(again), describe(component)), "is another one after pickling")
     try:
-        plain = described(component)
+        plain = describe(component)
         back = rebuilt(plain, trust=modules_in(plain))
     except ConfigError as error:
         raise AssertionError(f"{type(component).__name__}: cannot be built again from a file: {error}") from error
-    require(component, alike(described(back), described(component)), "is another one when read from a file")
+    require(component, alike(describe(back), describe(component)), "is another one when read from a file")
 
 
 def flat(thing: Any, where: str = "") -> dict[str, Any]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
 from gsl.core.servo_law import HIDDEN, LAYERS
 from gsl.training.frozen import Frozen
@@ -33,7 +33,7 @@ from gsl.worlds.encoder import REMEMBERED
 from gsl.worlds.servo_state import COMMANDS, MEMORY, ServoParameters, ServoState
 
 
-@compiled
+@compile_kernel
 def cost_and_gradient(
     servos: ServoParameters, data: Frozen, some: np.ndarray, step: float, substeps: int, robust: float, to: Gradient
 ) -> float:
@@ -54,7 +54,7 @@ def cost_and_gradient(
     return total
 
 
-@compiled
+@compile_kernel
 def _side_by_side(
     servos: ServoParameters, data: Frozen, some: np.ndarray, step: float, substeps: int, robust: float, to: Gradient
 ) -> float:
@@ -83,7 +83,7 @@ def _side_by_side(
     return cost
 
 
-@compiled
+@compile_kernel
 def _back(servos: ServoParameters, path: Path, slopes: np.ndarray, step: float, substeps: int, to: Gradient) -> None:
     """Add the derivatives of replayed windows.
 
@@ -124,7 +124,7 @@ def _back(servos: ServoParameters, path: Path, slopes: np.ndarray, step: float, 
                 encoder_back(rows, i, s, -adjoint.error[i], 0, step, adjoint.sensed)
 
 
-@compiled
+@compile_kernel
 def _links_back(rows: np.ndarray, mobility: np.ndarray, now: Moment, adjoint: Adjoint) -> None:
     """Fill in the adjoint of the torques, and move that of the motion to the beginning of the step, torques given."""
     moved, push, step = adjoint.moved, adjoint.push, now.step

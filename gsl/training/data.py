@@ -58,10 +58,10 @@ def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
     _check_joints(path, batch)
     if len(batch) < FEWEST:
         raise TrajectoryError(path, f"holds {several(len(batch), 'episode')}; {FEWEST} are the least: {WHY}")
-    return parted(batch, share, seed)
+    return split_batch(batch, share, seed)
 
 
-def parted(batch: Batch, share: float, seed: int) -> Parts:
+def split_batch(batch: Batch, share: float, seed: int) -> Parts:
     """Split a batch of three trajectories at least."""
     rng = np.random.default_rng(seed)
     rest, heldout = _split(batch, share, rng)
@@ -86,7 +86,7 @@ def earlier_batch(path: Path, newest: Batch) -> Batch:
     return batch
 
 
-def aggregated(data: Parts, earlier: Sequence[Batch]) -> Parts:
+def aggregate(data: Parts, earlier: Sequence[Batch]) -> Parts:
     """Add the trajectories of earlier policies to those that models learn from; the other parts stay the newest's."""
     if not earlier:
         return data
@@ -140,12 +140,12 @@ def degrees_by_joint(errors: np.ndarray, joints: tuple[str, ...]) -> dict[str, f
     return {joint: degrees(errors[:, index]) for index, joint in enumerate(joints)}
 
 
-def explained(errors: np.ndarray, wanted: np.ndarray) -> float:
+def compute_r2(errors: np.ndarray, wanted: np.ndarray) -> float:
     """Return the share of the variance that is explained, R², over all joints."""
     return float(1.0 - np.sum(errors**2) / np.sum((wanted - wanted.mean(axis=0)) ** 2))
 
 
-def checked(path: Path, episodes: Sequence[Trajectory], needed: int) -> Sequence[Trajectory]:
+def check_lengths(path: Path, episodes: Sequence[Trajectory], needed: int) -> Sequence[Trajectory]:
     """Return the episodes that are at least `needed` ticks long before a fall.
 
     Raises:

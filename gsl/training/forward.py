@@ -9,21 +9,21 @@ from typing import Any
 import numpy as np
 
 from gsl.core.angles import encode
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import Transitions, transitions, usable
-from gsl.models.calibration import calibrated
+from gsl.models.calibration import calibrate
 from gsl.models.choice import Choice, best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.ensemble import Forward, ensemble
 from gsl.models.forward import ForwardModel
-from gsl.models.free_run import Segments, predicted_error, segments, shortest, standstill_error
+from gsl.models.free_run import Segments, predict_error, segments, shortest, standstill_error
 from gsl.models.network import Samples
 from gsl.training.data import (
     Parts,
+    compute_r2,
     degrees,
     degrees_by_joint,
-    explained,
     of_policy,
 )
 
@@ -47,7 +47,7 @@ def _fit(config: ModelConfig, data: Parts, seed: int, base: ForwardModel | None,
     episodes = data.training.episodes
     if config.members == 1:
         return _member(config, episodes, data, seed, base, whole)
-    rng = np.random.default_rng(derived_seed(seed, "members"))
+    rng = np.random.default_rng(derive_seed(seed, "members"))
     drawn = [rng.integers(len(episodes), size=len(episodes)) for _ in range(config.members)]
     members = [
         _member(config, [episodes[index] for index in indices], data, seed + number, base)
@@ -84,7 +84,7 @@ def _member(
     network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole, pieces=pieces)
     memory = np.zeros(unseen[1].shape[1])
     if head.draws and config.calibrated:
-        network, memory = calibrated(network, head, [_samples(config, [one], base) for one in data.validation.episodes])
+        network, memory = calibrate(network, head, [_samples(config, [one], base) for one in data.validation.episodes])
     joints = data.training.joints
     return ForwardModel(
         network, config.of_body, joints, config.encoding, config.horizon, head, memory, base, config.multi_step
@@ -121,13 +121,13 @@ def forward_errors(model: Forward, episodes: Sequence[Trajectory]) -> dict[str, 
         "trajectories": len(episodes),
         "one_step_deg": degrees(errors),
         "one_step_no_change_deg": degrees(data.change),
-        "r2": explained(errors, data.change),
+        "r2": compute_r2(errors, data.change),
         "one_step_by_joint_deg": degrees_by_joint(errors, model.joints),
         "free_run_no_change_deg": degrees(standstill_error(pieces)),
     }
     if model.head.draws:
         measured["nll"] = float(model.surprise(data.windows, data.change).mean())
     if model.horizon == 1:
-        ahead = predicted_error(model, pieces)
+        ahead = predict_error(model, pieces)
         measured |= {"free_run_deg": degrees(ahead), "free_run_by_joint_deg": degrees_by_joint(ahead, model.joints)}
     return measured

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.plant import Plant
 from gsl.diagnosis.log.records import Pieces
 from gsl.worlds.chain import COLUMNS, Chain, accelerate, chain, nothing
-from gsl.worlds.servo_state import ROTOR, packed
+from gsl.worlds.servo_state import ROTOR, pack
 
 
 class Frozen(NamedTuple):
@@ -52,7 +52,7 @@ def freeze(plant: Plant, pieces: Pieces, floor: np.ndarray, period: float) -> Fr
     path = np.concatenate([windows.motion[:, :1], pieces.real[:, :, plant.robot.drive]], axis=1) - bias
     speed = np.diff(path, axis=1) / period
     middle = np.ascontiguousarray(0.5 * (path[:, 1:] + path[:, :-1]))
-    servo = packed(plant.servo, plant.robot.supply_voltage)
+    servo = pack(plant.servo, plant.robot.supply_voltage)
     tree = chain(plant, plant.servo.armature - servo.rows[ROTOR])
     mobility, free = np.empty((*middle.shape, middle.shape[2])), np.empty(middle.shape)
     _rigid_body(tree, middle, np.ascontiguousarray(speed), mobility, free)
@@ -62,7 +62,7 @@ def freeze(plant: Plant, pieces: Pieces, floor: np.ndarray, period: float) -> Fr
     return Frozen(commands, motion, windows.clock, mobility, free, pieces.real, floor, bias, pieces.warm_up)
 
 
-@compiled
+@compile_kernel
 def _rigid_body(tree: Chain, position: np.ndarray, speed: np.ndarray, mobility: np.ndarray, free: np.ndarray) -> None:
     """Fill in inverse mass matrices and accelerations without torque, one a period."""
     n = position.shape[2]

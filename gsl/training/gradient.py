@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import zeros_in_lanes
 from gsl.core.servo_law import HIDDEN, INPUTS, LAGS
 
@@ -32,7 +32,7 @@ class Gradient(NamedTuple):
     last_bias: np.ndarray
 
 
-@compiled
+@compile_kernel
 def sums_in_lanes(motors: int, groups: int) -> Gradient:
     """Return zeros to sum up derivatives in, each array with an axis of lanes in the end."""
     g = groups
@@ -44,7 +44,7 @@ def sums_in_lanes(motors: int, groups: int) -> Gradient:
     )  # fmt: skip
 
 
-@compiled
+@compile_kernel
 def add_lanes(to: Gradient, sums: Gradient, lanes: int) -> None:
     """Add the derivatives of the first lanes; a lane in which a single one is no finite number gives none."""
     for lane in range(lanes):
@@ -60,7 +60,7 @@ def add_lanes(to: Gradient, sums: Gradient, lanes: int) -> None:
         to.last_bias[:] += sums.last_bias[..., lane]
 
 
-@compiled
+@compile_kernel
 def _finite(sums: Gradient, lane: int) -> bool:
     return (
         np.isfinite(sums.numbers[..., lane]).all()

@@ -13,7 +13,7 @@ from gsl.core.transitions import Transitions, transitions
 from gsl.models.choice import Choice, best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.forward import ForwardModel
-from gsl.models.free_run import recovered_error, segments
+from gsl.models.free_run import recover_error, segments
 from gsl.models.inverse import InverseModel, Regression, Solver
 from gsl.models.linear import fit_linear
 from gsl.models.network import Samples
@@ -39,12 +39,12 @@ def fit_inverse(
             return _regression(one, data, seed, whole)
         return _solver(one, data, seed, damping, whole)
 
-    return best(config, fit, lambda model: degrees(recovered_error(model, pieces)))
+    return best(config, fit, lambda model: degrees(recover_error(model, pieces)))
 
 
 def _regression(config: ModelConfig, data: Parts, seed: int, whole: bool) -> InverseModel:
     n = len(data.training.joints)
-    known, unseen = (_turned(_rows(config, part), n, config) for part in (data.training, data.validation))
+    known, unseen = (_invert(_rows(config, part), n, config) for part in (data.training, data.validation))
     network = fit_network(known, unseen, config, seed=seed, whole=whole)
     return Regression(network, config.of_joints, data.training.joints, config.encoding, config.horizon)
 
@@ -60,7 +60,7 @@ def _solver(config: ModelConfig, data: Parts, seed: int, damping: float, whole: 
     return Solver(simulator, sensitivity, damping)
 
 
-def _turned(data: Transitions, n: int, config: ModelConfig) -> Samples:
+def _invert(data: Transitions, n: int, config: ModelConfig) -> Samples:
     """Let the wanted change take the place of the action in the inputs, and the action become the target."""
     inputs = np.concatenate([data.change, data.windows[:, n:]], axis=1)
     return inputs, encode(data.windows[:, :n], config.encoding)

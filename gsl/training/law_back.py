@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import where
 from gsl.core.servo import ROW
 from gsl.core.servo_law import FIRST, HIDDEN, INPUTS, LAG, LAGS, LAST, NOBODY, SECOND, SIGN, SPEED_UNIT
 from gsl.training.gradient import BY_DELAY, Gradient
 from gsl.training.replay_path import POSITION, Moment
 from gsl.training.servo_back import Adjoint, Work, slope_by_delay
-from gsl.worlds.servo import BRISTLE, wanted_torque
+from gsl.worlds.servo import BRISTLE, compute_wanted_torque
 from gsl.worlds.servo_state import GROUP, LAG_SHARE, LAW_BENT, STIFFNESS, TORQUE, ServoParameters, ServoState
 
 
-@compiled
+@compile_kernel
 def law_back(
     servos: ServoParameters, state: ServoState, now: Moment, adjoint: Adjoint, work: Work, to: Gradient
 ) -> None:
@@ -37,7 +37,7 @@ def law_back(
         by_u, still = adjoint.wanted[i], 0.0 * adjoint.wanted[i]
         state.memory[LAW_BENT, i] = before[LAW_BENT, i]
         q = now.seen[POSITION, i]
-        wanted_torque(servos, state, i, motion, still, q, still, now.elapsed, now.step, now.period)
+        compute_wanted_torque(servos, state, i, motion, still, q, still, now.elapsed, now.step, now.period)
         drive, output, g = rows[TORQUE, i] * by_u, rows[TORQUE, i] * adjoint.output[i], int(rows[GROUP, i])
         _network_back(servos.weights, g, drive, output, state.layers, inputs, work.hidden, to)
         for k in range(LAGS):
@@ -54,7 +54,7 @@ def law_back(
         moved[1, i] += now.step * held[LAW_BENT, i]
 
 
-@compiled
+@compile_kernel
 def _network_back(
     weights: np.ndarray, g: int, drive: float, output: float, layers: np.ndarray, inputs: np.ndarray,
     hidden: np.ndarray, to: Gradient,
@@ -94,7 +94,7 @@ def _network_back(
         inputs[k] = back
 
 
-@compiled
+@compile_kernel
 def slope_of_act(z: float) -> float:
     """Return the derivative of `act`."""
     low = 27.0 + 9.0 * z * z

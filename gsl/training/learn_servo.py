@@ -23,7 +23,7 @@ from gsl.training.servo_bench import CHANCE, LIKELY, Duel, ServoBench, cut_windo
 from gsl.training.servo_members import ITERATIONS, Member, further
 from gsl.training.servo_network import Progress
 from gsl.training.servo_replays import Replays
-from gsl.training.servo_split import Split, left_out, split
+from gsl.training.servo_split import Split, leave_out, split
 from gsl.training.servo_walks import Walks
 from gsl.worlds.fits import fitting_step
 
@@ -89,7 +89,7 @@ def learn_servo(
     _check_motion(exp)
     step = fitting_step(step, exp.period)
     parts, start = split(exp, labelled=labelled), neutral(plant, np.random.default_rng(seed))
-    splits = [parts, *left_out(exp, parts)]
+    splits = [parts, *leave_out(exp, parts)]
     with ThreadPoolExecutor(threads) as pool:
         bench = ServoBench(exp, Replays(plant, step, exp.period, threads, pool), start)
 

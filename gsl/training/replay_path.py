@@ -6,16 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
 from gsl.training.frozen import Frozen
 from gsl.worlds.servo import (
-    drawn_current,
+    compute_current,
+    compute_wanted_torque,
     encoder_motion,
     output_torque,
-    sensed_error,
+    sense_error,
     supply_share,
-    wanted_torque,
 )
 from gsl.worlds.servo_state import COMMANDS, MEMORY, ServoParameters, ServoState, settle
 
@@ -81,13 +81,13 @@ class Moment(NamedTuple):
     seen: np.ndarray
 
 
-@compiled
+@compile_kernel
 def cube(first: int, second: int, third: int) -> np.ndarray:
     """Return zeros for `side_by_side`, shape (first, second, third, LANES)."""
     return zeros_in_lanes(first, second * third).reshape((first, second, third, LANES))
 
 
-@compiled
+@compile_kernel
 def load(data: Frozen, some: np.ndarray) -> Loaded:
     """Return windows in lanes; lanes that are left over get the last window once more."""
     periods, n = data.free.shape[1:]
@@ -103,7 +103,7 @@ def load(data: Frozen, some: np.ndarray) -> Loaded:
     return into
 
 
-@compiled
+@compile_kernel
 def replay(servos: ServoParameters, path: Path, start: np.ndarray, step: float, substeps: int) -> None:
     """Fill in a path.
 
@@ -134,7 +134,7 @@ def replay(servos: ServoParameters, path: Path, start: np.ndarray, step: float, 
         state.clock[0] += period
 
 
-@compiled
+@compile_kernel
 def _torque(servos: ServoParameters, state: ServoState, now: Moment, torque: np.ndarray) -> None:
     """Do as `servo.servo_torque` does, and write down what the servos saw and did."""
     rows, memory, motion, seen = servos.rows, state.memory, now.motion, now.seen
@@ -142,17 +142,17 @@ def _torque(servos: ServoParameters, state: ServoState, now: Moment, torque: np.
     for r in range(MEMORY):
         for i in range(motion.shape[1]):
             now.memory[r, i] = memory[r, i]
-    current = drawn_current(rows, memory)
+    current = compute_current(rows, memory)
     for i in range(motion.shape[1]):
-        error, q, v = sensed_error(rows, state, i, motion, elapsed, step, period)
-        u, output = wanted_torque(servos, state, i, motion, error, q, v, elapsed, step, period)
+        error, q, v = sense_error(rows, state, i, motion, elapsed, step, period)
+        u, output = compute_wanted_torque(servos, state, i, motion, error, q, v, elapsed, step, period)
         seen[ERROR, i], seen[POSITION, i], seen[RATE, i] = error, q, v
         seen[WANTED, i], seen[OUTPUT, i] = u, output
         torque[i] = output_torque(rows, memory, i, motion, u, output, supply_share(rows, i, current), step)
     state.steps[0] += 1
 
 
-@compiled
+@compile_kernel
 def _move(mobility: np.ndarray, free: np.ndarray, torque: np.ndarray, now: Moment) -> None:
     """Step the links, semi-implicitly as the chain model does."""
     motion, after, step = now.motion, now.after, now.step
@@ -164,7 +164,7 @@ def _move(mobility: np.ndarray, free: np.ndarray, torque: np.ndarray, now: Momen
         after[0, i] = motion[0, i] + step * after[1, i]
 
 
-@compiled
+@compile_kernel
 def score(data: Frozen, some: np.ndarray, robust: float, told: np.ndarray, slopes: np.ndarray) -> float:
     """Return the cost of replayed windows.
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import where
 from gsl.core.servo import ROW
 from gsl.training.gradient import (
@@ -25,7 +25,7 @@ from gsl.training.gradient import (
 )
 from gsl.training.replay_path import ERROR, OUTPUT, RATE, WANTED, Moment
 from gsl.worlds.drive_train import ROTOR_SHARE
-from gsl.worlds.servo import delayed, drawn_current, kept_gain, output_torque, supply_share
+from gsl.worlds.servo import compute_current, compute_gain, delay_command, output_torque, supply_share
 from gsl.worlds.servo_state import (
     BENT,
     FRICTION,
@@ -86,7 +86,7 @@ class Work(NamedTuple):
     hidden: np.ndarray
 
 
-@compiled
+@compile_kernel
 def output_back(rows: np.ndarray, now: Moment, adjoint: Adjoint, work: Work, numbers: np.ndarray) -> None:
     """Pull adjoints back through the servos' outputs, to those of wanted torque and of what the law adds behind it.
 
@@ -100,7 +100,7 @@ def output_back(rows: np.ndarray, now: Moment, adjoint: Adjoint, work: Work, num
         numbers: Of `Gradient`, added to.
     """
     motion, after, memory, seen, step = now.motion, now.after, now.memory, now.seen, now.step
-    held, jacobian, current = adjoint.held, work.jacobian, drawn_current(rows, memory)
+    held, jacobian, current = adjoint.held, work.jacobian, compute_current(rows, memory)
     for i in range(motion.shape[1]):
         push, supply = adjoint.push[i], supply_share(rows, i, current)
         outcome = (
@@ -122,7 +122,7 @@ def output_back(rows: np.ndarray, now: Moment, adjoint: Adjoint, work: Work, num
         numbers[BY_ARMATURE, i] -= carried * push * (after[1, i] - motion[1, i]) / step
 
 
-@compiled
+@compile_kernel
 def _sum(jacobian: np.ndarray, k: int, outcome: tuple[float, ...]) -> float:
     total = 0.0 * outcome[0]
     for r in range(OUTCOMES):
@@ -130,7 +130,7 @@ def _sum(jacobian: np.ndarray, k: int, outcome: tuple[float, ...]) -> float:
     return total
 
 
-@compiled
+@compile_kernel
 def _differentiate(
     rows: np.ndarray, i: int, motion: np.ndarray, before: np.ndarray, seen: np.ndarray, supply: float, step: float,
     memory: np.ndarray, jacobian: np.ndarray,
@@ -150,7 +150,7 @@ def _differentiate(
             jacobian[k, r] = (probe[r] - base[r]) / PROBES[k]
 
 
-@compiled
+@compile_kernel
 def _outcome(
     rows: np.ndarray, i: int, motion: np.ndarray, before: np.ndarray, seen: np.ndarray, supply: float, step: float,
     memory: np.ndarray, probed: int,
@@ -183,7 +183,7 @@ def _outcome(
     )  # fmt: skip
 
 
-@compiled
+@compile_kernel
 def feedback_back(rows: np.ndarray, state: ServoState, now: Moment, adjoint: Adjoint, numbers: np.ndarray) -> None:
     """Pull the adjoints of wanted torques back to control errors, targets and encoders, the law apart.
 
@@ -196,7 +196,7 @@ def feedback_back(rows: np.ndarray, state: ServoState, now: Moment, adjoint: Adj
     """
     seen, held, sensed, length = now.seen, adjoint.held, adjoint.sensed, now.step / now.period
     for i in range(seen.shape[1]):
-        gain, error, by_u = kept_gain(rows, state, i, now.elapsed), seen[ERROR, i], adjoint.wanted[i]
+        gain, error, by_u = compute_gain(rows, state, i, now.elapsed), seen[ERROR, i], adjoint.wanted[i]
         by_error = where(abs(error) > rows[ROW.deadband, i], gain * by_u, 0.0)
         by_v = -rows[ROW.kd, i] * by_u
         kept = error - min(rows[ROW.deadband, i], max(-rows[ROW.deadband, i], error))
@@ -210,7 +210,7 @@ def feedback_back(rows: np.ndarray, state: ServoState, now: Moment, adjoint: Adj
         encoder_back(rows, i, now.number, by_v, 1, now.step, sensed)
 
 
-@compiled
+@compile_kernel
 def _filter_back(rows: np.ndarray, held: np.ndarray, i: int, by_target: float, step: float) -> float:
     """Return the adjoint of motor i's target before its filter; rounding counts as what it is on average: nothing."""
     if rows[ROW.smoothing, i] > 0.0:
@@ -221,14 +221,14 @@ def _filter_back(rows: np.ndarray, held: np.ndarray, i: int, by_target: float, s
     return by_target
 
 
-@compiled
+@compile_kernel
 def slope_by_delay(commands: np.ndarray, i: int, start: float, length: float) -> float:
     """Return the derivative of a delayed target by its delay [rad per control period], see `servo.delayed`."""
-    change = delayed(commands, i, start - SHIFT * length, length) - delayed(commands, i, start, length)
+    change = delay_command(commands, i, start - SHIFT * length, length) - delay_command(commands, i, start, length)
     return change / (SHIFT * length)
 
 
-@compiled
+@compile_kernel
 def encoder_back(rows: np.ndarray, i: int, index: int, share: float, row: int, step: float, sensed: np.ndarray) -> None:
     """Give the adjoint of what an encoder tells at a physics step to the steps at which it was measured."""
     age = rows[ROW.sensor_delay, i] / step
@@ -240,7 +240,7 @@ def encoder_back(rows: np.ndarray, i: int, index: int, share: float, row: int, s
         sensed[first - 1, row, i] += older * share
 
 
-@compiled
+@compile_kernel
 def take_sensed(rows: np.ndarray, number: int, adjoint: Adjoint) -> None:
     """Pass the adjoint of what was measured at a physics step to the outputs' motion, or to the rotors'."""
     moved, held, sensed = adjoint.moved, adjoint.held, adjoint.sensed[number]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.models.servo import ServoModel, neutral, without_group
 
 ITERATIONS = 60  # of a fit: in 140 more the judged gap would fall by 5 % (nao_worn, 70 s in the air)
@@ -50,7 +50,7 @@ def further(
         seed: Of the first member's first weights.
     """
     for k in range(count):
-        rng = np.random.default_rng(derived_seed(seed, "member", k + 1))
+        rng = np.random.default_rng(derive_seed(seed, "member", k + 1))
         begun = replace(numbers(rng), network=neutral(plant, rng).network)
         model = fit(begun, bootstrap(samples, rng))
         for name in dropped:

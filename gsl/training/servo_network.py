@@ -18,7 +18,7 @@ from gsl.training.adjoint import cost_and_gradient
 from gsl.training.frozen import Frozen, heavier
 from gsl.training.gradient import NUMBERS as SLOPES
 from gsl.training.gradient import Gradient
-from gsl.worlds.servo_state import OUTPUT_ARMATURE, packed
+from gsl.worlds.servo_state import OUTPUT_ARMATURE, pack
 
 ROBUST = 3.0  # residual beyond which one counts less and less [floors]
 RIDGE_LAG, RIDGE_WEIGHT = 1e-2, 1e-4  # of squares, in mean squares of a residual
@@ -114,12 +114,12 @@ def fit_network(
     lanes = [(k, np.arange(len(one.data.clock))) for k, one in enumerate(windows)]
     blocks = [(k, index[at : at + LANES]) for k, index in lanes for at in range(0, len(index), LANES)]
 
-    carried = [packed(one.plant.servo, one.plant.robot.supply_voltage).rows[OUTPUT_ARMATURE] for one in windows]
+    carried = [pack(one.plant.servo, one.plant.robot.supply_voltage).rows[OUTPUT_ARMATURE] for one in windows]
 
     def value(theta: np.ndarray) -> tuple[float, np.ndarray]:
         now = free.model_at(theta)
         changed = [now.on(one.plant) for one in windows]
-        servos = [packed(one.servo, one.robot.supply_voltage, one.law) for one in changed]
+        servos = [pack(one.servo, one.robot.supply_voltage, one.law) for one in changed]
         more = [own.rows[OUTPUT_ARMATURE] - before for own, before in zip(servos, carried, strict=True)]
         here = [heavier(one.data, inertia) for one, inertia in zip(windows, more, strict=True)]
 

@@ -10,7 +10,7 @@ import numpy as np
 from gsl.core.plant import Plant
 from gsl.diagnosis.log.records import Pieces
 from gsl.diagnosis.simulate.in_the_air import Effects
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.models.servo import ServoModel
 from gsl.worlds.held import Held, Windows, shares
 
@@ -48,7 +48,7 @@ class Replays:
 
     def known(self, pieces: Pieces) -> list[tuple[Plant, np.ndarray]]:
         """Return windows by what is known of their records: the plant, and indices, shape (k,)."""
-        return [(applied(self.plant, built(known)), index) for known, index in pieces.alike]
+        return [(apply_all(self.plant, build(known)), index) for known, index in pieces.alike]
 
     def replay(self, model: ServoModel | None, pieces: Pieces) -> np.ndarray:
         """Return the replayed positions [rad], shape (W, T, n_joints); NaN where a replay diverges."""

@@ -45,7 +45,7 @@ def split(exp: Log, *, labelled: bool) -> Split:
     return Split(exp.train, judge, np.setdiff1d(exp.held_out, judge))
 
 
-def left_out(exp: Log, parts: Split) -> list[Split]:
+def leave_out(exp: Log, parts: Split) -> list[Split]:
     """Return splits that leave out one known condition each, such as a firmware gain, and test on it.
 
     A servo learned at some gains is used at others. Motions held out at the same gains cannot say how far it holds.

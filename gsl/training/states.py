@@ -17,10 +17,10 @@ from gsl.models.choice import best, fit_network
 from gsl.models.config import ModelConfig
 from gsl.models.counts import Counts, counted
 from gsl.models.head import POINT, Head
-from gsl.models.network import Network, Samples, unscaled
-from gsl.models.states import NearestChoice, StateForward, StateInverse, encoded
+from gsl.models.network import Network, Samples, unscale
+from gsl.models.states import NearestChoice, StateForward, StateInverse, encode
 from gsl.storage.models import write_model
-from gsl.training.data import Parts, explained, summary
+from gsl.training.data import Parts, compute_r2, summary
 
 ROUNDING = 1e-9  # of the largest value, below which a spread is rounding
 
@@ -52,11 +52,11 @@ def forward_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int)
     write_model(folder, model)
     rows = _steps(data.heldout, model.variables)
     errors = model.changes(rows.states, rows.actions) - rows.changes
-    measured = {"steps": len(errors), "r2": explained(errors / model.scale, rows.changes / model.scale)}
+    measured = {"steps": len(errors), "r2": compute_r2(errors / model.scale, rows.changes / model.scale)}
     if model.head.draws:
         measured["nll"] = _nll(model, rows)
     by_variable = {
-        str(variable): explained(errors[:, [k]], rows.changes[:, [k]]) for k, variable in enumerate(model.variables)
+        str(variable): compute_r2(errors[:, [k]], rows.changes[:, [k]]) for k, variable in enumerate(model.variables)
     }
     heldout = {**measured, "r2_by_variable": by_variable}
     return {**summary(choice, data), "space": StateForward.space, "heldout": heldout}
@@ -121,9 +121,9 @@ def _forward(config: ModelConfig, whole: bool, *, data: Parts, seed: int, head: 
     known, unseen = (_steps(part, variables) for part in (data.training, data.validation))
     head = config.head if head is None else head
     training, validation = (
-        (np.hstack([part.states, encoded(part.actions, choices)]), part.changes) for part in (known, unseen)
+        (np.hstack([part.states, encode(part.actions, choices)]), part.changes) for part in (known, unseen)
     )
-    network = _fitted(training, validation, config, seed, whole, head)
+    network = _fit(training, validation, config, seed, whole, head)
     scale = np.maximum(known.changes.std(axis=0), 1e-12)
     actions = choices or known.actions.shape[1]
     full = head.likelihood == "gaussian" and config.covariance == "full"
@@ -133,19 +133,19 @@ def _forward(config: ModelConfig, whole: bool, *, data: Parts, seed: int, head: 
 
 def _inverse(config: ModelConfig, whole: bool, *, data: Parts, seed: int) -> StateInverse:
     variables = config.of_interest(data.training.states, "model")
-    known, unseen = (_turned(_steps(part, variables)) for part in (data.training, data.validation))
-    network = _fitted(known, unseen, config, seed, whole)
+    known, unseen = (_invert(_steps(part, variables)) for part in (data.training, data.validation))
+    network = _fit(known, unseen, config, seed, whole)
     return StateInverse(network, data.training.states, known[1].shape[1], variables)
 
 
-def _fitted(
+def _fit(
     training: Samples, validation: Samples, config: ModelConfig, seed: int, whole: bool, head: Head = POINT
 ) -> Network:
     """Return a network that was fitted in units of each column's own spread; what never changes stays as it is."""
     given, wanted = (_own_units(values) for values in training)
     known, unseen = ((given.apply(x), wanted.apply(y)) for x, y in (training, validation))
     network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole)
-    return unscaled([(weight, bias) for weight, bias in network.layers], given, head.scaling(wanted))
+    return unscale([(weight, bias) for weight, bias in network.layers], given, head.scaling(wanted))
 
 
 def _own_units(values: np.ndarray) -> Scaling:
@@ -157,7 +157,7 @@ def _nearest(config: ModelConfig, whole: bool, *, data: Parts, seed: int) -> Nea
     return NearestChoice(_forward(config, whole, data=data, seed=seed, head=POINT))
 
 
-def _turned(steps: Steps) -> Samples:
+def _invert(steps: Steps) -> Samples:
     return np.hstack([steps.states, steps.changes]), steps.actions
 
 
@@ -181,4 +181,4 @@ def _recovery(model: StateInverse | NearestChoice, data: Batch) -> float:
     found = model.actions_for(rows.states, rows.changes)
     if isinstance(model, NearestChoice):
         return float(np.mean(found != rows.actions))
-    return 1.0 - explained(found - rows.actions, rows.actions)
+    return 1.0 - compute_r2(found - rows.actions, rows.actions)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 
 from gsl.core.observation import missing
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import InputError
 from gsl.grounding.gat import LoadedTransformation
@@ -18,7 +18,7 @@ from gsl.grounding.preparation import without_margins
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.training.data import FALLS, of_policy
 from gsl.validation.reachability import Reachability, reachability
-from gsl.validation.replay import PAST, Deviations, places, replayed, unmoved
+from gsl.validation.replay import PAST, Deviations, places, predict_no_change, replayed
 from gsl.validation.report import BARE, GROUNDED, OFF, PI0, STILL, GroundingReport
 
 REPLAYS = 60  # of each group of trajectories, at most
@@ -28,7 +28,7 @@ SURELY = 0.05  # chance of so many falls in the grounded simulator, if π0 fell 
 ALPHAS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3)
 
 
-def allowed_falls(heldout: Batch) -> int:
+def count_allowed_falls(heldout: Batch) -> int:
     """Return how often π0 may fall in the grounded simulator: not surely more often than by its share in real."""
     share = float(heldout.metadata.get(FALLS, 0.0))
     return max(k for k in range(EPISODES + 1) if stats.binom.sf(k - 1, EPISODES, share) >= SURELY)
@@ -60,21 +60,23 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
     env = scenario.world.make()
     try:
         deviations = {
-            group: _compared(env, expected, of_policy(heldout, pi0=group == PI0), seed)
+            group: _compare(env, expected, of_policy(heldout, pi0=group == PI0), seed)
             for group in (PI0, OFF)
             if not lacking
         }
-        reach = asked(env, transformation, heldout.episodes, seed) if transformation and not lacking else None
+        reach = (
+            ask_reachability(env, transformation, heldout.episodes, seed) if transformation and not lacking else None
+        )
     finally:
         env.close()
-    ran = pi0_in(scenario, parameters, derived_seed(seed, EPISODES))
+    ran = pi0_in(scenario, parameters, derive_seed(seed, EPISODES))
     return GroundingReport(
         {group: found for group, found in deviations.items() if found},
         layout.joints,
         len(ran),
         sum(fell for _, fell in ran),
         np.array([value for value, _ in ran]),
-        allowed_falls(heldout),
+        count_allowed_falls(heldout),
         transformation.alpha if transformation else None,
         reach,
         sum(one.ended_in_a_fall for one in of_policy(heldout, pi0=False)),
@@ -102,20 +104,22 @@ def largest_stable(
     return next(stands, last)
 
 
-def asked(env: Any, grounding: LoadedTransformation, episodes: Sequence[Trajectory], seed: int) -> Reachability | None:
+def ask_reachability(
+    env: Any, grounding: LoadedTransformation, episodes: Sequence[Trajectory], seed: int
+) -> Reachability | None:
     """Return how much of what is predicted on real trajectories the simulator can do; None if that is no tick ahead."""
     starts = places(episodes, env.layout, ASKED, max(PAST, grounding.forward.history.span))
     return reachability(env, grounding, starts, seed) if starts and grounding.forward.horizon == 1 else None
 
 
-def _compared(env: Any, grounding: Any, episodes: Sequence[Any], seed: int) -> dict[str, dict[int, Deviations]]:
+def _compare(env: Any, grounding: Any, episodes: Sequence[Any], seed: int) -> dict[str, dict[int, Deviations]]:
     starts = places(episodes, env.layout, REPLAYS)
     if not starts:
         return {}
     return {
         GROUNDED: replayed(env, grounding, starts, seed),
         BARE: replayed(env, NoGrounding(), starts, seed),
-        STILL: unmoved(env.layout, starts),
+        STILL: predict_no_change(env.layout, starts),
     }
 
 
@@ -125,7 +129,7 @@ def pi0_in(
     """Return value and fall of some episodes of π0, up to one fall more than `patience`."""
     env, done = scenario.make(), []
     for index in range(EPISODES):
-        episode = rollout(scenario, env, parameters, derived_seed(seed, index))
+        episode = rollout(scenario, env, parameters, derive_seed(seed, index))
         done.append((episode.value, episode.ended_in_a_fall))
         if sum(fell for _, fell in done) > patience:
             break

@@ -18,7 +18,7 @@ from gsl.core.body import Robot
 from gsl.core.impedance import impedance
 from gsl.core.interfaces import Grounding
 from gsl.core.plant import Plant, noiseless
-from gsl.core.seeds import derived_seed, grounding_generator
+from gsl.core.seeds import derive_seed, grounding_generator
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.worlds.bullet import BulletEnv, BulletWorld
@@ -104,10 +104,10 @@ def measure(world: Any, grounding: Grounding, seed: int) -> Compliance:
     env = BulletEnv(held, plant=replace(noiseless(held.plant), pushes=()))
     for number, loaded in enumerate(rounds(robot) if apart else np.eye(len(robot.motors), dtype=bool)):
         swing = Swing(AMPLITUDE * effort * loaded, held.step)
-        hold(env, quiet, swing, swing.duration, derived_seed(seed, "swing", number))
+        hold(env, quiet, swing, swing.duration, derive_seed(seed, "swing", number))
         found[:3, loaded] = swing.answer()[:, loaded]
         rising = Ramp(RATE * effort * loaded * inwards(robot), DRAG * effort * loaded, found[0])
-        hold(env, quiet, rising, MOST / RATE, derived_seed(seed, "yield", number))
+        hold(env, quiet, rising, MOST / RATE, derive_seed(seed, "yield", number))
         found[3, loaded] = np.where(rising.yielded, rising.torque, MOST * effort)[loaded]
     env.close()
     return Compliance(robot.motors, joint_groups(robot), *found)

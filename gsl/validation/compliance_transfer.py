@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.core.console import Console
-from gsl.core.impedance import closed, handed_over
+from gsl.core.impedance import compute_closure, compute_transfer
 from gsl.core.interfaces import Grounding, World
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.grounding.ane import ActionNoise
 from gsl.grounding.none import NoGrounding
 from gsl.storage.documents import write_json
@@ -44,7 +44,7 @@ class Share(NamedTuple):
     torque: float | None
 
 
-def transferred(sim: Compliance, grounded: Compliance, real: Compliance) -> Mapping[str, Share]:
+def compute_transfers(sim: Compliance, grounded: Compliance, real: Compliance) -> Mapping[str, Share]:
     """Return what a grounding hands over, by group of joints."""
     noise = SURELY * np.hypot(sim.noise, real.noise)
     stiff, strong = np.fmax(noise, RESOLUTION * np.abs(sim.impedance)), RESOLUTION * sim.torque
@@ -52,9 +52,9 @@ def transferred(sim: Compliance, grounded: Compliance, real: Compliance) -> Mapp
     for group in sim.groups:
         one = sim.where(group)
         found[group] = Share(
-            handed_over(sim.stiffness[one], grounded.stiffness[one], real.stiffness[one], stiff[one]),
-            closed(sim.impedance[one], grounded.impedance[one], real.impedance[one], stiff[one]),
-            handed_over(sim.torque[one], grounded.torque[one], real.torque[one], strong[one]),
+            compute_transfer(sim.stiffness[one], grounded.stiffness[one], real.stiffness[one], stiff[one]),
+            compute_closure(sim.impedance[one], grounded.impedance[one], real.impedance[one], stiff[one]),
+            compute_transfer(sim.torque[one], grounded.torque[one], real.torque[one], strong[one]),
         )
     return found
 
@@ -74,7 +74,7 @@ class ComplianceReport:
     @property
     def shares(self) -> Mapping[str, Share]:
         """By group; nothing without a real robot."""
-        return {} if self.real is None else transferred(self.sim, self.grounded, self.real)
+        return {} if self.real is None else compute_transfers(self.sim, self.grounded, self.real)
 
     @property
     def titles(self) -> tuple[str, ...]:
@@ -160,7 +160,7 @@ def report_compliance(
     if nothing or not (isinstance(plain, BulletWorld) and isinstance(world, BulletWorld)) or plain.motors != "servo":
         return {}  # the engine's own motors bear any load below their limit
     console.status("loading single joints in the air, without and with the grounding")
-    start = derived_seed(seed, SECTION)
+    start = derive_seed(seed, SECTION)
     found = ComplianceReport(measure(plain, NoGrounding(), start), measure(world, grounding, start))
     before = json.loads(report.read_text(encoding="utf-8")) if report.exists() else {}
     write_json(report, {**before, SECTION: found.document()})
@@ -177,4 +177,4 @@ def with_real(report: Path, real: World, seed: int) -> ComplianceReport | None:
     sim, grounded = (Compliance.of(by_motor[name]) for name in (SIM, GROUNDED))
     if real.plant.robot.motors != sim.motors:
         return None
-    return ComplianceReport(sim, grounded, measure(real, NoGrounding(), derived_seed(seed, SECTION)))
+    return ComplianceReport(sim, grounded, measure(real, NoGrounding(), derive_seed(seed, SECTION)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from gsl.core.checkpoint import read_checkpoint
 from gsl.core.region import Region
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import transitions, usable
 from gsl.grounding.gat import LoadedTransformation
@@ -53,7 +53,7 @@ def drifts(scenario: Scenario, known: Region, found: Mapping[str, np.ndarray], s
     scenario = replace(scenario, grounding=grounding.expected)
     env, shares, columns = scenario.make(), {}, scenario.world.layout.numbers(grounding.forward.joints)
     for index, (name, parameters) in enumerate(found.items()):
-        walked = rollout(scenario, env, parameters, derived_seed(seed, index)).only(columns)
+        walked = rollout(scenario, env, parameters, derive_seed(seed, index)).only(columns)
         shares[name] = outside(grounding, known, [walked])
     env.close()
     return shares

@@ -10,7 +10,7 @@ import numpy as np
 
 from gsl.core.interfaces import Trainable
 from gsl.grounding.diagnosis_file import Diagnosis, read_diagnosis
-from gsl.grounding.effects import DiagnosedEffects, switched_on
+from gsl.grounding.effects import DiagnosedEffects, switch_on
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.servo import LearnedServo
 from gsl.rollout.rollout import Scenario
@@ -50,7 +50,7 @@ def check_diagnosed_effects(grounding: DiagnosedEffects, scenario: Scenario, gat
     found = grounding.load(read_diagnosis)
     gate.console.status(found.told)
     about = {"effects": list(found.causes), "diagnosis": found.verdict}
-    inside = replace(scenario, world=switched_on(scenario.world, found), grounding=grounding.inner)
+    inside = replace(scenario, world=switch_on(scenario.world, found), grounding=grounding.inner)
     ready, checked = check_grounding(inside, gate)
     own, path = isinstance(grounding.inner, ActionTransformation | LearnedServo | Trainable), gate.folder / REPORT
     before = json.loads(path.read_text(encoding="utf-8")) if own and path.exists() else {}

@@ -14,7 +14,7 @@ from gsl.rollout.rollout import Scenario
 from gsl.storage.models import model_file, read_forward_model, read_inverse_model
 from gsl.storage.trajectories import read
 from gsl.training.data import HELDOUT, VALIDATION, of_policy
-from gsl.validation.check import ALPHAS, REPLAYS, allowed_falls, check, largest_stable
+from gsl.validation.check import ALPHAS, REPLAYS, check, count_allowed_falls, largest_stable
 from gsl.validation.fewest_joints import fewest
 from gsl.validation.gate import Gate, Passed, examine
 from gsl.validation.replay import places
@@ -40,7 +40,9 @@ def check_transformation(grounding: ActionTransformation, scenario: Scenario, ga
     ready = replace(scenario, grounding=loaded)
     if grounding.alpha == "auto":
         tried = {alpha: replace(ready, grounding=replace(loaded, alpha=alpha)) for alpha in ALPHAS}
-        ready = tried[largest_stable(tried, gate.parameters, gate.seed_of("alpha"), allowed=allowed_falls(heldout))]
+        ready = tried[
+            largest_stable(tried, gate.parameters, gate.seed_of("alpha"), allowed=count_allowed_falls(heldout))
+        ]
     try:
         report = check(ready, gate.parameters, heldout, gate.seed_of("check"))
     except InputError as error:

@@ -16,7 +16,7 @@ import numpy as np
 
 from gsl.core.console import Console
 from gsl.core.interfaces import SIM, World
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.errors import Refused
 from gsl.grounding.ane import ActionNoise
 from gsl.grounding.none import NoGrounding
@@ -61,7 +61,7 @@ class Gate:
 
     def seed_of(self, what: str) -> int:
         """Return the seed of a part of a check."""
-        return derived_seed(self.seed, what)
+        return derive_seed(self.seed, what)
 
     def count_falls(self, scenario: Scenario, what: str = "check") -> int:
         """Return in how many of `EPISODES` episodes π0 falls."""

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.interfaces import Grounding, World
 from gsl.core.observation import missing, observations
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import actions
 from gsl.diagnosis.log.log import cut_log
@@ -72,7 +72,7 @@ def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parame
     if not missing(shown, held.layout):
         draw_joint(folder, Way(held, NoGrounding()), Way(steady, NoGrounding()), shown)
     env = scenario.make()
-    walk = rollout(scenario, env, parameters, derived_seed(seed, WALK))
+    walk = rollout(scenario, env, parameters, derive_seed(seed, WALK))
     env.close()
     if not missing(walk, grounded.layout):
         walk_strip(robot, walk, folder / WALK)
@@ -117,6 +117,6 @@ def _centre(world: World | EnsembleWorld | RandomisedWorld) -> BulletWorld | Non
 
 def _largest_held_out(log: Batch, world: BulletWorld) -> Trajectory:
     """Return the largest motion of a log that a diagnosis or a learned servo was not fitted to."""
-    split = cut_log(log, lumped(world.plant.robot))
+    split = cut_log(log, lump(world.plant.robot))
     episodes = [log.episodes[split.order[k]] for k in np.unique(split.pieces.record[split.held_out])]
     return max(episodes, key=lambda episode: np.ptp(episode.position, axis=0).max())

@@ -10,7 +10,7 @@ import numpy as np
 
 from gsl.core.body import Robot
 from gsl.core.plant import noiseless
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import transitions
@@ -25,7 +25,7 @@ from gsl.models.forward import ForwardModel
 from gsl.models.free_run import shortest
 from gsl.models.inverse import Solver
 from gsl.models.linear import fit_linear
-from gsl.training.data import parted
+from gsl.training.data import split_batch
 from gsl.training.forward import fit_forward
 from gsl.training.inverse import Damping, fit_inverse
 from gsl.validation.model_requirements import SHRINKING, extra_ticks_of, looking_ahead
@@ -119,7 +119,7 @@ class LearnedReplay:
         played = world.batch(world.played(known, conditions, self.noise, seed))
         if len(played) < LEAST:
             raise GslError("GAT cannot learn a simulator whose replays diverge; gat=null leaves it out")
-        found, _ = fit_inverse(self.model, parted(played, SHARE, seed), seed, "solve", self.damping)
+        found, _ = fit_inverse(self.model, split_batch(played, SHARE, seed), seed, "solve", self.damping)
         assert isinstance(found, Solver)
         return found
 
@@ -129,7 +129,7 @@ class LearnedReplay:
         """Return a forward model for every solver, given which one each trajectory belongs to."""
         logged = world.batch(map(world.recorded, known))
         if not self.residual:
-            return [fit_forward(self.model, parted(logged, SHARE, seed), seed)[0]] * len(solvers)
+            return [fit_forward(self.model, split_batch(logged, SHARE, seed), seed)[0]] * len(solvers)
         bases = [one.simulator for one in solvers]
         rows = [transitions([one], bases[0].history, bases[0].horizon, carried_out=True) for one in logged.episodes]
         windows = np.concatenate([one.windows for one in rows])
@@ -168,7 +168,7 @@ class Simulated:
     ) -> Iterator[Trajectory]:
         """Yield what the simulator does from the states and with the commands of logs, in cuts, with noise on top."""
         joints, longest = self.nuisances.shape[1], round(PLAYED / self.simulator.period)
-        rng = np.random.default_rng(derived_seed(seed, "played"))
+        rng = np.random.default_rng(derive_seed(seed, "played"))
         for one in known:
             about, length = replace(one, about={**one.about, "conditions": conditions}), min(longest, len(one))
             cut = cut_pieces([about], self.robot, self.simulator.period, warm_up=0, scored=length)

@@ -9,7 +9,7 @@ import numpy as np
 
 from gsl.core.console import Console, Progress
 from gsl.core.interfaces import REAL
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.statistics import Interval, bootstrap_interval, mean_interval, rank_correlation
 from gsl.grounding.none import NoGrounding
 from gsl.rollout.parallel import Episode, Job, episodes
@@ -45,7 +45,7 @@ def policy_gap(
     """
     with console.progress(2 * effort.episodes * len(measured.policies), "policies in both simulators") as progress:
         sim, diagnosed = (_played(measured, measured.setup(one), effort, progress) for one in (before, after))
-    seed = derived_seed(effort.seed, "policy_gap")
+    seed = derive_seed(effort.seed, "policy_gap")
     rows = [
         {
             "name": one.name,
@@ -74,7 +74,7 @@ def _played(measured: RealReturns, world: BulletWorld, effort: Effort, progress:
     """Return the episodes of each policy."""
     scenario = Scenario(world, measured.task, measured.policy, REAL, NoGrounding())
     jobs = [
-        Job(one.parameters, derived_seed(effort.seed, "policy_gap", one.name, number))
+        Job(one.parameters, derive_seed(effort.seed, "policy_gap", one.name, number))
         for one in measured.policies
         for number in range(effort.episodes)
     ]

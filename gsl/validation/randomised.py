@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gsl.grounding.none import NoGrounding
-from gsl.grounding.randomised import RandomisedEffects, randomised
+from gsl.grounding.randomised import RandomisedEffects, randomise
 from gsl.rollout.rollout import Scenario
 from gsl.validation.check import EPISODES, largest_stable
 from gsl.validation.gate import Gate, Passed, examine
@@ -15,7 +15,7 @@ from gsl.validation.gate import Gate, Passed, examine
 def check_randomised(grounding: RandomisedEffects, scenario: Scenario, gate: Gate) -> Passed:
     """Settle the width; of what knows nothing of the real robot there is nothing else to check."""
     bare = replace(scenario, grounding=NoGrounding())
-    worlds = {width: replace(bare, world=randomised(bare.world, grounding, width)) for width in grounding.widths}
+    worlds = {width: replace(bare, world=randomise(bare.world, grounding, width)) for width in grounding.widths}
     width = largest_stable(worlds, gate.parameters, gate.seed_of("width"))
     share = f"{100 * width:.0f} % of the documented ranges"
     gate.console.status(f"drawing from {share}")

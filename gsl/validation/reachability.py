@@ -70,13 +70,13 @@ def reachability(env: Any, grounding: LoadedTransformation, starts: Sequence[Pla
     known = env.layout.numbers(joints)
     changes = np.array([place.seen[place.tick + 1][x] - place.seen[place.tick][x] for place in starts])
     wanted = changes.copy()  # of joints that the models do not know nothing else is expected
-    wanted[:, known] = [_expected(grounding, place, known, env.layout) for place in starts]
+    wanted[:, known] = [_expect(grounding, place, known, env.layout) for place in starts]
     tolerance = FLOOR + TOLERANCE * np.sqrt(np.mean(changes[:, known] ** 2, axis=0))
-    missed = [missed_by(env, place, target, seed)[known] for place, target in zip(starts, wanted, strict=True)]
+    missed = [measure_misses(env, place, target, seed)[known] for place, target in zip(starts, wanted, strict=True)]
     return Reachability(joints, np.mean(np.abs(missed) > tolerance, axis=0), len(starts))
 
 
-def _expected(grounding: LoadedTransformation, place: Place, known: list[int], layout: Layout) -> np.ndarray:
+def _expect(grounding: LoadedTransformation, place: Place, known: list[int], layout: Layout) -> np.ndarray:
     """Return what the forward model expects of the agent's action at a start [rad], shape (len(known),)."""
     history, seen = grounding.forward.history, place.seen[: place.tick + 1]
     senses = Senses(layout, history.sensors)
@@ -86,14 +86,14 @@ def _expected(grounding: LoadedTransformation, place: Place, known: list[int], l
     return grounding.forward.effects(windows(history, position, place.actions[:, known], sensed, ticks))[0]
 
 
-def missed_by(env: Any, place: Place, wanted: np.ndarray, seed: int) -> np.ndarray:
+def measure_misses(env: Any, place: Place, wanted: np.ndarray, seed: int) -> np.ndarray:
     """Return by how much each joint misses its wanted change at best [rad], shape (n_joints,)."""
     x = env.layout["position"]
     before, now = np.zeros(len(wanted)), np.where(wanted > 0.0, PROBE, -PROBE)
-    error = _moved(env, place, before, seed)[x] - place.seen[place.tick][x] - wanted
+    error = _move(env, place, before, seed)[x] - place.seen[place.tick][x] - wanted
     least = np.abs(error)
     for _ in range(STEPS):
-        next_error = _moved(env, place, now, seed)[x] - place.seen[place.tick][x] - wanted
+        next_error = _move(env, place, now, seed)[x] - place.seen[place.tick][x] - wanted
         least = np.minimum(least, np.abs(next_error))
         step = now - before
         slope = np.where(step == 0.0, LEAST, (next_error - error) / np.where(step == 0.0, 1.0, step))
@@ -102,7 +102,7 @@ def missed_by(env: Any, place: Place, wanted: np.ndarray, seed: int) -> np.ndarr
     return least
 
 
-def _moved(env: Any, place: Place, change: np.ndarray, seed: int) -> np.ndarray:
+def _move(env: Any, place: Place, change: np.ndarray, seed: int) -> np.ndarray:
     """Return what is seen one tick after a start whose action is changed [rad], shape (layout.size,)."""
     return next(replay(env, _Changed(change), place, np.random.default_rng(seed), 1))
 

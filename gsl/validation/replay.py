@@ -87,7 +87,7 @@ def replayed(env: BulletEnv, grounding: Grounding, starts: Sequence[Place], seed
     return {tick: _deviations(env.layout, np.array(seen), starts, tick) for tick, seen in ends.items()}
 
 
-def unmoved(layout: Layout, starts: Sequence[Place]) -> dict[int, Deviations]:
+def predict_no_change(layout: Layout, starts: Sequence[Place]) -> dict[int, Deviations]:
     """Return the deviations of a prediction that nothing changes."""
     seen = np.array([place.seen[place.tick] for place in starts])
     return {tick: _deviations(layout, seen, starts, tick) for tick in (1, TICKS)}

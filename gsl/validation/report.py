@@ -62,7 +62,9 @@ class GroundingReport:
         found = [] if group == OFF else [nothing]
         if errors[GROUNDED] > errors[BARE]:
             against = f"{errors[GROUNDED]:.2f}°, without grounding {errors[BARE]:.2f}°"
-            found.append(f"after {TICKS} ticks the joints {_named(group)} are farther from the real ones: {against}")
+            found.append(
+                f"after {TICKS} ticks the joints {_name_group(group)} are farther from the real ones: {against}"
+            )
         return found
 
     @property
@@ -106,7 +108,7 @@ class GroundingReport:
     def by_joint(self) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
         """Return the error of each joint after `TICKS` ticks [deg], by group and simulator."""
         return {
-            _named(group): {
+            _name_group(group): {
                 name: degrees_by_joint(by_ticks[TICKS].joints, self.joints) for name, by_ticks in sims.items()
             }
             for group, sims in self.deviations.items()
@@ -115,7 +117,7 @@ class GroundingReport:
     def rows(self) -> list[tuple[str, ...]]:
         """Return a table for people; its titles are `TITLES`."""
         return [
-            (_named(group), name.replace("_", " "), *_cells(by_ticks[1]), *_cells(by_ticks[TICKS]))
+            (_name_group(group), name.replace("_", " "), *_cells(by_ticks[1]), *_cells(by_ticks[TICKS]))
             for group, simulators in self.deviations.items()
             for name, by_ticks in simulators.items()
         ]
@@ -140,7 +142,7 @@ def _cells(one: Deviations) -> tuple[str, str, str]:
     return f"{degrees(one.joints):.2f}", f"{degrees(one.pitch):.2f}", f"{one.forward_mm:.1f}"
 
 
-def _named(group: str) -> str:
+def _name_group(group: str) -> str:
     return "of π0" if group == PI0 else "off π0"
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from gsl.core.console import Console
 from gsl.core.interfaces import Grounding
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.setting import setting
 from gsl.grounding.effects import DiagnosedEffects, innermost
 from gsl.grounding.servo import LearnedServo
@@ -62,7 +62,7 @@ def screen(
     with console.progress(len(policies) * count, "walking the winners in simulation") as progress:
 
         def count_falls(names: Sequence[str], numbers: range) -> dict[str, int]:
-            jobs = [Job(policies[name], derived_seed(seed, "screening", name, n)) for name in names for n in numbers]
+            jobs = [Job(policies[name], derive_seed(seed, "screening", name, n)) for name in names for n in numbers]
             fell = [episode.fell for episode in episodes(scenario, jobs, workers=workers, progress=progress)]
             return {name: sum(fell[k * len(numbers) : (k + 1) * len(numbers)]) for k, name in enumerate(names)}
 

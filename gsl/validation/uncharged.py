@@ -12,7 +12,7 @@ from gsl.worlds.control_cost import FREE, KEYS
 _PRICE = "'{_target_: gsl.worlds.control_cost.Quadratic, weight: 0.1}'"
 
 
-def uncharged(world: Any) -> bool:
+def is_uncharged(world: Any) -> bool:
     """Whether nobody knows what a world's reward charges for an action, so that a grounded or noisy one is charged."""
     if not world.layout.states or world.layout.choices or getattr(world, "control_cost", None) is not None:
         return False
@@ -27,7 +27,7 @@ def uncharged(world: Any) -> bool:
 
 def warn_uncharged(world: Any, console: Console, role: str, what: str) -> None:
     """Warn where the reward of a world that plays `role` may charge for `what` instead of the agent's action."""
-    if uncharged(world):
+    if is_uncharged(world):
         advice = f"{role}.control_cost={_PRICE} says what it charges, weight: 0 that it does not"
         alone = "world.control_cost in a command of one world"
         console.status(f"warning: the reward may charge for {what} instead of the agent's action; {advice} ({alone})")

@@ -10,7 +10,7 @@ import numpy as np
 
 from gsl.core.interfaces import Grounding, GroundingRun
 from gsl.core.layout import Layout
-from gsl.core.seeds import derived_seed
+from gsl.core.seeds import derive_seed
 from gsl.core.statistics import Interval, difference_interval, mean_interval
 from gsl.core.trajectory import Trajectory
 from gsl.core.unit import Unit
@@ -138,6 +138,6 @@ def value_report(
 
 def _episodes(scenario: Scenario, parameters: np.ndarray, seed: int) -> list[Trajectory]:
     env = scenario.make()
-    done = [rollout(scenario, env, parameters, derived_seed(seed, index)) for index in range(EPISODES)]
+    done = [rollout(scenario, env, parameters, derive_seed(seed, index)) for index in range(EPISODES)]
     env.close()
     return done

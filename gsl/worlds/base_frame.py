@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 
 
 class BaseMotion(NamedTuple):
@@ -25,7 +25,7 @@ class BaseMotion(NamedTuple):
     gyro: np.ndarray
 
 
-@compiled
+@compile_kernel
 def base_motion(
     axes: np.ndarray,
     com: np.ndarray,

@@ -14,11 +14,11 @@ from typing import Annotated, Any
 import gymnasium
 import numpy as np
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.layout import Layout
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
-from gsl.effects.effect import applied, built, own, use_own
+from gsl.effects.effect import apply_all, build, own, use_own
 from gsl.errors import ConfigError, GslError
 from gsl.models.servo import having_servo
 from gsl.models.servo_file import read_servo, servo_file
@@ -61,7 +61,7 @@ class BulletWorld:
         if self.servo_member and self.servo is None:
             raise ConfigError("servo_member", "is of a learned servo; name one by servo", given=str(self.servo_member))
         if self.motors != "servo":
-            check_motors(nominal(robot(self.robot)), built(self.effects))
+            check_motors(nominal(robot(self.robot)), build(self.effects))
             if self.servo is not None:
                 raise ConfigError("servo", "acts on torques; velocity motors have none", given=self.servo)
 
@@ -73,7 +73,7 @@ class BulletWorld:
     @cached_property
     def plant(self) -> Plant:
         """The robot with its effects and its learned servo."""
-        plant = applied(nominal(robot(self.robot)), built(self.effects))
+        plant = apply_all(nominal(robot(self.robot)), build(self.effects))
         if self.servo is None:
             return plant
         return having_servo(plant, read_servo(self.servo, self.servo_member), self.servo)
@@ -117,7 +117,7 @@ class BulletEnv(gymnasium.Env):
     def __init__(self, world: BulletWorld, plant: Plant | None = None, host: BulletEnv | None = None) -> None:
         self.world, self.layout, self._host = world, world.layout, host
         self._plant = plant or world.plant
-        self._robot = lumped(self._plant.robot)
+        self._robot = lump(self._plant.robot)
         self._drive, self._n = self._robot.drive, len(self._robot.controlled)
         low, high = np.array([self._robot.commanded(name) for name in self._robot.controlled]).T
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)

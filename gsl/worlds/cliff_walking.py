@@ -52,15 +52,15 @@ class CliffWalking(gymnasium.Env):
         if self.np_random.random() < self.noise:
             action = int(self.np_random.integers(len(MOVES)))
         self._steps += 1
-        self._state, reward, ended = _moved(self._state, int(action))
+        self._state, reward, ended = _move(self._state, int(action))
         return self._state, reward, ended, self._steps >= LONGEST, {}
 
     def _outcomes(self, state: int, action: int) -> list[Outcome]:
         chances = self.noise / len(MOVES) + (1.0 - self.noise) * np.eye(len(MOVES))[action]
-        return [(float(chance), *_moved(state, move)) for move, chance in enumerate(chances) if chance > 0.0]
+        return [(float(chance), *_move(state, move)) for move, chance in enumerate(chances) if chance > 0.0]
 
 
-def _moved(state: int, action: int) -> tuple[int, float, bool]:
+def _move(state: int, action: int) -> tuple[int, float, bool]:
     """Return where a move leads, what it is worth, and whether that is an end."""
     row, column = divmod(state, COLUMNS)
     down, right = MOVES[action]

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.worlds import bullet_c as c
 from gsl.worlds.rotor import Rotors, compensation
 from gsl.worlds.servo import servo_torque
@@ -89,7 +89,7 @@ def first_memory(servo: ServoState, loads: int = 0) -> Memory:
     )
 
 
-@compiled
+@compile_kernel
 def torques(drive: Drive, memory: Memory, turn: np.ndarray, k: int, step: float, period: float) -> None:
     """Fill in the torques of one physics step, given motion and spin (world axes).
 
@@ -118,7 +118,7 @@ def torques(drive: Drive, memory: Memory, turn: np.ndarray, k: int, step: float,
         memory.push[k] = wanted[0] * axes[0, k] + wanted[1] * axes[1, k] + wanted[2] * axes[2, k]
 
 
-@compiled
+@compile_kernel
 def in_c(
     handle: int, body: int, places: np.ndarray, floating: bool, substeps: int, step: float, period: float,
     drive: Drive, memory: Memory, turn: np.ndarray,
@@ -151,7 +151,7 @@ def in_c(
         c.submit(handle, c.step_simulation(handle))
 
 
-@compiled
+@compile_kernel
 def read_joints(handle: int, body: int, places: np.ndarray, motion: np.ndarray, spin: np.ndarray) -> None:
     """Read the state by Bullet's C interface.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import where
 
 TOOTH_STIFFNESS = 300.0  # of the gear teeth in contact, if there is play [N·m/rad]: an estimate
@@ -14,8 +14,8 @@ SUBSTEPS = 8
 DAMPING = 0.2  # of the teeth or the spring, as a share of sqrt(stiffness · inertia)
 
 
-@compiled
-def limited(u: float, v: float, bound: float, no_load: float) -> float:
+@compile_kernel
+def limit_torque(u: float, v: float, bound: float, no_load: float) -> float:
     """Return a motor's torque [N·m] within its limit and, where it drives the motion, below its speed line.
 
     Args:
@@ -30,7 +30,7 @@ def limited(u: float, v: float, bound: float, no_load: float) -> float:
     return min(high, max(-low, u))
 
 
-@compiled
+@compile_kernel
 def through_gear(
     rotor: np.ndarray, i: int, motion: np.ndarray, u: float, bound: float, no_load: float, inertia: float,
     play: float, compliance: float, step: float,
@@ -61,7 +61,7 @@ def through_gear(
         push = stiffness * bent + damping * (speed - v)
         if play > 0.0:
             push = where(bent > 0.0, max(0.0, push), where(bent < 0.0, min(0.0, push), 0.0))
-        drive = limited(u, speed, bound, no_load)
+        drive = limit_torque(u, speed, bound, no_load)
         speed += h * (drive - push) / inertia
         angle += h * speed
         passed += push / SUBSTEPS

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 
 REMEMBERED = 128  # physics steps: the longest sensor delay
 
 
-@compiled
-def seen(delay: float, history: np.ndarray, count: int, now: float, row: int, i: int, step: float) -> float:
+@compile_kernel
+def read_encoder(delay: float, history: np.ndarray, count: int, now: float, row: int, i: int, step: float) -> float:
     """Return what an encoder tells, linear between the physics steps and so continuous in its delay.
 
     Args:
@@ -30,7 +30,7 @@ def seen(delay: float, history: np.ndarray, count: int, now: float, row: int, i:
     return (1.0 - share) * newer + share * older
 
 
-@compiled
+@compile_kernel
 def first_history(motion: np.ndarray, step: float) -> np.ndarray:
     """Return the history of joints that have moved at constant speed, shape (REMEMBERED, 2, n_motors).
 
@@ -43,7 +43,7 @@ def first_history(motion: np.ndarray, step: float) -> np.ndarray:
     return history
 
 
-@compiled
+@compile_kernel
 def fill_history(history: np.ndarray, motion: np.ndarray, step: float) -> None:
     """Write the same into a given array; floats or lanes."""
     for k in range(REMEMBERED):

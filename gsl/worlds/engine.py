@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant
 from gsl.core.scratch import Scratch
 from gsl.robots.urdf import principal_axes, urdf
@@ -20,10 +20,10 @@ from gsl.worlds.bullet_c import NO_HANDLE, client_handle
 from gsl.worlds.control_period import Drive, first_memory, in_c, in_python, read_joints
 from gsl.worlds.ground import PLANE, lay
 from gsl.worlds.physics import Load, Physics, Reading
-from gsl.worlds.pushes import aimed, apply_push, overlap
-from gsl.worlds.rotor import carried_inertia, rotors
+from gsl.worlds.pushes import aim, apply_push, overlap
+from gsl.worlds.rotor import carry_inertia, rotors
 from gsl.worlds.servo import encoder_motion
-from gsl.worlds.servo_state import ROTOR, first_state, packed
+from gsl.worlds.servo_state import ROTOR, first_state, pack
 from gsl.worlds.velocity_motors import VelocityMotors
 
 NOTHING = -1  # Bullet's number of a robot that is not loaded yet
@@ -60,19 +60,19 @@ class Engine:
             self.bullet, self.hosted = pybullet, host is not None
             self.client: int = pybullet.connect(pybullet.DIRECT) if host is None else host.client
         self.body = NOTHING
-        self.plant, self.physics, self.robot = plant, physics, lumped(plant.robot)
+        self.plant, self.physics, self.robot = plant, physics, lump(plant.robot)
         self.handle = client_handle(pybullet.__file__, self.client)
-        servo = packed(plant.servo, plant.robot.supply_voltage, plant.law)
+        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law)
         apart, moved = servo.rows[ROTOR], physics.motors == "servo"
         armature = plant.servo.armature - apart if moved else np.zeros(len(apart))
         self._motors = None if moved else VelocityMotors.of(plant, servo.rows)
         rotor = rotors(self.robot, armature, floating=physics.floating, apart=apart)
-        self._loaded = _heavier(self.robot, carried_inertia(self.robot, rotor.carried))
+        self._loaded = _heavier(self.robot, carry_inertia(self.robot, rotor.carried))
         self._inertia = {name: principal_axes(link.inertia)[0].tolist() for name, link in self._loaded.links.items()}
         base = self._loaded.links[self.robot.base]
         axes = np.ascontiguousarray(principal_axes(base.inertia)[1])
         self._drive, self._base_com = Drive.of(servo, rotor, axes), base.com
-        self._pushes = aimed(plant, self._loaded)
+        self._pushes = aim(plant, self._loaded)
         self._link_from_inertial = Rotation.from_matrix(axes.T).as_quat().tolist()
         self._folder = Scratch()
         for name, text in (("robot", urdf(self._loaded, visuals=False)), ("ground", PLANE)):

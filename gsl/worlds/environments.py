@@ -22,7 +22,7 @@ _log = logging.getLogger("gsl")
 _INSTALLED = (*(Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib")), PACKAGE)
 
 
-def made(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
+def make_environment(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
     """Return a registered environment, or an instance of an importable class.
 
     Raises:

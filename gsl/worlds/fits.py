@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant
 from gsl.errors import ConfigError
 from gsl.worlds.encoder import REMEMBERED
@@ -54,7 +54,7 @@ def check_base(robot: Robot, *, floating: bool) -> None:
     Raises:
         ConfigError: if it would have to.
     """
-    if floating and (lumped(robot).links[robot.base].mass <= 0.0 or not robot.feet):
+    if floating and (lump(robot).links[robot.base].mass <= 0.0 or not robot.feet):
         raise ConfigError("floating", f"the {robot.name} has no feet to stand on; say floating=false", given="true")
 
 

@@ -22,7 +22,7 @@ from gsl.core.setting import component, setting
 from gsl.core.table import Table
 from gsl.errors import ConfigError, GslError
 from gsl.worlds.control_cost import Charged, ControlCost
-from gsl.worlds.environments import line, made, own_module
+from gsl.worlds.environments import line, make_environment, own_module
 from gsl.worlds.mujoco import change_masses
 
 _STREAM = 11  # sets the noise on actions apart from the environment's own randomness, whose seed is the same
@@ -116,7 +116,7 @@ class StateEnv(gymnasium.Env):
 
     def __init__(self, world: GymnasiumWorld) -> None:
         self.world = world
-        env = made(world.env_id, world.kwargs)
+        env = make_environment(world.env_id, world.kwargs)
         if world.mass:
             change_masses(env, world.mass)
         self.charged: Charged | None = None

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.body import Robot, carrier
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
 from gsl.core.plant import Plant, Push
 from gsl.core.servo_law import HIDDEN, LAYERS
@@ -21,7 +21,7 @@ from gsl.worlds.chain import COLUMNS, Chain, Pushed, accelerate, chain
 from gsl.worlds.encoder import REMEMBERED
 from gsl.worlds.pushes import acting
 from gsl.worlds.servo import encoder_motion, servo_torque
-from gsl.worlds.servo_state import COMMANDS, MEMORY, ROTOR, SPEED, ServoParameters, ServoState, packed, settle
+from gsl.worlds.servo_state import COMMANDS, MEMORY, ROTOR, SPEED, ServoParameters, ServoState, pack, settle
 
 RUNAWAY = 1e3  # speed at which a replay has no meaning any more [rad/s]
 
@@ -94,8 +94,8 @@ class Held:
             ConfigError: It has a torque hook, which only Bullet calls.
         """
         refuse_hook(plant)
-        servo = packed(plant.servo, plant.robot.supply_voltage, plant.law)
-        pushes = [row for push in plant.pushes for row in _aimed(push, plant.robot)]
+        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law)
+        pushes = [row for push in plant.pushes for row in _aim(push, plant.robot)]
         tree = chain(plant, plant.servo.armature - servo.rows[ROTOR])
         return cls(servo, tree, np.array(pushes).reshape(-1, 9), plant.sensors.bias, step, period, accurate)
 
@@ -151,14 +151,14 @@ def _around(path: np.ndarray, before: int, after: int) -> np.ndarray:
     return np.concatenate([np.repeat(path[:1], before, axis=0), path, np.repeat(path[-1:], after, axis=0)])
 
 
-def _aimed(push: Push, robot: Robot) -> list[tuple[float, ...]]:
+def _aim(push: Push, robot: Robot) -> list[tuple[float, ...]]:
     """Return the row of a push, none if it is at the base, which is held."""
     link, point = carrier(robot, push.link, robot.links[push.link].com)
     motors = [k for k, name in enumerate(robot.motors) if robot.joint(name).child == link]
     return [(k, push.start, push.end, *push.force, *point) for k in motors]
 
 
-@compiled
+@compile_kernel
 def _replay(
     servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, step: float,
     substeps: int, accurate: bool, told: np.ndarray,
@@ -167,7 +167,7 @@ def _replay(
         _side_by_side(servo, tree, pushes, load, windows, first, step, substeps, accurate, told)
 
 
-@compiled
+@compile_kernel
 def _side_by_side(
     servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, first: int,
     step: float, substeps: int, accurate: bool, told: np.ndarray,
@@ -201,7 +201,7 @@ def _side_by_side(
         state.clock[0] += substeps * step
 
 
-@compiled
+@compile_kernel
 def _step(
     servo: ServoParameters, state: ServoState, tree: Chain, pushes: np.ndarray, load: np.ndarray, motion: np.ndarray,
     step: float, substeps: int, scratch: Scratch,
@@ -214,7 +214,7 @@ def _step(
             motion[0, i] += step * motion[1, i]
 
 
-@compiled
+@compile_kernel
 def _leap(
     servo: ServoParameters, state: ServoState, tree: Chain, pushes: np.ndarray, load: np.ndarray, motion: np.ndarray,
     step: float, substeps: int, scratch: Scratch,
@@ -244,7 +244,7 @@ def _leap(
     state.steps[1] = 1
 
 
-@compiled
+@compile_kernel
 def _accelerate(
     servo: ServoParameters, state: ServoState, tree: Chain, pushes: np.ndarray, load: np.ndarray, motion: np.ndarray,
     start: float, length: float, row: int, period: float, scratch: Scratch,
@@ -258,7 +258,7 @@ def _accelerate(
     accelerate(tree, motion, scratch.pushed, scratch.torque, scratch.work, scratch.matrix)
 
 
-@compiled
+@compile_kernel
 def _fill(windows: Windows, first: int, motion: np.ndarray, commands: np.ndarray, clock: np.ndarray) -> None:
     """Write windows into lanes; lanes that are left over get the last window once more."""
     for lane in range(LANES):
@@ -271,7 +271,7 @@ def _fill(windows: Windows, first: int, motion: np.ndarray, commands: np.ndarray
                 commands[k, i, lane] = windows.commands[w, k, i]
 
 
-@compiled
+@compile_kernel
 def _push(pushes: np.ndarray, time: float, step: float, force: np.ndarray) -> None:
     """Fill in the forces of one physics step."""
     for j in range(len(pushes)):
@@ -280,7 +280,7 @@ def _push(pushes: np.ndarray, time: float, step: float, force: np.ndarray) -> No
             force[j, k] = share * pushes[j, 3 + k]
 
 
-@compiled
+@compile_kernel
 def _note(speeds: np.ndarray, position: np.ndarray, told: np.ndarray, t: int) -> bool:
     """Write down the positions of replays that have not run away, now or before, and tell whether there are any."""
     some = False

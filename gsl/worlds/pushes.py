@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from gsl.core.body import Robot, carrier
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import where
 from gsl.core.plant import Plant, Push
 from gsl.robots.urdf import principal_axes
@@ -28,14 +28,14 @@ class Aimed(NamedTuple):
     point: Sequence[float]
 
 
-def aimed(plant: Plant, loaded: Robot) -> tuple[Aimed, ...]:
+def aim(plant: Plant, loaded: Robot) -> tuple[Aimed, ...]:
     """Find where the pushes of a plant act on the robot as it is loaded.
 
     Args:
         plant: Its robot may have fixed joints.
         loaded: The same robot without them, with the inertias that Bullet gets.
     """
-    return tuple(_aimed(push, plant.robot, loaded) for push in plant.pushes)
+    return tuple(_aim(push, plant.robot, loaded) for push in plant.pushes)
 
 
 def overlap(push: Push, time: float, step: float) -> float:
@@ -49,7 +49,7 @@ def overlap(push: Push, time: float, step: float) -> float:
     return acting(push.start, push.end, time, step)
 
 
-@compiled
+@compile_kernel
 def acting(start: float, end: float, time: float, step: float) -> float:
     """Return the same given start and end of the push [s]; `time` may be lanes."""
     share = (min(end, time + step) - max(start, time)) / step
@@ -68,7 +68,7 @@ def apply_push(bullet: Any, client: int, body: int, links: Mapping[str, int], pu
     bullet.applyExternalForce(body, number, force, place, bullet.WORLD_FRAME, client)
 
 
-def _aimed(push: Push, robot: Robot, loaded: Robot) -> Aimed:
+def _aim(push: Push, robot: Robot, loaded: Robot) -> Aimed:
     name, point = carrier(robot, push.link, robot.links[push.link].com)
     link = loaded.links[name]
     return Aimed(push, name, (principal_axes(link.inertia)[1].T @ (point - link.com)).tolist())

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsl.core.body import Robot
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.dynamics import forward_kinematics, mass_matrix
 
 LINK_SHARE = 0.5  # of the rotor inertia that the link carries
@@ -64,7 +64,7 @@ def rotors(robot: Robot, armature: np.ndarray, *, floating: bool, apart: np.ndar
         apart: Further rotor inertia, which turns on its own behind play or a spring [kg·m²], shape (n_motors,).
     """
     carried = LINK_SHARE * (armature + apart)
-    surplus = _carried_matrix(robot, carried) - np.diag(np.r_[np.zeros(3), armature])
+    surplus = _carry_matrix(robot, carried) - np.diag(np.r_[np.zeros(3), armature])
     return Rotors(
         carried,
         np.asarray(armature, dtype=float),
@@ -75,13 +75,13 @@ def rotors(robot: Robot, armature: np.ndarray, *, floating: bool, apart: np.ndar
     )
 
 
-def carried_inertia(robot: Robot, carried: np.ndarray) -> Mapping[str, np.ndarray]:
+def carry_inertia(robot: Robot, carried: np.ndarray) -> Mapping[str, np.ndarray]:
     """Return what is added to each link's inertia tensor [kg·m²], in link axes, by link."""
     joints = [robot.joint(name) for name in robot.motors]
     return {joint.child: value * np.outer(joint.axis, joint.axis) for joint, value in zip(joints, carried, strict=True)}
 
 
-@compiled
+@compile_kernel
 def compensation(
     parent: np.ndarray,
     order: np.ndarray,
@@ -122,7 +122,7 @@ def compensation(
             speed += work[i, 9 + k] * work[i, 12 + k]
         for k in range(3):
             momentum = carried[i] * speed * work[i, 9 + k]
-            work[i, 15 + k] = (momentum - memory[2 + k, 3 + i]) / step + carried[i] * speed * _turned(spin, work[i], k)
+            work[i, 15 + k] = (momentum - memory[2 + k, 3 + i]) / step + carried[i] * speed * _turn(spin, work[i], k)
             memory[2 + k, 3 + i] = momentum
         wanted[3 + i] = -armature[i] * (motion[1, i] - memory[1, 3 + i]) / step
         memory[1, 3 + i] = motion[1, i]
@@ -150,14 +150,14 @@ def compensation(
         torque[i] += memory[0, 3 + i]
 
 
-@compiled
-def _turned(spin: np.ndarray, row: np.ndarray, k: int) -> float:
+@compile_kernel
+def _turn(spin: np.ndarray, row: np.ndarray, k: int) -> float:
     """Component k of spin x axis: base axes turn with the base."""
     first, second = (k + 1) % 3, (k + 2) % 3
     return float(spin[first] * row[9 + second] - spin[second] * row[9 + first])
 
 
-@compiled
+@compile_kernel
 def _place(
     work: np.ndarray, above: int, i: int, axis: np.ndarray, angle: float, speed: float, spin: np.ndarray
 ) -> None:
@@ -185,7 +185,7 @@ def _place(
 def _newton_gain(robot: Robot, carried: np.ndarray, surplus: np.ndarray, *, floating: bool) -> np.ndarray:
     whole = mass_matrix(robot, robot.stance)
     used = np.r_[0:3, 6 : len(whole)]
-    whole[np.ix_(used, used)] += _carried_matrix(robot, carried)
+    whole[np.ix_(used, used)] += _carry_matrix(robot, carried)
     if floating:
         mobility = np.linalg.inv(whole)[np.ix_(used, used)]
     else:
@@ -194,7 +194,7 @@ def _newton_gain(robot: Robot, carried: np.ndarray, surplus: np.ndarray, *, floa
     return np.linalg.inv(np.eye(len(surplus)) - surplus @ mobility)
 
 
-def _carried_matrix(robot: Robot, carried: np.ndarray) -> np.ndarray:
+def _carry_matrix(robot: Robot, carried: np.ndarray) -> np.ndarray:
     """E in the robot's stance for (base angular velocity, motor velocities): sum of carried (axis · spin)²."""
     frames, total = forward_kinematics(robot, robot.stance), np.zeros((3 + len(carried),) * 2)
     for i, name in enumerate(robot.motors):

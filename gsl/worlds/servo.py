@@ -20,12 +20,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import where
 from gsl.core.servo import ROW
 from gsl.core.servo_law import LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, act, network
-from gsl.worlds.drive_train import limited, through_gear
-from gsl.worlds.encoder import REMEMBERED, seen
+from gsl.worlds.drive_train import limit_torque, through_gear
+from gsl.worlds.encoder import REMEMBERED, read_encoder
 from gsl.worlds.servo_state import (
     BENT,
     COMMANDS,
@@ -53,7 +53,7 @@ BRISTLE = 1e-3  # deflection at which dry friction slips [rad]: below an encoder
 STOP_STIFFNESS, STOP_DAMPING = 500.0, 2.0  # of a hard stop [N·m/rad], [N·m·s/rad]: stable at 2 ms with our rotors
 
 
-@compiled
+@compile_kernel
 def servo_torque(
     servos: ServoParameters,
     state: ServoState,
@@ -66,7 +66,7 @@ def servo_torque(
     """Fill `torque` [N·m] for one physics step and move `state` on.
 
     Args:
-        servos: From `packed`.
+        servos: From `pack`.
         state: Changed in place, but for `commands` and the time, which are the caller's.
         motion: Positions [rad] then velocities [rad/s] at the output, shape (2, n_motors).
         elapsed: Time since the newest command was issued [s].
@@ -75,17 +75,17 @@ def servo_torque(
         torque: Result, shape (n_motors,).
     """
     parameters = servos.rows
-    current = drawn_current(parameters, state.memory)
+    current = compute_current(parameters, state.memory)
     for i in range(motion.shape[1]):
-        error, q, v = sensed_error(parameters, state, i, motion, elapsed, step, period)
-        u, output = wanted_torque(servos, state, i, motion, error, q, v, elapsed, step, period)
+        error, q, v = sense_error(parameters, state, i, motion, elapsed, step, period)
+        u, output = compute_wanted_torque(servos, state, i, motion, error, q, v, elapsed, step, period)
         supply = supply_share(parameters, i, current)
         torque[i] = output_torque(parameters, state.memory, i, motion, u, output, supply, step)
     state.steps[0] += 1
 
 
-@compiled
-def drawn_current(parameters: np.ndarray, memory: np.ndarray) -> float:
+@compile_kernel
+def compute_current(parameters: np.ndarray, memory: np.ndarray) -> float:
     """Return the current of all motors at the last physics step [A]."""
     current = 0.0
     for i in range(memory.shape[1]):
@@ -93,57 +93,60 @@ def drawn_current(parameters: np.ndarray, memory: np.ndarray) -> float:
     return current
 
 
-@compiled
+@compile_kernel
 def supply_share(parameters: np.ndarray, i: int, current: float) -> float:
     """Return the share of the supply's voltage that is left at a current of all motors [A]."""
     return max(1e-3, 1.0 - parameters[SAG, i] * current)
 
 
-@compiled
-def sensed_error(
+@compile_kernel
+def sense_error(
     parameters: np.ndarray, state: ServoState, i: int, motion: np.ndarray, elapsed: float, step: float, period: float
 ) -> tuple[float, float, float]:
     """Return motor i's control error [rad], and position [rad] and velocity [rad/s] as its servo sees them."""
     count = state.steps[0]
-    target = delayed(state.commands, i, (elapsed - parameters[ROW.delay, i]) / period, step / period)
-    target = shaped(parameters, state.memory, i, target, step)
-    q, v = _measured(parameters, state.memory, i, motion)
+    target = delay_command(state.commands, i, (elapsed - parameters[ROW.delay, i]) / period, step / period)
+    target = shape_target(parameters, state.memory, i, target, step)
+    q, v = _measure(parameters, state.memory, i, motion)
     if parameters[ROW.sensor_delay, i] > 0.0:
         delay, now, whole = parameters[ROW.sensor_delay, i], (q, v), step * state.steps[1]
-        q, v = seen(delay, state.history, count, q, 0, i, whole), seen(delay, state.history, count, v, 1, i, whole)
+        q, v = (
+            read_encoder(delay, state.history, count, q, 0, i, whole),
+            read_encoder(delay, state.history, count, v, 1, i, whole),
+        )
         for row in range(2):
             state.history[count % REMEMBERED, row, i] = now[row]
     return target + parameters[ROW.offset, i] - q, q, v
 
 
-@compiled
-def kept_gain(parameters: np.ndarray, state: ServoState, i: int, elapsed: float) -> float:
+@compile_kernel
+def compute_gain(parameters: np.ndarray, state: ServoState, i: int, elapsed: float) -> float:
     """Return motor i's proportional gain after what time has taken of it [N·m/rad]."""
     fade = max(0.0, 1.0 - parameters[ROW.fade, i] * max(0.0, state.clock[0] + elapsed))
     return fade * parameters[ROW.kp, i]
 
 
-@compiled
-def wanted_torque(
+@compile_kernel
+def compute_wanted_torque(
     servos: ServoParameters, state: ServoState, i: int, motion: np.ndarray, error: float, q: float, v: float,
     elapsed: float, step: float, period: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the torque that motor i's servo wants and what a learned law adds at the output [N·m]."""
     parameters = servos.rows
     error -= min(parameters[ROW.deadband, i], max(-parameters[ROW.deadband, i], error))
-    u, output = kept_gain(parameters, state, i, elapsed) * error - parameters[ROW.kd, i] * v, 0.0 * v
+    u, output = compute_gain(parameters, state, i, elapsed) * error - parameters[ROW.kd, i] * v, 0.0 * v
     if parameters[GROUP, i] != NOBODY:
         since = elapsed - parameters[ROW.delay, i]
         for k in range(LAGS):
-            lagged = delayed(state.commands, i, (since - LAG * k) / period, step / period)
+            lagged = delay_command(state.commands, i, (since - LAG * k) / period, step / period)
             state.layers[0, k] = parameters[STIFFNESS, i] * (lagged + parameters[ROW.offset, i] - q)
-        drive, output = _learned(parameters, servos.weights, state.memory, i, motion[1, i], step, state.layers)
+        drive, output = _evaluate_law(parameters, servos.weights, state.memory, i, motion[1, i], step, state.layers)
         u += drive
     return u, output
 
 
-@compiled
-def _learned(
+@compile_kernel
+def _evaluate_law(
     parameters: np.ndarray, weights: np.ndarray, memory: np.ndarray, i: int, v: float, step: float, layers: np.ndarray
 ) -> tuple[float, float]:
     """Return what motor i's law adds before the torque limit and behind it [N·m], errors being in `layers` already."""
@@ -157,30 +160,30 @@ def _learned(
     return parameters[TORQUE, i] * drive, parameters[TORQUE, i] * output
 
 
-@compiled
+@compile_kernel
 def encoder_motion(
     servos: ServoParameters, state: ServoState, motion: np.ndarray, step: float, told: np.ndarray
 ) -> None:
     """Fill `told` with what the encoders tell between two physics steps, given the outputs', both (2, n_motors)."""
     parameters = servos.rows
     for i in range(motion.shape[1]):
-        told[0, i], told[1, i] = _measured(parameters, state.memory, i, motion)
+        told[0, i], told[1, i] = _measure(parameters, state.memory, i, motion)
         if parameters[ROW.sensor_delay, i] > 0.0:
             for row in range(2):
                 now, delay = told[row, i], parameters[ROW.sensor_delay, i]
-                told[row, i] = seen(delay, state.history, state.steps[0], now, row, i, step)
+                told[row, i] = read_encoder(delay, state.history, state.steps[0], now, row, i, step)
 
 
-@compiled
-def _measured(parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndarray) -> tuple[float, float]:
+@compile_kernel
+def _measure(parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndarray) -> tuple[float, float]:
     """Return position [rad] and velocity [rad/s] at the encoder now."""
     if parameters[ROW.motor_encoder, i] * parameters[ROTOR, i] > 0.0:
         return memory[ROTOR_ANGLE, i], memory[ROTOR_SPEED, i]
     return motion[0, i], motion[1, i]
 
 
-@compiled
-def delayed(commands: np.ndarray, i: int, start: float, length: float) -> float:
+@compile_kernel
+def delay_command(commands: np.ndarray, i: int, start: float, length: float) -> float:
     """Mean of a delayed, held command over one physics step: continuous in the delay.
 
     Args:
@@ -196,8 +199,8 @@ def delayed(commands: np.ndarray, i: int, start: float, length: float) -> float:
     return (1.0 - newer) * commands[index, i] + newer * commands[index - 1, i]
 
 
-@compiled
-def shaped(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, step: float) -> float:
+@compile_kernel
+def shape_target(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, step: float) -> float:
     """Filter and round a target [rad]."""
     if parameters[ROW.smoothing, i] > 0.0:
         memory[SMOOTHED, i] += (1.0 - np.exp(-step / parameters[ROW.smoothing, i])) * (target - memory[SMOOTHED, i])
@@ -206,7 +209,7 @@ def shaped(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, st
     return quantum * np.rint(target / quantum) if quantum > 0.0 else target
 
 
-@compiled
+@compile_kernel
 def output_torque(
     parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndarray, u: float, output: float, supply: float,
     step: float,
@@ -229,7 +232,7 @@ def output_torque(
         limit = parameters[ROW.limit, i]
         u = min(limit, max(-limit, u))
         u *= 1.0 - parameters[ROW.duty_loss, i] * abs(u) / limit
-    drive = limited(u, v, bound, no_load)
+    drive = limit_torque(u, v, bound, no_load)
     through = drive
     if parameters[ROTOR, i] > 0.0:
         through = through_gear(
@@ -243,7 +246,7 @@ def output_torque(
     )
 
 
-@compiled
+@compile_kernel
 def _dry(parameters: np.ndarray, memory: np.ndarray, i: int, v: float, through: float, step: float) -> float:
     size, stribeck, load = parameters[ROW.coulomb, i], parameters[ROW.stribeck, i], parameters[ROW.load_friction, i]
     if size == 0.0 and stribeck == 0.0 and load == 0.0:
@@ -260,7 +263,7 @@ def _dry(parameters: np.ndarray, memory: np.ndarray, i: int, v: float, through: 
     return where(free, 0.0, size * bent / BRISTLE)
 
 
-@compiled
+@compile_kernel
 def _stop(beyond: float, v: float) -> float:
     """Return the torque of a stop that only pushes back [N·m], `beyond` it [rad] at speed v away from it."""
     return where(beyond > 0.0, -max(0.0, STOP_STIFFNESS * beyond + STOP_DAMPING * v), 0.0)

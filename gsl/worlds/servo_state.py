@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.servo import ROW, Servo
 from gsl.core.servo_law import HIDDEN, LAYERS, ServoLaw, no_law, weights
 from gsl.worlds.drive_train import ROTOR_SHARE, STIFFEST
@@ -55,7 +55,7 @@ class ServoState(NamedTuple):
     layers: np.ndarray
 
 
-def packed(servo: Servo, supply_voltage: float, law: ServoLaw | None = None) -> ServoParameters:
+def pack(servo: Servo, supply_voltage: float, law: ServoLaw | None = None) -> ServoParameters:
     """Return the parameters as the kernel reads them.
 
     Args:
@@ -95,7 +95,7 @@ def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: fl
     )
 
 
-@compiled
+@compile_kernel
 def settle(memory: np.ndarray, history: np.ndarray, motion: np.ndarray, target: np.ndarray, step: float) -> None:
     """Write what settled servos remember, the rest of the memory being zero; floats or lanes.
 

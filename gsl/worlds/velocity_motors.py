@@ -18,12 +18,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.plant import Plant
 from gsl.core.servo import ROW, Servo
 from gsl.effects.effect import Effect, name_of
 from gsl.errors import ConfigError
-from gsl.worlds.servo import delayed, shaped
+from gsl.worlds.servo import delay_command, shape_target
 from gsl.worlds.servo_state import ServoState
 
 Motors = Literal["servo", "velocity"]
@@ -77,7 +77,7 @@ class VelocityMotors:
             bullet.stepSimulation(client)
 
 
-@compiled
+@compile_kernel
 def ask_speed(
     parameters: np.ndarray, state: ServoState, position: np.ndarray, fastest: np.ndarray, period: float,
     speed: np.ndarray,
@@ -85,7 +85,7 @@ def ask_speed(
     """Fill `speed` [rad/s] for one control period and move the filters of `state` on.
 
     Args:
-        parameters: From `servo.packed`.
+        parameters: From `servo_state.pack`.
         state: Its newest command is issued now.
         position: Of the joints now [rad], shape (n_motors,).
         fastest: Greatest speed [rad/s], shape (n_motors,).
@@ -93,8 +93,8 @@ def ask_speed(
         speed: Result, shape (n_motors,).
     """
     for i in range(len(position)):
-        target = delayed(state.commands, i, -parameters[ROW.delay, i] / period, 1.0)
-        target = shaped(parameters, state.memory, i, target, period)
+        target = delay_command(state.commands, i, -parameters[ROW.delay, i] / period, 1.0)
+        target = shape_target(parameters, state.memory, i, target, period)
         error = target + parameters[ROW.offset, i] - position[i]
         error -= min(parameters[ROW.deadband, i], max(-parameters[ROW.deadband, i], error))
         speed[i] = min(fastest[i], max(-fastest[i], error / period))

@@ -15,7 +15,7 @@ from commands import done, gsl
 
 from gsl.core.plant import Plant, nominal
 from gsl.core.statistics import quantile_interval, wilson
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.policies.excitation import Excitation
 from gsl.report.console import Console
 from gsl.robots.nao import nao
@@ -209,7 +209,7 @@ def test_the_same_generator_is_the_chain_model(robot: Plant, played: Programme) 
     targets = np.vstack([np.repeat(path[:1], COMMANDS - 1 + SETTLE, axis=0), path])
     begin = np.array([[path[0], np.zeros_like(path[0])]])
     windows = Windows(np.ascontiguousarray(targets[::-1])[None], begin, np.array([-SETTLE * PERIOD]))
-    expected = Held.of(applied(robot, built(effects)), STEP, PERIOD).replay(windows)[0, SETTLE - 1 :]
+    expected = Held.of(apply_all(robot, build(effects)), STEP, PERIOD).replay(windows)[0, SETTLE - 1 :]
     assert np.array_equal(play_same(robot, effects, None, [path], [path[0]], PERIOD)[0], expected)
 
 

@@ -11,12 +11,12 @@ import pytest
 from commands import gsl
 from scipy.stats import spearmanr
 
-from gsl.commandline.composer import compose, opened
-from gsl.commandline.config import prepared, resolved
+from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.config import prepare, resolve
 from gsl.errors import ArtifactError
 from gsl.report.style import GAT, UNINFORMED
 from gsl.validation.compliance import Compliance
-from gsl.validation.compliance_transfer import transferred
+from gsl.validation.compliance_transfer import compute_transfers
 from gsl_experiments.gain_predictors import points, predictors, rank_correlations, searched
 from gsl_experiments.ledger_file import read
 from gsl_experiments.replay import Replay
@@ -85,7 +85,7 @@ def test_joints_that_go_too_far_do_not_make_up_for_others() -> None:
         Compliance(("a", "b"), legs, ones, ones, 0.0 * ones, strength)
         for ones, strength in ((np.ones(2), np.array(torque)) for torque in ((3.0, 3.0), (3.0, 1.0), (2.0, 2.0)))
     )
-    assert transferred(sim, grounded, real)["legs"].torque == pytest.approx(1.0)
+    assert compute_transfers(sim, grounded, real)["legs"].torque == pytest.approx(1.0)
     assert closed_strength(sim, grounded, real, "legs") == pytest.approx(0.0)
     assert closed_strength(sim, real, real, "legs") == pytest.approx(1.0)
     assert closed_strength(sim, grounded, sim, "legs") is None
@@ -150,8 +150,8 @@ def test_gains_are_set_against_how_joints_move_and_yield() -> None:
 
 
 def test_learned_servos_are_methods_unless_they_draw(tmp_path: Path) -> None:
-    with opened(None):
-        study = prepared(resolved(compose("reproduce_replays", ["trials=1"])))[0]
+    with open_hydra(None):
+        study = prepare(resolve(compose("reproduce_replays", ["trials=1"])))[0]
     study._check()
     assert {"servo", "effects_servo"} <= {method for _, _, method in study.recipes}
     for more, line in (

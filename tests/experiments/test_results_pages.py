@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from gsl.commandline.composer import compose, opened
-from gsl.commandline.config import prepared, resolved
+from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.config import prepare, resolve
 from gsl.core.unit import Unit
 from gsl_experiments import budget, noise_table
 from gsl_experiments.budget import Budget
@@ -59,9 +59,9 @@ def as_trial(row: dict[str, Any]) -> Trial:
 
 def composed(typed: list[str]) -> Any:
     what, rest = (f"reproduce_{typed[1]}", typed[2:]) if typed[0] == "reproduce" else (typed[0], typed[1:])
-    with opened(None):
+    with open_hydra(None):
         composition = compose(what.replace("-", "_"), rest)
-        return prepared(resolved(composition), composition.trust)[0]
+        return prepare(resolve(composition), composition.trust)[0]
 
 
 def test_pages_have_such_commands() -> None:

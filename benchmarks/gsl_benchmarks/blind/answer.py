@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import diagnose
@@ -43,7 +43,7 @@ class Question:
     @property
     def robot(self) -> Robot:
         """Without fixed joints."""
-        return lumped(self.plant.robot)
+        return lump(self.plant.robot)
 
 
 def answered(

@@ -8,10 +8,10 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant
 from gsl.core.setting import Setting, settings_of
-from gsl.effects.effect import documented, effect_class, names
+from gsl.effects.effect import effect_class, list_documented, names
 from gsl_benchmarks.blind.extras import EXTRAS, Extra
 
 # Besides effects of contact: not for a log in the air.
@@ -48,7 +48,7 @@ class Dial:
 
     def mask(self, plant: Plant) -> np.ndarray:
         """Return the controlled joints that it acts on, those that carry a link included, shape (n_joints,)."""
-        robot = lumped(plant.robot)
+        robot = lump(plant.robot)
         if "link" not in self.fixed:
             return plant.mask(self.fixed.get("joints", "all"))[: len(robot.controlled)]
         above, link = {joint.child: joint for joint in robot.joints}, self.fixed["link"]
@@ -82,12 +82,12 @@ def drawn(effect: str, robot: Robot, rng: np.random.Generator, *, alone: bool = 
         floating: On the ground, where it acts on all joints, or on the base.
     """
     target: Any = effect_class(effect)
-    known, hints = documented(effect, robot), get_type_hints(target)
+    known, hints = list_documented(effect, robot), get_type_hints(target)
     fixed: dict[str, Any] = {}
     if "joints" in known:
         fixed["joints"] = "all" if floating else _scope(robot, rng, alone=alone)
     if "link" in known:
-        fixed["link"] = robot.base if floating else str(rng.choice([joint.child for joint in lumped(robot).joints]))
+        fixed["link"] = robot.base if floating else str(rng.choice([joint.child for joint in lump(robot).joints]))
     for key, hint in hints.items():
         if get_origin(hint) is Literal:
             fixed[key] = str(rng.choice(get_args(hint)))

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.plant import Plant
 
 COGGING, NUMBER, PHASE, SPRING, SLACK, SIDE, SHARE, HOT, BOUC, YIELDING = range(10)  # rows of the parameters
@@ -70,7 +70,7 @@ def extra_rows(plant: Plant, extra: Mapping[str, Any] | None) -> np.ndarray:
     return rows
 
 
-@compiled
+@compile_kernel
 def extra_torque(
     rows: np.ndarray, state: np.ndarray, rest: np.ndarray, motion: np.ndarray, drive: np.ndarray, step: float,
     torque: np.ndarray,

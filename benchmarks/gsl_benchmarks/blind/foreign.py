@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.plant import Plant
 from gsl.worlds.chain import COLUMNS, Chain, accelerate, chain, nothing
 from gsl_benchmarks.blind import foreign_servo as servo
@@ -135,7 +135,7 @@ def _entries(effects: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
     return [(name, one) for name, entries in listed for one in entries]
 
 
-@compiled
+@compile_kernel
 def _play(
     p: np.ndarray, tree: Chain, rows: np.ndarray, extras: np.ndarray, rest: np.ndarray, path: np.ndarray,
     motion: np.ndarray, period: float, said: np.ndarray,
@@ -161,13 +161,13 @@ def _play(
     _note(p, ring, settling + len(path) * ticks, motion, said, len(path))
 
 
-@compiled
+@compile_kernel
 def _note(p: np.ndarray, ring: np.ndarray, count: int, motion: np.ndarray, said: np.ndarray, row: int) -> None:
     for i in range(motion.shape[1]):
         said[row, i] = servo.told(p, ring, count, motion, i, STEP)[0]
 
 
-@compiled
+@compile_kernel
 def _arrived(path: np.ndarray, i: int, begin: float, length: float) -> float:
     """Return the mean of the held commands from a time on, for a while, both in control periods."""
     first, last = int(np.floor(begin + 1e-9)), int(np.floor(begin + length - 1e-9))

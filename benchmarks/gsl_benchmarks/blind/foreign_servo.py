@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 
 (
     KP, KD, LIMIT, NO_LOAD, COULOMB, VISCOUS, STRIBECK, STRIBECK_SPEED, LOAD, ROTOR, DELAY, SMOOTHING, QUANTUM,
@@ -30,7 +30,7 @@ REMEMBERED = 256  # physics steps of encoder readings
 SUBSTEPS = 4  # of the drive train
 
 
-@compiled
+@compile_kernel
 def foreign_torque(
     p: np.ndarray, state: np.ndarray, ring: np.ndarray, count: int, motion: np.ndarray, wanted: np.ndarray,
     time: float, step: float, torque: np.ndarray,
@@ -76,7 +76,7 @@ def foreign_torque(
             ring[count % REMEMBERED, row, i] = motion[row, i]
 
 
-@compiled
+@compile_kernel
 def told(p: np.ndarray, ring: np.ndarray, count: int, motion: np.ndarray, i: int, step: float) -> tuple[float, float]:
     """Return position [rad] and speed [rad/s] as an encoder tells them, some time late."""
     late = p[AGE, i] / step
@@ -88,7 +88,7 @@ def told(p: np.ndarray, ring: np.ndarray, count: int, motion: np.ndarray, i: int
     return (1.0 - part) * new[0, i] + part * old[0, i], (1.0 - part) * new[1, i] + part * old[1, i]
 
 
-@compiled
+@compile_kernel
 def _through(p: np.ndarray, state: np.ndarray, i: int, motion: np.ndarray, step: float) -> float:
     """Return the mean torque in the gear over one physics step [N·m]."""
     h, half, inertia = step / SUBSTEPS, 0.5 * p[PLAY, i], p[ROTOR, i]
@@ -109,7 +109,7 @@ def _through(p: np.ndarray, state: np.ndarray, i: int, motion: np.ndarray, step:
     return passed
 
 
-@compiled
+@compile_kernel
 def _dry(p: np.ndarray, state: np.ndarray, i: int, h: float) -> float:
     """Return the dry friction on a rotor [N·m]; what presses the gear is motor and load together."""
     v = state[OMEGA, i]
@@ -123,7 +123,7 @@ def _dry(p: np.ndarray, state: np.ndarray, i: int, h: float) -> float:
     return size * state[BENT, i] + MICRO * np.sqrt(size / BREAKAWAY * p[ROTOR, i]) * rate
 
 
-@compiled
+@compile_kernel
 def _stopped(p: np.ndarray, i: int, q: float, v: float) -> float:
     if q > p[UPPER, i]:
         return max(0.0, STOP * (q - p[UPPER, i]) + STOP_DAMPING * v)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.records import slope
@@ -96,7 +96,7 @@ class Workshop:
 
     def _logged(self, robot: Plant, label: Label, rng: np.random.Generator) -> Batch:
         """Return what a robot logs of its programme; its metadata say nothing of the causes."""
-        programme, body = self.programmes[label.programme], lumped(robot.robot)
+        programme, body = self.programmes[label.programme], lump(robot.robot)
         targets, n = programme.targets(body), len(body.controlled)
         starts = [path[0] + START * rng.standard_normal(len(path[0])) for path in targets]
         played = PLAYERS[label.generator](robot, label.effects, label.extra, targets, starts, self.period)

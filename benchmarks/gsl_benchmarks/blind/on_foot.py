@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import BASE, Pieces
@@ -53,7 +53,7 @@ class Yardstick:
     def of(cls, sim: BulletWorld, walks: Walks, noise: float, rng: np.random.Generator) -> Yardstick:
         """Let the nominal robot walk, and replay it."""
         log = replace(walks, episodes=WALKED).logged(sim, None, {}, noise, rng)
-        found = cut_log(log, lumped(sim.plant.robot), walking=True)
+        found = cut_log(log, lump(sim.plant.robot), walking=True)
         simulator = Walking(sim.plant, fitting_step(sim.step, sim.period), sim.period)
         pieces = _some(found.pieces)
         floor = found.with_model_error(model_error(simulator, pieces, rng)).comparison.floor
@@ -77,7 +77,7 @@ class Yardstick:
         A window begins with what a log tells of a state, and not with what springs, gears and delays hold: an effect
         can move a robot from there and yet not be what a replay of it shows.
         """
-        pieces = _some(cut_log(log, lumped(self.simulator.plant.robot), walking=True).pieces)
+        pieces = _some(cut_log(log, lump(self.simulator.plant.robot), walking=True).pieces)
         left = [
             self._square(self.simulator.simulate(effects, np.zeros(0), pieces) - pieces.real, dial)
             for effects in ({dial.effect: dial.entry(share)}, {})

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 from gsl.core.plant import Plant
 from gsl.core.servo_law import HIDDEN, LAYERS
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.worlds.chain import COLUMNS, Chain, accelerate, nothing
 from gsl.worlds.encoder import first_history
 from gsl.worlds.held import Held
@@ -40,7 +40,7 @@ def play_same(
         starts: Positions before the first command is held [rad], shape (n_motors,) each.
         period: Control period [s].
     """
-    held = Held.of(applied(plant, built(effects)), STEP, period)
+    held = Held.of(apply_all(plant, build(effects)), STEP, period)
     if extra is None:
         return held.play(targets, starts, SETTLE)
     rows, state = extra_rows(plant, extra), np.zeros((2, len(held.bias)))
@@ -55,7 +55,7 @@ def play_same(
     return told
 
 
-@compiled
+@compile_kernel
 def _play(
     servo: ServoParameters, tree: Chain, rows: np.ndarray, extras: np.ndarray, rest: np.ndarray, commands: np.ndarray,
     motion: np.ndarray, step: float, substeps: int, settle: int, told: np.ndarray,

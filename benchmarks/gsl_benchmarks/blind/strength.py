@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.plant import Plant
 from gsl.diagnosis.log.records import Pieces, Record, cut_pieces, slope
 from gsl.diagnosis.settings import LogSettings
@@ -86,7 +86,7 @@ class Yardstick:
         return float(np.sqrt(1.0 + np.mean(z[..., joints] ** 2)))
 
     def _residual(self, effects: Mapping[str, Any], extra: Mapping[str, Any] | None) -> np.ndarray:
-        robot = lumped(self.plant.robot)
+        robot = lump(self.plant.robot)
         targets, n = self.programme.targets(robot), len(robot.controlled)
         played = self.player(self.plant, effects, extra, targets, [path[0] for path in targets], self.period)
         if not all(np.isfinite(one).all() for one in played):

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.plant import Plant
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
@@ -56,7 +56,7 @@ class Walks:
             near = neighbour(engine, engine.initial, 0.0 if name == "pi0" else self.spread, rng)
             told.append(_noisy(self._walk(env, engine, near, int(rng.integers(2**31))), noise, sim.period, rng))
         env.close()
-        about = {"robot": lumped(sim.plant.robot).name, "role": "real", "source": "gsl blind"}
+        about = {"robot": lump(sim.plant.robot).name, "role": "real", "source": "gsl blind"}
         episodes = [{"policy": name} for name in names]
         return Batch(tuple(told), env.layout.joints, sim.period, {**about, "episodes": episodes})
 

@@ -13,11 +13,11 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hint
 
 import numpy as np
 
-from gsl.core.body import Robot, carrier, lumped
+from gsl.core.body import Robot, carrier, lump
 from gsl.core.setting import Setting
 from gsl.diagnosis.settings import GridSettings
 from gsl.diagnosis.simulate.in_the_air import Effects
-from gsl.effects.effect import documented, effect_class, names
+from gsl.effects.effect import effect_class, list_documented, names
 
 WIDE = 10.0  # ends of a range of shapes that are further apart, as a factor, are stepped in logarithms
 PROBE = 0.1  # share of the range at which an effect that acts in proportion is probed
@@ -146,7 +146,7 @@ def library(
     """
     settings, looks = settings or GridSettings(), looks or Looks({}, {})
     shares = settings.dense if dense else settings.one_sided
-    moving = [robot.base] if floating else [joint.child for joint in lumped(robot).joints]
+    moving = [robot.base] if floating else [joint.child for joint in lump(robot).joints]
     pushed = [link for link in robot.links if floating or carrier(robot, link, np.zeros(3))[0] != robot.base]
     return tuple(
         candidate.with_start(looks.starts.get(name))
@@ -166,7 +166,7 @@ def _candidates(
 ) -> list[Candidate]:
     target: Any = effect_class(name)
     links = places[target.kind != "body"]
-    parameters, hints = documented(name, robot), get_type_hints(target)
+    parameters, hints = list_documented(name, robot), get_type_hints(target)
     choices: list[list[tuple[str, Any]]] = []
     if "joints" in parameters:
         choices.append([("joints", "all")])

@@ -24,7 +24,7 @@ from gsl.diagnosis.settings import SearchSettings
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.in_the_air import Effects
 from gsl.diagnosis.simulate.simulator import Bench, Simulator
-from gsl.effects.effect import applied, built, effect_class, names, own
+from gsl.effects.effect import apply_all, build, effect_class, names, own
 
 LATENCY, PUSH = "command_latency", "external_push"
 IN_CONTACT = "contact"  # kind of effects that a robot in the air cannot show
@@ -161,7 +161,7 @@ def _has_hook(candidate: Candidate, plant: Plant, tick: Callable[[str], None]) -
     """Whether an effect of a user's own hooks its torque: the chain model, which replays logs in air, calls none."""
     if candidate.effect not in own():
         return False
-    hooked = applied(plant, built({candidate.effect: candidate.entry(candidate.documented[1])})).hook is not None
+    hooked = apply_all(plant, build({candidate.effect: candidate.entry(candidate.documented[1])})).hook is not None
     if hooked:
         tick(f"without {candidate.effect}, whose torque hook acts in Bullet alone")
     return hooked

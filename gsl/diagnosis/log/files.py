@@ -15,7 +15,7 @@ from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.settings import LogSettings
 from gsl.errors import ArtifactError, InputError, TrajectoryError
 from gsl.storage.importers.formats import readable
-from gsl.storage.trajectories import data_file, imported, read
+from gsl.storage.trajectories import data_file, read, suggest_import
 
 CLOCKS, APART = "clocks", "unsynchronised"  # of a log's metadata, as gsl import writes them
 MOVES = 1e-4  # a command that changes less is constant [rad]
@@ -39,7 +39,7 @@ def log_files(reference: str) -> list[Path]:
         return [data_file(reference)]
     except ArtifactError as error:
         if folder.is_dir() and any(readable(path) for path in folder.iterdir()):
-            problem = f"holds no trajectory file; make one of its logs first: {imported(folder)}"
+            problem = f"holds no trajectory file; make one of its logs first: {suggest_import(folder)}"
             raise InputError(f"{folder}: {problem}") from error
         raise
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.plant import Plant
 from gsl.diagnosis.log.records import Pieces, Record, group_alike
 from gsl.diagnosis.simulate.calibration import calibrate
-from gsl.effects.effect import applied, built
+from gsl.effects.effect import apply_all, build
 from gsl.worlds.engine import Engine
 from gsl.worlds.fits import fitting_step
 from gsl.worlds.held import Held, Windows, shares
@@ -27,7 +27,7 @@ Effects = Mapping[str, Any]
 
 def change(plant: Plant, effects: Effects, shifts: np.ndarray | None = None) -> Plant:
     """Return the plant with effects switched on and, on top of them, a calibration, shape (7, n_joints)."""
-    changed = applied(plant, built(effects))
+    changed = apply_all(plant, build(effects))
     return changed if shifts is None else calibrate(changed, shifts)
 
 
@@ -116,7 +116,7 @@ def replay_in_bullet(plant: Plant, pieces: Pieces, *, step: float, period: float
 def _replay_window(engine: Engine, commands: np.ndarray, motion: np.ndarray, clock: float) -> np.ndarray:
     """Return what the encoders show in Bullet after each control period [rad], shape (T, n_motors)."""
     length = len(commands) - COMMANDS + 1
-    start = resting(lumped(engine.plant.robot), motion[0], commands[length], floating=False).reading
+    start = resting(lump(engine.plant.robot), motion[0], commands[length], floating=False).reading
     engine.load(start._replace(motion=motion), commands[length:], float(clock))
     rows = []
     for t in range(length):

@@ -9,7 +9,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from scipy.spatial.transform import Rotation
 
-from gsl.core.body import lumped
+from gsl.core.body import lump
 from gsl.core.interruption import processes_starting
 from gsl.core.plant import GRAVITY, Plant
 from gsl.diagnosis.log.records import OnGround, Pieces
@@ -124,7 +124,7 @@ def _heights(plant: Plant, windows: OnGround) -> np.ndarray:
     stance foot is. In soft ground it is deeper where the log has it deeper, as far as that is more than noise; where
     the log's own ground is it does not matter.
     """
-    robot = lumped(plant.robot)
+    robot = lump(plant.robot)
     turns = Rotation.from_quat(windows.base[:, 6:10]).as_matrix()
     low = np.array([lowest_point(robot, *pose) for pose in zip(windows.motion[:, 0], turns, strict=True)])
     soles, stiffness = windows.base[:, 2] + low, plant.contact.stiffness

@@ -20,7 +20,7 @@ from gsl.diagnosis.verdict.localise import cells, find_regimes, horizon, sides
 from gsl.diagnosis.verdict.shrinkage import find_unexplained, shrinkage
 from gsl.diagnosis.verdict.verdict import Cause, Verdict
 from gsl.diagnosis.verdict.zero_or_load import find_droops
-from gsl.effects.effect import confused_with, effect_class
+from gsl.effects.effect import describe_confusion, effect_class
 
 RANKED = 12  # hypotheses that are listed
 REPLAYS, TICKS = 6, 400  # pictures of replays, and their ticks at most
@@ -130,7 +130,7 @@ def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
         "probability": cause.probability,
         "gain": {"value": cause.value, "low": cause.low, "high": cause.high},
         "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
-        "confused": None if sure else confused_with(candidate.effect),
+        "confused": None if sure else describe_confusion(candidate.effect),
     }
 
 

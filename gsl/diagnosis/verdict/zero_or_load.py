@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsl.core.body import Robot, lumped
+from gsl.core.body import Robot, lump
 from gsl.core.dynamics import gravity_torque
 from gsl.core.plant import Plant
 from gsl.diagnosis.log.residual import BLOCK
@@ -84,7 +84,7 @@ def _statics(findings: Findings, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     every = max(1, -(-len(poses) // findings.options.design.windows))
     for conditions, index in pieces.alike:
         under = change(plant, conditions)
-        robot = lumped(under.robot)
+        robot = lump(under.robot)
         some = index[::every]
         pull += [_torque(under, robot, pose) for pose in poses[some, :n]]
         stiffness += [under.servo.kp[:n].clip(1e-9)] * len(some)
@@ -119,7 +119,7 @@ def _droop(
 
 def _pull_of_movers(plant: Plant, bounds: Limits, positions: np.ndarray) -> np.ndarray:
     """Return gravity's torque on every joint while one after the other moves, shape (n_movers, positions, n_joints)."""
-    robot = lumped(plant.robot)
+    robot = lump(plant.robot)
     pull = np.zeros((*positions.shape, len(bounds.joints)))
     for mover, stops in enumerate(positions):
         for number, position in enumerate(stops):

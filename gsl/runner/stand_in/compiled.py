@@ -8,6 +8,6 @@ from typing import TypeVar
 F = TypeVar("F", bound=Callable[..., object])
 
 
-def compiled(function: F) -> F:
+def compile_kernel(function: F) -> F:
     """Return the function."""
     return function

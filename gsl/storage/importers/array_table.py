@@ -67,12 +67,12 @@ def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> tupl
     """Return the shape and type that an array declares."""
     try:
         with archive.open(info) as file:
-            return _declared(file)  # type: ignore[arg-type]
+            return _read_header(file)  # type: ignore[arg-type]
     except (ValueError, SyntaxError, TypeError, EOFError, zlib.error, MemoryError, RecursionError) as error:
         raise TrajectoryError(path, "is no numpy array; save it with numpy.savez", column=info.filename) from error
 
 
-def _declared(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]:
+def _read_header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]:
     version = npy.read_magic(file)
     size = file.read(2 if version == (1, 0) else 4)  # of the header, which is read at once, however long it says it is
     if int.from_bytes(size, "little") > HEADER_BYTES:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from gsl.core.labels import alike
-from gsl.core.series import SAME, held, interpolated, pieces
+from gsl.core.series import SAME, hold, interpolate, pieces
 from gsl.core.trajectory import Trajectory
 from gsl.effects.effect import together
 from gsl.errors import InputError
-from gsl.storage.importers.labels import filled
+from gsl.storage.importers.labels import fill
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.reading import Raw, Series
 from gsl.storage.importers.signal import COMMANDS, FLAGS
@@ -95,8 +95,8 @@ def _trajectory(raw: Raw, stamps: np.ndarray, mapping: LogMapping) -> Trajectory
 
 def _at(name: str, series: Series, at: np.ndarray) -> np.ndarray:
     if name in COMMANDS or name in FLAGS:
-        return held(series.stamps, series.values, at)
-    return interpolated(series.stamps, series.values, at)
+        return hold(series.stamps, series.values, at)
+    return interpolate(series.stamps, series.values, at)
 
 
 def labelled(raw: Raw, mapping: LogMapping) -> dict[str, Any]:
@@ -105,8 +105,8 @@ def labelled(raw: Raw, mapping: LogMapping) -> dict[str, Any]:
     Raises:
         ConfigError: A {field} is neither in its files nor in its path.
     """
-    name = filled(mapping.name, raw.fields, "mapping.name") if mapping.name else raw.name
-    about = {key: filled(value, raw.fields, f"mapping.about.{key}") for key, value in mapping.about.items()}
+    name = fill(mapping.name, raw.fields, "mapping.name") if mapping.name else raw.name
+    about = {key: fill(value, raw.fields, f"mapping.about.{key}") for key, value in mapping.about.items()}
     known = together(
         effects
         for label, values in mapping.conditions.items()
@@ -116,7 +116,7 @@ def labelled(raw: Raw, mapping: LogMapping) -> dict[str, Any]:
     return {**about, "policy": str(name), "file": raw.name, **({"conditions": known} if known else {})}
 
 
-def unmatched(found: Sequence[Episode], mapping: LogMapping) -> Iterator[str]:
+def list_unmatched(found: Sequence[Episode], mapping: LogMapping) -> Iterator[str]:
     """Tell of conditions that no episode has: most often a value that is written otherwise."""
     for label, values in mapping.conditions.items():
         there = [one.label[label] for one in found]

@@ -61,14 +61,14 @@ def references(
     twice = [one for one in found if found.count(one) > 1]
     if twice and name in PER_JOINT:
         problem = f"is that of several joints for {name}; every joint has one of its own"
-        raise ConfigError(f"mapping.signals.{name}.column", problem, given=_told(twice[0]))
+        raise ConfigError(f"mapping.signals.{name}.column", problem, given=_describe(twice[0]))
     for reference in found:
         if reference.column not in table.names:
             raise missing_column(table, reference.column, others)
     return found
 
 
-def taken(mapping: LogMapping, joints: Mapping[str, str], file: str) -> set[str]:
+def list_columns(mapping: LogMapping, joints: Mapping[str, str], file: str) -> set[str]:
     """Return the columns that the mapping names of a file."""
     own = {name: signal for name, signal in mapping.signals.items() if signal.file == file}
     words = {word for name, signal in own.items() for word in _words(name, signal, joints)}
@@ -95,7 +95,7 @@ def _reference(word: str, table: Table) -> Reference:
     return Reference(word) if word in table.names or not entry else Reference(entry.group(1), int(entry.group(2)))
 
 
-def _told(reference: Reference) -> str:
+def _describe(reference: Reference) -> str:
     return reference.column if reference.entry is None else f"{reference.column}[{reference.entry}]"
 
 

@@ -14,7 +14,7 @@ AS_FAR = 0.33  # of the command that it follows: a joint that is dragged along m
 AGAINST = 3  # times as many episodes that say so as say the contrary
 
 
-def exchanged(found: Sequence[Trajectory], moves: float) -> dict[int, int]:
+def find_exchanges(found: Sequence[Trajectory], moves: float) -> dict[int, int]:
     """Return for each joint whose position is another's that other joint; episodes of like commands say nothing.
 
     Args:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gsl.errors import TrajectoryError
-from gsl.storage.importers.sizes import check_need, opened
+from gsl.storage.importers.sizes import check_need, open_log
 from gsl.storage.importers.table import missing_column, numbers
 
 FACTOR = 10.0  # bytes of memory that a byte of a document takes while it is read
@@ -68,18 +68,18 @@ class JsonTable:
 
 def _document(path: Path, memory: float) -> Any:
     check_need(path, FACTOR * path.stat().st_size, memory)
-    with opened(path, most=memory / FACTOR) as file:
-        return _parsed(path, file.read(), None)
+    with open_log(path, most=memory / FACTOR) as file:
+        return _parse(path, file.read(), None)
 
 
 def _records(path: Path, memory: float) -> Iterator[Any]:
-    with opened(path, most=100.0 * memory, lines=True) as file:
+    with open_log(path, most=100.0 * memory, lines=True) as file:
         for number, line in enumerate(file, 1):
             if line.strip():
-                yield _parsed(path, line, number)
+                yield _parse(path, line, number)
 
 
-def _parsed(path: Path, text: bytes, line: int | None) -> Any:
+def _parse(path: Path, text: bytes, line: int | None) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -15,7 +15,7 @@ from gsl.storage.importers.table import Table
 _FIELD = re.compile(r"\{([^{}]+)\}")
 
 
-def told_by_columns(
+def find_label_columns(
     mapping: LogMapping, fields: Mapping[str, Any], tables: Mapping[str, Table]
 ) -> dict[str, list[str]]:
     """Return for each file the columns that name an episode or say something of it; single values go first."""
@@ -57,7 +57,7 @@ def constant(table: Table, name: str, values: np.ndarray, rows: np.ndarray) -> A
     return first.item() if isinstance(first, np.generic) else first
 
 
-def filled(value: Any, fields: Mapping[str, Any], where: str) -> Any:
+def fill(value: Any, fields: Mapping[str, Any], where: str) -> Any:
     """Return a value with its {fields} filled in; one that is a field alone keeps its type.
 
     Raises:

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator
 
 from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
-from gsl.effects.effect import built
+from gsl.effects.effect import build
 from gsl.errors import ConfigError
 from gsl.storage.importers.signal import AXES, BY_NAME, KNOWN, Signal, Time
 from gsl.storage.importers.units import factor
@@ -23,7 +23,7 @@ TAKEN = (*INTEGERS, "time", "reward", "fell", "terminated", "state", "next_state
 def _time(value: Any) -> Time:
     if isinstance(value, Time):
         return value
-    return _made(Time, {"column": value} if isinstance(value, str) else value, "time")
+    return _make(Time, {"column": value} if isinstance(value, str) else value, "time")
 
 
 def _signals(value: Any) -> dict[str, Signal]:
@@ -34,10 +34,10 @@ def _signal(value: Any, where: str) -> Signal:
     if isinstance(value, Signal):
         return value
     alone = isinstance(value, str | int | list) and not isinstance(value, bool)
-    return _made(Signal, {"column": value} if alone else value, where)
+    return _make(Signal, {"column": value} if alone else value, where)
 
 
-def _made(kind: Callable[..., T], value: Any, where: str) -> T:
+def _make(kind: Callable[..., T], value: Any, where: str) -> T:
     try:
         return make(kind, _dictionary(value, ""))
     except ConfigError as error:
@@ -122,7 +122,7 @@ class Mapping:
 
 def _check_effects(where: str, effects: dict[str, Any]) -> None:
     try:
-        built(effects)
+        build(effects)
     except ConfigError as error:
         raise error.under(where) from error
 

@@ -11,7 +11,7 @@ import numpy as np
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.sizes import check_need
 from gsl.storage.importers.table import missing_column, numbers
-from gsl.storage.parquet import declared_bytes
+from gsl.storage.parquet import count_bytes
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -43,7 +43,7 @@ class ParquetTable:
                 raise missing_column(self, name)
         try:
             with pq.ParquetFile(self.path) as file:
-                check_need(self.path, 2.0 * declared_bytes(file.metadata, wanted), self.memory)
+                check_need(self.path, 2.0 * count_bytes(file.metadata, wanted), self.memory)
                 table = file.read(columns=list(wanted))
         except (pa.ArrowException, OSError) as error:
             raise TrajectoryError(self.path, "is truncated or damaged; copy it again") from error

@@ -30,7 +30,7 @@ class Place(NamedTuple):
     files: Mapping[str, Path]
 
 
-def located(source: str) -> str:
+def locate(source: str) -> str:
     """Return a source as it is, or below the folder of gsl's repository if it is only there."""
     if not glob.glob(source) and not Path(source).exists() and not os.path.isabs(source) and (HOME / source).exists():
         return os.path.relpath(HOME / source)
@@ -47,7 +47,7 @@ def places(source: str, files: str | Mapping[str, str] | None) -> list[Place]:
     Raises:
         InputError: There is nothing, or a file of an episode is missing.
     """
-    base, found = _found(source)
+    base, found = _find(source)
     if isinstance(files, Mapping):
         return [_several(base, folder, files) for folder in _folders(source, found, files)]
     chosen = sorted({one for path in found for one in _below(path, files)})
@@ -57,7 +57,7 @@ def places(source: str, files: str | Mapping[str, str] | None) -> list[Place]:
     return [Place(stem(_relative(path, base)), {"": path}) for path in chosen]
 
 
-def _found(source: str) -> tuple[Path, list[Path]]:
+def _find(source: str) -> tuple[Path, list[Path]]:
     """Return the folder that names are relative to, and what the source names."""
     path = Path(source)
     if path.is_dir():
@@ -76,12 +76,12 @@ def _below(path: Path, pattern: str | None) -> Iterator[Path]:
     if not path.is_dir() or is_bag(path):
         yield path
         return
-    below = sorted(one for one in path.rglob(pattern or "*") if readable(one) and not _hidden(one, path))
+    below = sorted(one for one in path.rglob(pattern or "*") if readable(one) and not _is_hidden(one, path))
     bags = [one for one in below if one.is_dir()]
     yield from (one for one in below if not any(bag in one.parents for bag in bags))
 
 
-def _hidden(path: Path, folder: Path) -> bool:
+def _is_hidden(path: Path, folder: Path) -> bool:
     return any(part.startswith(".") for part in path.relative_to(folder).parts)
 
 

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.errors import ConfigError, TrajectoryError
-from gsl.storage.importers.columns import Reference, joints_of, output_names, references, side_by_side, taken
+from gsl.storage.importers.columns import Reference, joints_of, list_columns, output_names, references, side_by_side
 from gsl.storage.importers.formats import table
-from gsl.storage.importers.labels import constant, told_by_columns
+from gsl.storage.importers.labels import constant, find_label_columns
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, fields_of
 from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, FLAGS, Signal
-from gsl.storage.importers.stamps import ordered, seconds
+from gsl.storage.importers.stamps import order_rows, seconds
 from gsl.storage.importers.table import Table, missing_column
 from gsl.storage.trajectory_contract import UNITS
 
@@ -83,11 +83,11 @@ def _episodes(place: Place, mapping: LogMapping, tables: Mapping[str, Table]) ->
     joints = joints_of(mapping, tables[mapping.signals["position"].file])
     mapping.check_joints(list(joints))
     named = {name: one for name, one in mapping.signals.items() if _there(name, one, joints, tables)}
-    others = {role: taken(mapping, joints, role) for role in tables}
+    others = {role: list_columns(mapping, joints, role) for role in tables}
     found = {name: references(name, one, joints, tables[one.file], others[one.file]) for name, one in named.items()}
     fields = {name: value for one in tables.values() for name, value in one.fields.items()}
     fields |= {FILE: place.name, **fields_of(place.name, mapping.path)}
-    told = told_by_columns(mapping, fields, tables)
+    told = find_label_columns(mapping, fields, tables)
     values = {role: _columns(one, role, mapping, named, found, told[role]) for role, one in tables.items()}
     for key, rows in _groups(values, mapping, tables):
         own = {**fields, **({mapping.episode: key} if key is not None else {})}
@@ -181,7 +181,7 @@ class _Reading(NamedTuple):
         stamps = seconds(self.table.path, self._stamps(values), self.mapping.time, self._column())
         keep = self._filled(raw)
         stamps, raw, rows = stamps[keep], raw[keep], self.rows[keep]
-        keep = ordered(self.table.path, stamps, self._column(), rows, drop=self.mapping.duplicates == "drop")
+        keep = order_rows(self.table.path, stamps, self._column(), rows, drop=self.mapping.duplicates == "drop")
         stamps, raw = stamps[keep], raw[keep]
         names = output_names(self.name, raw.shape[1], joints)
         if self.name in FLAGS:

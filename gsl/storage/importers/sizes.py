@@ -30,7 +30,7 @@ def check_need(path: Path, need: float, memory: float) -> None:
 
 
 @contextmanager
-def opened(path: Path, *, most: float, lines: bool = False) -> Iterator[IO[bytes]]:
+def open_log(path: Path, *, most: float, lines: bool = False) -> Iterator[IO[bytes]]:
     """Open a file for reading, unpacked if its name ends with gz.
 
     Args:

@@ -35,7 +35,7 @@ def _dates(path: Path, stamps: np.ndarray, column: str) -> np.ndarray:
         raise TrajectoryError(path, f"holds no dates: {error}", column=column) from error
 
 
-def ordered(path: Path, stamps: np.ndarray, column: str, rows: np.ndarray, *, drop: bool) -> np.ndarray:
+def order_rows(path: Path, stamps: np.ndarray, column: str, rows: np.ndarray, *, drop: bool) -> np.ndarray:
     """Return which rows to keep, shape (T,): all, or without those whose stamp has just been there.
 
     Args:

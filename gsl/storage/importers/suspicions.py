@@ -9,7 +9,7 @@ import numpy as np
 
 from gsl.core.series import Lag, lag
 from gsl.storage.importers.assembly import Episode
-from gsl.storage.importers.exchanged import exchanged
+from gsl.storage.importers.exchanged import find_exchanges
 
 MOVES = 0.02  # range of a command below which it tells nothing of what follows it [rad]
 ALIKE = 0.8  # correlation above which a signal is taken to follow a command
@@ -42,7 +42,7 @@ def suspicions(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> list[
         lags: Of each trajectory and joint, from command to position.
     """
     joints = found[0].joints
-    told = [*_time(found), *_order(found, lags), *_exchanged(found)]
+    told = [*_time(found), *_order(found, lags), *_suspect_exchange(found)]
     for index, joint in enumerate(joints):
         told += _joint(joint, index, found)
     return told
@@ -56,7 +56,7 @@ def lags_of(episode: Episode) -> list[Lag]:
     return [lag(command, position, one.time[:-1]) if moves else NONE for command, position, moves in pairs]
 
 
-def saturated(values: np.ndarray, command: np.ndarray) -> float:
+def measure_saturation(values: np.ndarray, command: np.ndarray) -> float:
     """Return the share of rows in which a channel is at one of its ends while the command goes on moving."""
     if np.ptp(values) == 0.0 or np.ptp(command) < MOVES:
         return 0.0
@@ -68,7 +68,7 @@ def saturated(values: np.ndarray, command: np.ndarray) -> float:
     return max(shares)
 
 
-def stopped(position: np.ndarray, command: np.ndarray) -> float:
+def measure_stops(position: np.ndarray, command: np.ndarray) -> float:
     """Return the share of rows in which a joint is at one of its ends while its command is well beyond that [rad].
 
     A joint that rests where its command rests, or turns round with it, is at no stop.
@@ -109,10 +109,10 @@ def _order(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> Iterator[
         yield Suspicion("position", problem, True)
 
 
-def _exchanged(found: Sequence[Episode]) -> Iterator[Suspicion]:
+def _suspect_exchange(found: Sequence[Episode]) -> Iterator[Suspicion]:
     """Tell of positions that follow another joint's command and not their own."""
     joints = found[0].joints
-    for joint, other in exchanged([one.trajectory for one in found], MOVES).items():
+    for joint, other in find_exchanges([one.trajectory for one in found], MOVES).items():
         problem = f"follows action.{joints[other]} and not action.{joints[joint]}: are the columns of joints swapped?"
         yield Suspicion(f"position.{joints[joint]}", problem, True)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from gsl.core.budget import repeated
 from gsl.errors import TrajectoryError
-from gsl.storage.importers.sizes import check_need, opened
+from gsl.storage.importers.sizes import check_need, open_log
 from gsl.storage.importers.table import check_columns, missing_column, numbers
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class TextTable:
     def __init__(self, path: Path, memory: float) -> None:
         self.path, self.memory = path, memory
         self.fields: Mapping[str, Any] = {}
-        with opened(path, most=FACTOR * memory, lines=True) as file:
+        with open_log(path, most=FACTOR * memory, lines=True) as file:
             first, second = (_text(path, file.readline()) for _ in range(2))
         self.separator = _separator(first)
         cells = _cells(first.lstrip("#% "), self.separator)
@@ -61,7 +61,7 @@ class TextTable:
             check_need(self.path, 2.0 * kept, self.memory)
         if not rows:
             raise TrajectoryError(self.path, "has no rows; log it again")
-        return {name: _joined(self.path, name, parts) for name, parts in pieces.items()}
+        return {name: _join(self.path, name, parts) for name, parts in pieces.items()}
 
     def _pieces(self, wanted: Sequence[str]) -> Any:
         import pandas as pd
@@ -69,7 +69,7 @@ class TextTable:
         # without usecols, with which pandas takes rows of any length
         options = {"chunksize": max(1000, CELLS // len(self.names)), "decimal": self.decimal, "header": None}
         options |= {"names": self.names, "skiprows": int(self.header), "index_col": False}
-        with opened(self.path, most=FACTOR * self.memory, lines=True) as file, warnings.catch_warnings():
+        with open_log(self.path, most=FACTOR * self.memory, lines=True) as file, warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
             try:
                 yield from pd.read_csv(file, sep=self.separator, skipinitialspace=True, **options)
@@ -129,7 +129,7 @@ def _vectors(path: Path, name: str, cells: list[str], first: int) -> np.ndarray:
         raise TrajectoryError(path, "is no list of numbers", column=name, row=first + row) from error
 
 
-def _joined(path: Path, name: str, parts: list[np.ndarray]) -> np.ndarray:
+def _join(path: Path, name: str, parts: list[np.ndarray]) -> np.ndarray:
     try:
         return np.concatenate(parts)
     except ValueError as error:
