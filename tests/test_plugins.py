@@ -45,6 +45,7 @@ def count(of: int = 3) -> None:
 }
 ENTRY_POINTS = {
     "collect": "others.number:value",
+    "odd": "no module: at all!",
     "missing": "not_installed.commands:app",
     **{name: f"others.{name}:app" for name in ("broken", "unclosed", "leaving", "tools")},
     "number": "others.number:value",
@@ -143,6 +144,7 @@ def test_functions_and_groups_are_commands_too(place: Path, tmp_path: Path) -> N
         ("leaving", "others.leaving:app", "SystemExit: 3; "),
         ("missing", "not_installed.commands:app", "ModuleNotFoundError: No module named 'not_installed'; "),
         ("number", "others.number:value", "TypeError: "),
+        ("odd", "no module: at all!", ""),
     ],
 )
 def test_a_broken_command_says_why_in_one_line(name: str, module: str, why: str, place: Path, tmp_path: Path) -> None:

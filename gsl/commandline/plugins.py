@@ -72,7 +72,7 @@ def load(entry_point: EntryPoint) -> Any:
             app.command(name)(found)
         return get_group(app).commands[name]
     except (Exception, SystemExit) as error:
-        package = entry_point.dist.name if entry_point.dist else entry_point.module
+        package = entry_point.dist.name if entry_point.dist else "?"
         why = f"{type(error).__name__}: {' '.join(str(error).split())}"
         problem = f"{entry_point.value} of the package {package} cannot be loaded: {why}"
         raise GslError(f"{problem}; repair that package or uninstall it") from error
@@ -88,18 +88,21 @@ def is_group(name: str) -> bool:
 
 def packages() -> list[str]:
     """Return the packages that bring commands: they were installed, so their files may name what is in them."""
-    return sorted({one.module.partition(".")[0] for one in plugins().values()})
+    return sorted({name for one in plugins().values() if (name := _package(one))})
 
 
 def folders() -> list[Path]:
     """Return the folders conf/ of the packages that bring commands."""
-    return [place for package in packages() if (place := _place(package) / CONF).is_dir()]
+    places = (place / CONF for name in packages() if (place := _place(name)) is not None)
+    return [place for place in places if place.is_dir()]
 
 
 def summary(entry_point: EntryPoint) -> str:
-    """Return the first sentence of what a command says of itself, read without importing it."""
-    package, *inner = entry_point.module.split(".")
-    path = _place(package).joinpath(*inner)
+    """Return the first line of what a command says of itself, read without importing it; nothing if that fails."""
+    place = _place(_package(entry_point))
+    if place is None:
+        return ""
+    path = place.joinpath(*entry_point.module.split(".")[1:])
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     try:
         tree = ast.parse(file.read_text(encoding="utf-8"))
@@ -110,12 +113,18 @@ def summary(entry_point: EntryPoint) -> str:
     return (ast.get_docstring(documented[0] if documented else tree) or "").partition("\n")[0]
 
 
-def _place(package: str) -> Path:
-    """Return the folder of a package, or the path of a module without its suffix; a place that is not there if none."""
+def _package(entry_point: EntryPoint) -> str:
+    """Return the package of a command; nothing if its entry point cannot be read, as is said when the command runs."""
+    readable = entry_point.pattern.match(entry_point.value)
+    return readable["module"].partition(".")[0] if readable else ""
+
+
+def _place(package: str) -> Path | None:
+    """Return the folder of a package, or the path of a lone module without its suffix; None if there is none."""
     try:
         spec = find_spec(package)
     except (ImportError, ValueError):
-        spec = None
+        return None
     if spec is not None and spec.submodule_search_locations:
         return Path(next(iter(spec.submodule_search_locations)))
-    return Path(spec.origin).with_suffix("") if spec is not None and spec.origin else Path("/nowhere", package)
+    return Path(spec.origin).with_suffix("") if spec is not None and spec.origin else None
