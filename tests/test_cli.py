@@ -14,6 +14,7 @@ ENVIRONMENT = {
     **{name: value for name, value in os.environ.items() if not name.startswith(("GSL_", "COMP_", "_"))},
     "PYTHONPATH": str(TESTS),
     "GSL_CONFIG_DIR": str(TESTS / "conf_example"),
+    "GSL_TRUST": "example_stage",
     "NO_COLOR": "1",
 }
 HEAVY = {

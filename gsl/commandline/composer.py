@@ -92,8 +92,9 @@ def open_hydra(config_dir: Path | None) -> Iterator[None]:
         raise InputError(f"--config-dir {config_dir}: there is no such folder")
     OtherConfiguration.folder = config_dir.resolve() if config_dir is not None else None
     installed_plugins().register(OtherConfiguration)
-    BudgetedFiles.replace_hydras()
-    with initialize_config_dir(config_dir=str(configuration_folder()), version_base="1.3", job_name="gsl"):
+    with BudgetedFiles.in_place_of_hydras():
+        opening = initialize_config_dir(config_dir=str(configuration_folder()), version_base="1.3", job_name="gsl")
+    with opening:
         yield
 
 

@@ -31,9 +31,15 @@ class BudgetedFiles(FileConfigSource):
     """Reads yaml files as hydra does; a file that is not below our folders is checked before."""
 
     @classmethod
-    def replace_hydras(cls) -> None:
-        """Have hydra read its files through this."""
-        SourcesRegistry.instance().types[cls.scheme()] = cls
+    @contextmanager
+    def in_place_of_hydras(cls) -> Iterator[None]:
+        """Within, hydra sets up its sources of files with this; processes of a launcher know hydra's own alone."""
+        types, scheme = SourcesRegistry.instance().types, cls.scheme()
+        before, types[scheme] = types[scheme], cls
+        try:
+            yield
+        finally:
+            types[scheme] = before
 
     def load_config(self, config_path: str) -> ConfigResult:
         """Return what is in a file.
