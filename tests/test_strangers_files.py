@@ -128,8 +128,9 @@ def test_the_refusal_says_what_to_type_and_that_is_enough(place: Path) -> None:
 def test_an_effect_of_somebody_else_is_not_imported(place: Path) -> None:
     (place / "theirs/effect").mkdir(parents=True)
     (place / "theirs/effect/slop.yaml").write_text("_target_: evil.Thing\n")
-    for how in ((), ("--help",), ("--cfg", "job")):
-        assert "say trust=evil if" in gsl("collect", "--config-dir", "theirs", *how, folder=place).err
+    for how in ((), ("--cfg", "job"), ("--help",)):
+        said = gsl("collect", "--config-dir", "theirs", "world.effects.slop.x=1", *how, folder=place)
+        assert how == ("--help",) or (said.code == 2 and "say trust=evil if" in said.err)
 
 
 def test_a_run_of_somebody_else_is_repeated_with_their_code_only_if_it_is_trusted(artifact: Path, place: Path) -> None:
