@@ -2,7 +2,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install demo test torture docs iterate real xl330 so101 logs-of-so101 menagerie go2 check clean FORCE
+.PHONY: help install demo test quick torture docs iterate real xl330 so101 logs-of-so101 menagerie go2 check clean FORCE
 
 VENV ?= .venv
 GSL ?= $(VENV)/bin/gsl
@@ -27,6 +27,9 @@ demo: $(INSTALLED) ## Improve a walk for a "real" robot that the optimiser never
 test: $(INSTALLED) ## Check the style, run the tests.
 	$(VENV)/bin/ruff check
 	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n 2
+
+quick: $(INSTALLED) ## Run the tests that take no simulation of seconds; a minute.
+	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n 2 -m "not slow"
 
 torture: $(INSTALLED) ## Kill commands, flip bits, feed rubbish, fill the disk; an hour (docs/reference/reliability.md).
 	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python tests/torture.py $(TORTURE)

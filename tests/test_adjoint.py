@@ -19,6 +19,8 @@ from gsl.training.replay_path import LOST
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo_state import OUTPUT_ARMATURE, pack
 
+pytestmark = pytest.mark.slow
+
 SUBSTEPS, ROBUST = round(PERIOD / STEP), 3.0
 N, JOINTS = len(NAO.motors), len(NAO.controlled)
 FLOOR = np.full(JOINTS, 5e-4)

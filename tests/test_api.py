@@ -16,6 +16,8 @@ import gsl
 from gsl.errors import GslError
 from gsl.storage.trajectories import read
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

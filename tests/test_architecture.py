@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 PLOT = Path(__file__).parents[1]
 HOUSE = PLOT / "gsl"
 FLOORS = (  # from the ground up: a room imports from lower floors alone

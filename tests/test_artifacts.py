@@ -23,6 +23,8 @@ from gsl.storage import hashing, manifest
 from gsl.storage.artifact import Artifact, build
 from gsl.storage.documents import write_json
 
+pytestmark = pytest.mark.slow
+
 
 @dataclass
 class Doubling:

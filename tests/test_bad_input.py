@@ -15,6 +15,8 @@ from commands import SMALL, gsl, refused
 from safetensors import safe_open
 from safetensors.numpy import save
 
+pytestmark = pytest.mark.slow
+
 LINEAR = ("train-forward", "model=linear")
 GAT = ("optimize", *SMALL, "grounding=gat", "grounding.inverse_model=chain", "accept=true")
 

@@ -6,12 +6,15 @@ from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
+import pytest
 from test_limits import found
 from test_verdict import EMPTY, friction, selection, with_both
 
 from gsl.diagnosis.verdict.caveats import caveats
 from gsl.diagnosis.verdict.findings import Findings
 from gsl.diagnosis.verdict.verdict import Verdict
+
+pytestmark = pytest.mark.slow
 
 LEFT: dict[str, Any] = {"fraction": 0.63}
 NAMED = Verdict("causes", (), (), 0.97, 1.0, 1.0)

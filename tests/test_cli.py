@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 TESTS = Path(__file__).parent
 ENVIRONMENT = {
     **{name: value for name, value in os.environ.items() if not name.startswith(("GSL_", "COMP_", "_"))},

@@ -19,6 +19,8 @@ from gsl.worlds.cliff_walking import CliffWalking
 from gsl.worlds.gymnasium import GymnasiumWorld
 from gsl_experiments.table_episodes import played
 
+pytestmark = pytest.mark.slow
+
 DOWN = 2
 EDGE = {0.0: 98.70, 0.1: 73.62, 0.5: 23.05, 0.8: -3.83, 1.0: -10.90}  # the path along the edge, exact
 BEST = {0.0: 98.70, 0.1: 95.00, 0.5: 63.71, 0.8: 2.19, 1.0: -10.90}  # of the real world's own optimum

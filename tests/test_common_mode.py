@@ -17,6 +17,8 @@ from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
 from gsl.worlds.held import Held
 
+pytestmark = pytest.mark.slow
+
 PERIOD = 0.02
 NAO = lump(nao())
 MASKS = {"all": np.ones(15, dtype=bool), "legs": np.arange(15) < 11, "arms": np.arange(15) >= 11}

@@ -35,6 +35,8 @@ from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.held import Held
 from gsl.worlds.servo import BRISTLE
 
+pytestmark = pytest.mark.slow
+
 OMEGA = 2.0 * np.pi * FREQUENCY
 SOFT = {"servo_gain": {"kp": 0.5, "kd": 0.4}}
 WEAK = {"torque_limit": {"factor": 0.75}}

@@ -36,6 +36,8 @@ from gsl.storage.trajectories import write
 from gsl.validation.learned_replay import LearnedReplay, Simulated
 from gsl.worlds.bullet import BulletWorld
 
+pytestmark = pytest.mark.slow
+
 SOFT = {"servo_gain": {"kp": 0.5}}
 LATE, STICKY = {"command_latency": {"delay": 0.04}}, {"viscous_friction": {"coefficient": 1.0}}
 

@@ -17,6 +17,8 @@ from gsl.commandline.plugins import folders
 from gsl.core.described import describe, rebuilt
 from gsl.errors import ConfigError
 
+pytestmark = pytest.mark.slow
+
 CONF = Path(__file__).parent / "conf_example"
 
 

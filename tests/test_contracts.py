@@ -24,6 +24,8 @@ from gsl.optimizers.cma_es import CmaEs
 from gsl.tasks.excite import Excite, ExciteRun
 from gsl.testing import check_component, check_effect, check_grounding, check_policy, check_search, check_task
 
+pytestmark = pytest.mark.slow
+
 GROUNDINGS = {
     "none": NoGrounding(),
     "ane": ActionNoise(sd=0.02),

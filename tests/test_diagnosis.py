@@ -27,6 +27,8 @@ from gsl.report.diagnosis_text import summary_lines
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo_state import COMMANDS
 
+pytestmark = pytest.mark.slow
+
 PERIOD, NOISE = 0.02, 0.0015
 WIDE = {"servo_gain": {"kp": (0.004, 1.5), "kd": (0.03, 1.5)}}
 QUICK = Options(duels=0, nulls=0, most=1, threads=1)

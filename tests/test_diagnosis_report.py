@@ -23,6 +23,8 @@ from gsl.report.diagnosis_text import summary_lines
 from gsl.report.diagnosis_verdict import cause_name, headline, places, where_sentence
 from gsl.report.diagnosis_words import between, interval, level, list_words, probability, share, short, value
 
+pytestmark = pytest.mark.slow
+
 DOCUMENTS: dict[str, Callable[[], dict[str, Any]]] = {
     "causes": made.document,
     "no_gap": made.no_gap,

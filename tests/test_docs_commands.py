@@ -26,6 +26,8 @@ from gsl.commandline.own_word import spoken
 from gsl.effects.effect import names, use_own
 from gsl.errors import ConfigError
 
+pytestmark = pytest.mark.slow
+
 TYPED = [command for page in GUIDES for command in commands(page)]
 ONCE = list({command.words: command for command in TYPED}.values())  # several pages have some of them
 FLAGS = ("--json", "--multirun", "--check", "--help", "--cfg", "job")

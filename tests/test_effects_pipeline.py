@@ -24,6 +24,8 @@ from gsl.storage.policies import read_policies
 from gsl.storage.trajectories import read
 from gsl.worlds.bullet import BulletWorld
 
+pytestmark = pytest.mark.slow
+
 LATE = ("real=nao_ideal", "real.effects.command_latency.delay=0.02")
 LINE = ("iterate", *SMALL, *LATE, "name=air", "accept=true")
 FIRST = "runs/air/iteration_01"

@@ -41,6 +41,8 @@ from gsl.validation.gate import Gate
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
 
+pytestmark = pytest.mark.slow
+
 NAO = BulletWorld(robot="nao", effects={}, start_noise=0.02)  # as nao_ideal says
 LATE = {"effect": "command_latency", "joints": list("ab"), "scope": "all", "fixed": {}, "probability": 0.8}
 LATE |= {"parameters": {"delay": {"value": 0.0123456789, "low": 0.01, "high": 0.015, "unit": "s"}}}

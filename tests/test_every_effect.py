@@ -21,6 +21,8 @@ from gsl.testing import check_effect
 from gsl.worlds.bullet import BulletEnv, BulletWorld
 from gsl.worlds.fits import check_plant
 
+pytestmark = pytest.mark.slow
+
 TABLE = (
     "command_latency", "target_smoothing", "deadband", "quantisation", "action_noise", "servo_gain",
     "coulomb_friction", "viscous_friction", "stribeck_friction", "load_friction", "backlash", "joint_compliance",

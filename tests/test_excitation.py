@@ -22,6 +22,8 @@ from gsl.policies.sides import inwards, pairs
 from gsl.robots.nao import nao
 from gsl.storage.trajectories import read
 
+pytestmark = pytest.mark.slow
+
 PERIOD = 0.02
 SMALL = ("collect", "task=excite", "workers=1", "name=x", "policy.motions=[triangle_slow]", "task.duration=1.5")
 ALL = [(motion, variant) for motion in MENU for variant in VARIANTS]

@@ -31,6 +31,8 @@ from gsl.validation.check_grounding import check_grounding
 from gsl.validation.effects import check_effects
 from gsl.validation.gate import Gate
 
+pytestmark = pytest.mark.slow
+
 LATE = {"command_latency": {"delay": 0.02}}
 DRY = {"coulomb_friction": [{"torque": 0.1, "joints": "legs"}, {"torque": 0.05, "joints": "arms"}]}
 PAIRS = {"without an effect": {}, "one": LATE, "several": {**LATE, **DRY}}

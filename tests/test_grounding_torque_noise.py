@@ -28,6 +28,8 @@ from gsl.validation.check_grounding import check_grounding
 from gsl.validation.gate import Gate
 from gsl.worlds.bullet import BulletWorld
 
+pytestmark = pytest.mark.slow
+
 WORLD = BulletWorld(robot="nao", effects={"torque_limit": {"factor": 0.5, "joints": "arms"}})
 
 

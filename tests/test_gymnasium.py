@@ -46,6 +46,8 @@ from gsl.worlds.environments import own_module
 from gsl.worlds.gymnasium import GymnasiumWorld
 from gsl_experiments.noise_table import Point
 
+pytestmark = pytest.mark.slow
+
 CART = GymnasiumWorld(env_id="examples.cart:Cart")
 POLE = GymnasiumWorld(env_id="CartPole-v1")
 SLOPE = replace(CART, kwargs={"slope": 2.0})

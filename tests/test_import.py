@@ -17,6 +17,8 @@ from gsl.diagnosis.log.files import read_logs
 from gsl.storage.importers.suspicions import STUCK, measure_saturation, measure_stops
 from gsl.storage.trajectories import read
 
+pytestmark = pytest.mark.slow
+
 JOINTS = ("shoulder", "elbow")
 PERIOD = 0.01
 TIME = PERIOD * np.arange(301)

@@ -21,6 +21,8 @@ from gsl.errors import TrajectoryError
 from gsl.storage import parquet
 from gsl.storage.trajectories import read
 
+pytestmark = pytest.mark.slow
+
 Columns = dict[str, Any]
 
 

@@ -11,6 +11,8 @@ from commands import done, gsl, refused
 
 from gsl.robots.catalogue import robot
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = Path(__file__).parents[1] / "examples/arm.urdf"
 SHORT = ("task.duration=1.6", "policy.motions=[triangle_slow]", "policy.repeats=1", "workers=1")
 

@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 from commands import eventually, gsl, session, started
 
+pytestmark = pytest.mark.slow
+
 FOREVER = {
     "collect": ("episodes=2000",),
     "train-forward": ("data=chain/collect_real", "model=mlp", "model.epochs=1000000", "model.patience=1000000"),

@@ -11,6 +11,8 @@ from gsl.robots.nao import nao
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.held import Held
 
+pytestmark = pytest.mark.slow
+
 PERIOD = 0.02
 FINEST = 0.02 / 320  # of the reference [s]
 

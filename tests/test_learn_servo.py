@@ -23,6 +23,8 @@ from gsl.worlds.bullet import BulletEnv, BulletWorld
 from gsl.worlds.fits import fitting_step
 from gsl.worlds.held import Held
 
+pytestmark = pytest.mark.slow
+
 ROBOT, PERIOD = pendulum(), 0.02
 NOISE, STEP = 1e-3, 0.002
 SLOW = {

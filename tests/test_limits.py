@@ -18,6 +18,8 @@ from gsl.diagnosis.verdict.limits import Limit, limits
 from gsl.diagnosis.verdict.shrinkage import find_unexplained
 from gsl.report.diagnosis_limits import limits_sentence
 
+pytestmark = pytest.mark.slow
+
 NEAR: dict[str, Any] = {"by_joint": [{"after": 1.0}], "by_regime": []}  # as `shrinkage` tells it
 HIDDEN = {
     "command_latency": ("delay", 2e-4),

@@ -12,6 +12,8 @@ from commands import done, gsl
 
 from gsl.commandline.rerun import AGAIN
 
+pytestmark = pytest.mark.slow
+
 Damage = Callable[[Path], object]
 
 

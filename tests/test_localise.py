@@ -14,6 +14,8 @@ from gsl.diagnosis.verdict.localise import Cell, cells, find_regimes
 from gsl.errors import GslError
 from tests.test_diagnosis import QUICK, arm, found, log
 
+pytestmark = pytest.mark.slow
+
 
 def part(count: int) -> Log:
     """Some trajectories of the arm."""

@@ -26,6 +26,8 @@ from gsl.policies.limits import breach, limits
 from gsl.robots.nao import nao
 from gsl.worlds.held import Held
 
+pytestmark = pytest.mark.slow
+
 TIME = PERIOD * np.arange(150)
 ROBOTS: dict[str, Callable[[], Robot]] = {"nao": nao, "test_diagnosis.arm": arm}
 LAGS = ("command_latency", "target_smoothing", "viscous_friction", "servo_gain", "coulomb_friction")

@@ -20,6 +20,8 @@ from gsl.storage.generation_log import FILE, Generation, GenerationLog
 from gsl.storage.policies import read_policies
 from gsl.tasks.arm import Arm
 
+pytestmark = pytest.mark.slow
+
 
 def by_definition(values: np.ndarray, share: float) -> float:
     """The greatest t - E[(t - v)+] / share, which Rockafellar and Uryasev show to be the conditional value at risk."""

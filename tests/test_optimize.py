@@ -23,6 +23,8 @@ from gsl.storage.generation_log import Generation, GenerationLog
 from gsl.storage.policies import read_policies
 from gsl.tasks.arm import Arm
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = [
     *("name=kill", "grounding=none", "task=arm", "policy=linear", "world.floating=false", "world.settle=0.1"),
     *("optimizer.candidates=6", "optimizer.generations=6", "optimizer.sigma=0.2", "rollouts=1", "workers=1"),

@@ -15,6 +15,8 @@ from gsl.grounding.preparation import KIND, MODEL
 from gsl.robots.nao import nao
 from gsl.testing import check_grounding, check_search, check_task
 
+pytestmark = pytest.mark.slow
+
 GROUNDING = '''
 """Actions move as much less far in the simulator as the real joints move less fast."""
 from typing import Annotated, ClassVar

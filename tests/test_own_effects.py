@@ -23,6 +23,8 @@ from gsl.robots.nao import nao
 from gsl.testing import check_effect
 from gsl.worlds.bullet import BulletWorld
 
+pytestmark = pytest.mark.slow
+
 PAGE = Path(__file__).parents[1] / "docs/howto/own-components.md"
 MODULE, NAME = "cold_grease", "cold_grease"
 OWN = ("--config-dir", "my_conf")

@@ -12,6 +12,8 @@ from commands import SMALL, Said, done, gsl, started
 from gsl.report.iteration import Rounds
 from gsl.validation.gate import Gate
 
+pytestmark = pytest.mark.slow
+
 NAMED = (*SMALL, "name=chain")
 STAGES = ("collect_real", "collect_sim", "train_forward", "train_inverse", "optimize", "evaluate")
 

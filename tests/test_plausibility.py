@@ -23,6 +23,8 @@ from gsl.diagnosis.settings import SearchSettings
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.verdict.document import document
 
+pytestmark = pytest.mark.slow
+
 
 def with_channels(batch: Batch, channels: Mapping[str, Any]) -> Batch:
     """The log with further columns, each from an episode's ticks of positions [rad] and targets [rad]."""

@@ -13,6 +13,8 @@ from commands import done, gsl, refused
 
 import gsl as python
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(r"```\w+\n# (\S+)\n(.*?)```", re.DOTALL)
 OTHERS = {

@@ -32,6 +32,8 @@ from gsl.validation.policy_gap import Effort, policy_gap
 from gsl.validation.real_returns import MOST, measured_parents, real_returns
 from gsl.worlds.bullet import BulletWorld
 
+pytestmark = pytest.mark.slow
+
 TASK = Arm(duration=0.4)
 WORN = {"servo_gain": {"kp": 0.4}}
 HELD = ("world.floating=false", "world.settle=0.1")

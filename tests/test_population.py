@@ -22,6 +22,8 @@ from gsl.rollout.parallel import Job, episodes, trajectories
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.worlds.bullet import BulletWorld
 
+pytestmark = pytest.mark.slow
+
 
 def _jobs(scenario: Scenario, count: int = 4) -> list[Job]:
     rng = np.random.default_rng(0)

@@ -19,6 +19,8 @@ from gsl.storage.answers import csv_episodes
 from gsl.storage.trajectories import read, write
 from gsl.worlds.external import ExternalRobot
 
+pytestmark = pytest.mark.slow
+
 STEADY = (*SMALL, "accept=true", "recipe.spread=0.02")  # no neighbour falls
 LOOP = ("iterate", *STEADY, "grounding=gat", "real=robot")
 FIRST = "runs/loop/iteration_01"

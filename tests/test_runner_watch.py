@@ -25,6 +25,8 @@ from gsl.runner.watch import Hangs, Watch, is_stuck
 from gsl.tasks.walk import Walk
 from gsl.worlds.external import ExternalRobot
 
+pytestmark = pytest.mark.slow
+
 JOINTS = ExternalRobot(robot="nao").layout.joints
 LIMITS = ExternalRobot(robot="nao").limits
 PERIOD = 0.02

@@ -21,6 +21,8 @@ from gsl.storage.trajectories import read
 from gsl.training.servo_verdict import problems, remarks
 from gsl.worlds.bullet import BulletWorld
 
+pytestmark = pytest.mark.slow
+
 SOFT = ("real=nao_ideal", "real.effects.servo_gain.kp=0.6", "real.effects.command_latency.delay=0.02")
 LINE = ("iterate", *SMALL, *SOFT, "name=air", "accept=true", "grounding=servo")
 FIRST = "runs/air/iteration_01"

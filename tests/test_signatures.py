@@ -14,6 +14,8 @@ from gsl.robots.nao import CONTROLLED, nao
 from gsl.worlds.bullet import BulletEnv
 from gsl.worlds.drive_train import ROTOR_SHARE, TOOTH_STIFFNESS
 
+pytestmark = pytest.mark.slow
+
 SHOULDER, KNEE = CONTROLLED.index("LShoulderPitch"), CONTROLLED.index("LKneePitch")
 ARM_KP = 0.35 * 150.0
 HAND = 0.105 + 0.05595 + 0.03434  # from the shoulder to the centre of mass of the hand, arm stretched [m]

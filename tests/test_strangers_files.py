@@ -27,6 +27,8 @@ from gsl.storage.manifest import HASH
 from gsl.storage.manifest import _hash as manifest_hash
 from gsl.storage.requests import seal, write_request
 
+pytestmark = pytest.mark.slow
+
 SECONDS = 30.0
 LOG = "time,action.a,position.a\n" + "".join(f"{0.01 * k:.2f},{0.1 * k},{0.1 * k}\n" for k in range(50))
 SIGNALS = "signals:\n  action: 'action.{joint}'\n  position: 'position.{joint}'\n"

@@ -17,6 +17,8 @@ from gsl.training.torque_width import held_out_widths
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo_state import COMMANDS
 
+pytestmark = pytest.mark.slow
+
 PERIOD, NOISE = 0.02, {"encoder_noise": {"sd": 3e-4}}
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from torture import campaign
 
+pytestmark = pytest.mark.slow
+
 PARTS = {"kills": 1, "flips": 40, "inputs": 30, "disks": 1}
 
 

@@ -23,6 +23,8 @@ from gsl.storage.trajectories import read, write
 from gsl.training.data import HELDOUT, labels
 from gsl.worlds.grounded import GroundedEnv
 
+pytestmark = pytest.mark.slow
+
 QUIET: Any = SimpleNamespace(status=lambda text: None, table=lambda title, columns, rows: None)
 LINEAR = ModelConfig(family="linear", ridge=1e-6)
 

@@ -14,6 +14,8 @@ from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.simulate import calibration
 from gsl.effects.effect import apply_all, build
 
+pytestmark = pytest.mark.slow
+
 PARTS = ("kp", "kd", "coulomb", "viscous", "armature", "offset", "load_friction", "stribeck")
 
 

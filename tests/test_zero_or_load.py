@@ -20,6 +20,8 @@ from gsl.diagnosis.verdict.zero_or_load import find_droops
 from gsl.policies.limits import breach, limits
 from gsl.worlds.held import Held
 
+pytestmark = pytest.mark.slow
+
 OFF = {"zero_offset": {"offset": 0.014, "joints": "shoulder"}}
 LEFT_OUT = ("zero_offset", "sensor_bias", "gravity_tilt", "link_mass", "centre_of_mass", "external_push")
 

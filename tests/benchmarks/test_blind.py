@@ -37,6 +37,8 @@ from gsl_benchmarks.blind.same import SETTLE, STEP, play_same
 from gsl_benchmarks.blind.strength import BANDS, Yardstick, turned_up
 from gsl_benchmarks.blind_answer import BlindAnswer
 
+pytestmark = pytest.mark.slow
+
 PERIOD = 0.02
 TOY = (
     "sim.robot=blind_arm.arm", "sim.floating=false", "excitation.motions=[steps_large,triangle_fast]",

@@ -25,6 +25,8 @@ from gsl_benchmarks.blind.on_foot import Track, Yardstick
 from gsl_benchmarks.blind.seals import files_below
 from gsl_benchmarks.blind.walks import Individual, Walks
 
+pytestmark = pytest.mark.slow
+
 SMALL = Walks(episodes=2, duration=1.0)
 TOY = ("cases=0", "mix.walk=1", "walks.episodes=2", "walks.duration=1.0", "programmes=1", "workers=1", "name=toy")
 WHOLE = "walks.still=0.97"  # of walks that end in a fall a diagnosis wants more than so short ones have

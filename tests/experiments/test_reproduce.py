@@ -30,6 +30,8 @@ from gsl_experiments.paper_tables import Figure5, LinearWalkTable, Table3, Table
 from gsl_experiments.sizes import numbers, trials_of
 from gsl_experiments.trial import Trial
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 KEPT = {

@@ -27,6 +27,8 @@ from gsl_experiments.reproduce import Reproduce
 from gsl_experiments.trial import Trial
 from gsl_experiments.tried import foretelling
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 PLACE, TRIALS = ROOT / "docs/results", ROOT / "experiments/trials"
 PAGES = [*sorted(PLACE.glob("*.md")), ROOT / "docs/howto/own-environment.md"]
