@@ -60,7 +60,9 @@ def test_friction_that_differs_between_legs_and_arms_is_told_apart() -> None:
         Trajectory(PERIOD * np.arange(151), path[:, :15], told, np.zeros_like(told))
         for path, told in zip(paths, logged, strict=True)
     )
-    batch = Batch(episodes, NAO.controlled, PERIOD, {"episodes": [{"policy": str(k)} for k in range(4)]})
+    batch = Batch(
+        episodes, NAO.controlled, PERIOD, {"episodes": [{"policy": str(k)} for k in range(4)], "world": {"step": 0.002}}
+    )
     problem = Nominal(plant, 0.002).problem(cut_log(batch, NAO), Options(threads=1), lambda phase: None)
     friction = candidate("coulomb_friction", "torque")
     everywhere = problem.fit((friction,), np.array([0.15]), no_shifts(15), every=1)

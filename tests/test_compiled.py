@@ -12,9 +12,9 @@ import pytest
 pytestmark = pytest.mark.slow
 
 DOUBLING = """
-from gsl.core.compiled import compiled
+from gsl.core.compiled import compile_kernel
 
-@compiled
+@compile_kernel
 def double(x):
     return 2.0 * x
 

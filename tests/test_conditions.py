@@ -49,7 +49,7 @@ def labelled(batch: Batch, **more: Any) -> Batch:
 
 def joined(first: Batch, second: Batch) -> Batch:
     labels = [*first.metadata["episodes"], *second.metadata["episodes"]]
-    return replace(first, episodes=(*first.episodes, *second.episodes), metadata={"episodes": labels})
+    return replace(first, episodes=(*first.episodes, *second.episodes), metadata={**first.metadata, "episodes": labels})
 
 
 def both(**cause: Any) -> Batch:

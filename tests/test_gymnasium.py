@@ -689,7 +689,7 @@ def test_rounds_go_on_from_what_the_real_world_chose(tmp_path: Path) -> None:
     further = [f"{world}/none/trial_01/iteration_02" for world in sims]
     assert sorted(searches) == sorted([*further, *(f"{sim}/none/trial_01" for sim in sims.values())])
     table = (runs / "reproduce/table.md").read_text()
-    assert "by 2 real episodes each; values are of 3 others" in table and "| 0 | 2 |" in table
+    assert "2 real episodes" in table and "Values are of 3 other episodes." in table and "| 0 | 2 |" in table
 
 
 def _known(row: dict[str, Any]) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def test_it_takes_torque_and_speed_for_placeholders_and_a_choice_of_joints(place
         ("urdf=models/arm.urdf name=arm period=0", "period = 0: must be above 0 (s)"),
         ("urdf=models/arm.urdf name=arm nme=x", "nme: no such setting; did you mean name?"),
         ("urdf=models/none.urdf name=arm", "models/none.urdf: cannot be read: No such file or directory"),
-        ("urdf=models name=arm", "models: cannot be read: Is a directory"),
+        ("urdf=models name=arm", "models: cannot be read: is a folder"),
         ("urdf=models/arm.urdf name=models", "models: exists; choose another folder with out="),
         ("urdf=models/arm.urdf name=arm joints=elbo", "joints.elbo: the URDF has no such joint; did you mean elbow?"),
         ("urdf=models/arm.urdf name=arm effort=much", "effort = much: must be a number (N·m)"),

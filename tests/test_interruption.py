@@ -65,10 +65,10 @@ def test_an_interruption_waits_until_a_library_is_imported() -> None:
     """One within torch's import is an exception in its C++, which aborts the process (seen once)."""
     importing = """
 import os, signal
-from gsl.core.interruption import held, listen
+from gsl.core.interruption import hold_interrupts, listen
 listen()
 try:
-    with held():
+    with hold_interrupts():
         os.kill(os.getpid(), signal.SIGINT)
         print("imported")
     print("went on")

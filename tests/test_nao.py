@@ -55,7 +55,7 @@ def test_left_and_right_are_mirror_images() -> None:
     motors = list(robot.motors)
     for left in (name for name in motors if name.startswith("L")):
         i, k = motors.index(left), motors.index("R" + left[1:])
-        assert all(getattr(plant.servo, row)[i] == getattr(plant.servo, row)[k] for row in plant.servo.__dict__)
+        assert all(getattr(plant.servo, row)[i] == getattr(plant.servo, row)[k] for row in plant.servo._fields)
 
 
 def test_every_inertia_tensor_is_that_of_a_body() -> None:

@@ -54,7 +54,9 @@ def played(
     held = Held.of(calibration.calibrate(apply_all(nominal(robot), build(effects)), drawn), 0.002, PERIOD)
     order = [*commands, next(iter(commands))]
     episodes = tuple(logged(held, commands[name], NOISE, rng) for name in order)
-    batch = Batch(episodes, robot.controlled, PERIOD, {"episodes": [{"policy": name} for name in order]})
+    batch = Batch(
+        episodes, robot.controlled, PERIOD, {"episodes": [{"policy": name} for name in order], "world": {"step": 0.002}}
+    )
     options = QUICK.__class__(**{**vars(QUICK), "without": without})
     return diagnose(batch, nominal(robot), 0.002, options, lambda phase: None)
 

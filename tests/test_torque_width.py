@@ -40,7 +40,11 @@ def log(effects: dict[str, Any], count: int = 16) -> Log:
         actions = np.vstack([actions, np.full(15, np.nan)])
         episodes.append(Trajectory(PERIOD * np.arange(len(rows)), actions, position, velocity))
     env.close()
-    metadata = {"robot": "nao", "episodes": [{"policy": f"swing_{index}"} for index in range(count)]}
+    metadata = {
+        "robot": "nao",
+        "episodes": [{"policy": f"swing_{index}"} for index in range(count)],
+        "world": {"step": 0.002},
+    }
     return cut_log(Batch(tuple(episodes), nao().controlled, PERIOD, metadata), nao())
 
 

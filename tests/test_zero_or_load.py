@@ -79,7 +79,8 @@ def test_a_zero_that_is_named_is_one_as_well() -> None:
     """Where the library explains it, an offset in the servo or in the log is still no load for sure."""
     named = played(OFF, swings(0.08, 0.9, 1.2), without=LEFT_OUT[2:])
     off = replace(named.answer.fit, shifts=calibration.no_shifts(2))
-    cause = next(one for one in named.selection.tried if one.names in (("zero_offset",), ("sensor_bias",)))
+    candidate = next(one for one in named.problem.library if one.effect in ("zero_offset", "sensor_bias"))
+    cause = named.problem.fit((candidate,), np.array([0.014]), calibration.no_shifts(2))
     chosen = replace(cause, fit=off)
     verdict = replace(named.verdict, word="inseparable")
     found = replace(named, selection=replace(named.selection, chosen=chosen), verdict=verdict)

@@ -111,7 +111,7 @@ def replays(simulator: InTheAir, pieces: Pieces, shifts: np.ndarray) -> Replay:
     plant = calibrate(simulator.plant, shifts)
     assert isinstance(pieces.windows, Windows), "windows in the air"
     parts = [
-        (Held.of(change(plant, conditions), simulator.step, simulator.period), index)
+        (Held.of(change(plant, conditions), simulator.step, simulator.period, simulator.accurate), index)
         for conditions, index in pieces.alike
     ]
     windows, joints = pieces.windows, pieces.real.shape[2]
