@@ -14,7 +14,7 @@ from gsl.core.table import Table
 from gsl.core.trajectory import Trajectory
 from gsl.errors import InputError
 from gsl.grounding.states import TableTransformation
-from gsl.models.counts import Counts, counted
+from gsl.models.counts import Counts, count_transitions
 from gsl.worlds.cliff_walking import CliffWalking
 from gsl.worlds.gymnasium import GymnasiumWorld
 from gsl_experiments.table_episodes import played
@@ -98,7 +98,7 @@ def test_numbers_that_are_no_states_are_refused(state: float, line: str) -> None
     states, nothing = np.array([[36.0], [state]]), np.zeros((2, 0))
     one = Trajectory(np.arange(2.0), np.zeros((1, 1)), nothing, nothing, state=states)
     with pytest.raises(InputError, match=line):
-        counted([one], 48, 4)
+        count_transitions([one], 48, 4)
 
 
 def test_what_was_never_seen_is_left_alone() -> None:

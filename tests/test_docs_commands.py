@@ -22,7 +22,7 @@ from pages import FENCE, GUIDES, ROOT, Command, commands
 from gsl.commandline.composer import compose, open_hydra
 from gsl.commandline.config import prepare, resolve
 from gsl.commandline.own_effects import load_own_effects
-from gsl.commandline.own_word import spoken
+from gsl.commandline.own_word import find_trust
 from gsl.effects.effect import names, use_own
 from gsl.errors import ConfigError
 
@@ -110,7 +110,7 @@ def built(words: list[str], home: Path) -> None:
     taken = [word for k, word in enumerate(rest) if word not in FLAGS and (place is None or k - place not in (0, 1))]
     assert all("=" in word or word.startswith("~") for word in taken), taken
     with open_hydra(own):
-        load_own_effects(own, spoken(taken))
+        load_own_effects(own, find_trust(taken))
         composition = compose(name, taken, multirun="--multirun" in rest)
         try:
             prepare(resolve(composition), composition.trust)

@@ -157,3 +157,9 @@ def test_what_is_alike_in_the_air_by_nature_wants_feet_on_the_ground() -> None:
     wanted = next_experiment(found, choices())
     assert wanted is not None and wanted.separates == (("sensor_bias", "zero_offset"),)
     assert wanted.episodes == () and "ground" in wanted.excitation
+
+
+def test_an_effect_that_makes_a_robot_run_away_would_have_been_seen() -> None:
+    rehearsal, shifts = Rehearsal.again(played({}, swings(0.3, 0.0, 0.6))), calibration.no_shifts(2)
+    wild = Explanation({"viscous_friction": {"coefficient": 1e4}}, shifts)
+    assert np.isposinf(rehearsal.log_odds(wild, (Explanation({}, shifts),))).all()

@@ -29,7 +29,7 @@ from gsl.storage.policies import write_policies
 from gsl.storage.policy_choice import EVALUATION, policies, record
 from gsl.tasks.arm import Arm
 from gsl.validation.policy_gap import Effort, policy_gap
-from gsl.validation.real_returns import MOST, measured_parents, real_returns
+from gsl.validation.real_returns import MOST, list_parents, real_returns
 from gsl.worlds.bullet import BulletWorld
 
 pytestmark = pytest.mark.slow
@@ -134,7 +134,7 @@ def test_an_iterate_stands_for_its_evaluations(arms: Path, tmp_path: Path, monke
     sizes = ("experiment=arm", "preset=toy", "grounding=none", "task.duration=0.4", "sim=nao_ideal", "workers=1")
     done("iterate", "name=whole", "grounding=gat", *sizes, folder=tmp_path)
     monkeypatch.chdir(tmp_path)
-    assert [path.name for path in measured_parents("whole").values()] == ["iterate", "evaluate", "optimize"]
+    assert [path.name for path in list_parents("whole").values()] == ["iterate", "evaluate", "optimize"]
     assert [one.name for one in real_returns("whole", AIR).policies] == list(NAMES)
     done("iterate", "name=twice", "iterations=2", "grounding=gat", *sizes, folder=tmp_path)
     found = real_returns("twice", AIR).policies  # the second begins with what the first has returned

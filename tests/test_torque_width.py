@@ -13,7 +13,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
-from gsl.training.torque_width import held_out_widths
+from gsl.training.torque_width import measure_widths
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo_state import COMMANDS
 
@@ -49,7 +49,7 @@ def log(effects: dict[str, Any], count: int = 16) -> Log:
 
 
 def widths(effects: dict[str, Any], known: dict[str, Any] | None = None) -> dict[str, tuple[float, float]]:
-    both = held_out_widths(log(effects), apply_all(nominal(nao()), build(known or {})), step=0.002)
+    both = measure_widths(log(effects), apply_all(nominal(nao()), build(known or {})), step=0.002)
     return {group: tuple(width) for group, width in both.items()}
 
 

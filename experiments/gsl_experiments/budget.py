@@ -23,7 +23,7 @@ from gsl.report.markdown import table
 from gsl.rollout.rollout import Scenario
 from gsl.stages.iterate import Iterate, check_trainable
 from gsl.training.data import FEWEST, degrees
-from gsl.validation.replay import replayed
+from gsl.validation.replay import replay_starts
 from gsl_experiments.budget_curve import Line, budget_curve
 from gsl_experiments.compare import Compare
 from gsl_experiments.comparison_table import bounds, finely, told_difference
@@ -156,7 +156,7 @@ class Budget:
         assert isinstance(acting, LoadedTransformation), "its world is a robot"
         env: Any = chain.sim.make()
         drawn = derive_seed(seed, "replays")
-        grounded, bare = (replayed(env, one, begins, drawn)[TICKS] for one in (acting.expected, NoGrounding()))
+        grounded, bare = (replay_starts(env, one, begins, drawn)[TICKS] for one in (acting.expected, NoGrounding()))
         env.close()
         errors = degrees(grounded.joints), degrees(bare.joints)
         return Point(method, count, number, measured.metrics["returned"]["value"], *errors)

@@ -26,7 +26,7 @@ from gsl.validation.check import ask_reachability
 from gsl.validation.check_grounding import check_grounding
 from gsl.validation.compliance import joint_groups
 from gsl.validation.gate import Gate
-from gsl.validation.replay import replayed
+from gsl.validation.replay import replay_starts
 from gsl.worlds.bullet import BulletWorld
 from gsl_experiments.compare import Compare
 from gsl_experiments.effort import seconds
@@ -129,7 +129,7 @@ class Replays:
         if isinstance(acting, LoadedTransformation):
             acting = acting.expected
             reach = ask_reachability(env, acting, of_policy(held, pi0=False), drawn)
-        after = replayed(env, acting, begins, drawn)
+        after = replay_starts(env, acting, begins, drawn)
         env.close()
         console.status("loading single joints in the air")
         yielding = loads.yielding(scenario.world, acting, self.worlds[world])

@@ -14,7 +14,7 @@ from gsl.commandline.composer import commands, compose, open_hydra
 from gsl.commandline.config import CommandSettings, execute, resolve
 from gsl.commandline.overrides import file_of
 from gsl.commandline.own_effects import load_own_effects
-from gsl.commandline.own_word import spoken
+from gsl.commandline.own_word import find_trust
 from gsl.core.console import Silent
 from gsl.core.described import describe
 from gsl.core.interfaces import World
@@ -53,7 +53,7 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
     folder, arguments = None if config_dir is None else Path(config_dir), list(overrides(plain))
     with open_hydra(folder):
         if folder is not None:  # effects of a world that is there already stay
-            load_own_effects(folder, spoken(arguments))
+            load_own_effects(folder, find_trust(arguments))
         composition = compose(command, arguments)
         config = resolve(composition)
     trust = [*composition.trust]

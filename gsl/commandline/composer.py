@@ -23,9 +23,9 @@ from yaml import YAMLError
 from gsl.commandline.config_errors import Vocabulary, misshapen, translate, unfit, unknown_key
 from gsl.commandline.known_settings import list_keys, plain, read_declared
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
-from gsl.commandline.own_word import find_own_modules, spoken
+from gsl.commandline.own_word import find_own_modules, find_trust
 from gsl.commandline.plugins import folders, packages
-from gsl.commandline.yaml_files import USER, BudgetedFiles, installed_plugins
+from gsl.commandline.yaml_files import USER, BudgetedFiles, load_plugins
 from gsl.core.setting import Setting
 from gsl.core.trust import TARGET, check_code, is_ours
 from gsl.core.validation import did_you_mean
@@ -91,7 +91,7 @@ def open_hydra(config_dir: Path | None) -> Iterator[None]:
     if config_dir is not None and not config_dir.is_dir():
         raise InputError(f"--config-dir {config_dir}: there is no such folder")
     OtherConfiguration.folder = config_dir.resolve() if config_dir is not None else None
-    installed_plugins().register(OtherConfiguration)
+    load_plugins().register(OtherConfiguration)
     with BudgetedFiles.in_place_of_hydras():
         opening = initialize_config_dir(config_dir=str(configuration_folder()), version_base="1.3", job_name="gsl")
     with opening:
@@ -104,7 +104,7 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
     Raises:
         ConfigError: An argument is malformed, or names a setting, option or effect that does not exist.
     """
-    vocabulary, typed = Vocabulary((), {}, options), spoken(arguments)
+    vocabulary, typed = Vocabulary((), {}, options), find_trust(arguments)
     find_own_modules(typed)
     trust = (*typed, *(package for package in packages() if not is_ours(package)))
     try:

@@ -22,7 +22,7 @@ from gsl.commandline.config import CommandSettings, resolve
 from gsl.commandline.known_settings import plain, read_declared
 from gsl.commandline.overrides import OPTIONAL_GROUPS
 from gsl.commandline.own_effects import load_own_effects
-from gsl.commandline.own_word import spoken
+from gsl.commandline.own_word import find_trust
 from gsl.core.setting import REQUIRED, Setting, settings_of
 from gsl.effects.effect import effect_class, names
 from gsl.errors import ConfigError, GslError
@@ -59,7 +59,7 @@ class Explanation:
 def explain(command: str, typed: Sequence[str] = (), *, config_dir: Path | None = None) -> Explanation:
     """Return what the yaml files and classes of a command say about themselves, with what is typed if it is right."""
     with open_hydra(config_dir):
-        load_own_effects(config_dir, spoken(typed))
+        load_own_effects(config_dir, find_trust(typed))
         try:
             composition = compose(command, typed)
         except GslError:

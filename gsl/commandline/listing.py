@@ -19,13 +19,13 @@ from gsl.storage.hashing import SHORT
 from gsl.storage.identity import content_hash
 from gsl.storage.lineage import out_of_date
 from gsl.storage.manifest import Manifest, Parent, find_damage, read
-from gsl.storage.references import RUNS, damaged_folders, find_all, resolve
+from gsl.storage.references import RUNS, find_all, find_damaged, resolve
 
 
 def list_runs(console: Console) -> None:
     """List the complete artifacts below runs/."""
     found = find_all()
-    for folder in damaged_folders():
+    for folder in find_damaged():
         console.status(f"{folder.as_posix()}: its manifest cannot be read; gsl verify says why")
     rows = [
         (_name_run(one.folder), one.manifest.kind, _local(one.manifest.created), _span(one.manifest), headline(one))

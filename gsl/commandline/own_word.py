@@ -20,7 +20,7 @@ _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _TRUTH = ("true", "false")
 
 
-def spoken(arguments: Sequence[str]) -> tuple[str, ...]:
+def find_trust(arguments: Sequence[str]) -> tuple[str, ...]:
     """Return the modules that a command line names: in `trust=`, and wherever it says itself which class to take.
 
     Args:
@@ -30,7 +30,7 @@ def spoken(arguments: Sequence[str]) -> tuple[str, ...]:
         ConfigError: `trust` names no module.
     """
     named = [word for word in os.environ.get(VARIABLE, "").replace(",", " ").split()]
-    for key, value in _typed(arguments):
+    for key, value in _split_words(arguments):
         named += modules_of(value) if key == TRUST else modules_in({key.rpartition(".")[2]: value})
     return tuple(dict.fromkeys(named))
 
@@ -55,7 +55,7 @@ def find_own_modules(trust: Collection[str]) -> None:
         sys.path.append(os.getcwd())
 
 
-def _typed(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:
+def _split_words(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:
     """Yield keys and values; what cannot be read is told by whoever composes."""
     parser = OverridesParser.create()
     for argument in arguments:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gsl.commandline.own_word import find_own_modules, spoken
+from gsl.commandline.own_word import find_own_modules, find_trust
 from gsl.core.described import rebuilt
 from gsl.errors import ArtifactError, ConfigError
 from gsl.report.console import Console
@@ -48,12 +48,12 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
         if content_hash(source) != parent.hash:
             raise ArtifactError(source, f"is no longer what {folder.as_posix()} was made from")
         _move(config, parent.role.split("."), source)
-    trust = spoken(settings)
+    trust = find_trust(settings)
     find_own_modules(trust)
     stage = rebuilt(config, trust=trust)
     command = f"gsl rerun {folder.as_posix()}"
     new = build(stage, config=config, out=place, command=command, force=False, console=console)
-    rows = list(_compared(old, new))
+    rows = list(_compare(old, new))
     other = [name for name, _, same in rows if not same]
     document = {"folder": place, "differs": other, "compared": [name for name, _, _ in rows]}
     console.table(
@@ -94,7 +94,7 @@ def _entry(settings: Any, name: str) -> Any:
     return None
 
 
-def _compared(old: Artifact, new: Artifact) -> Iterator[tuple[str, str, bool]]:
+def _compare(old: Artifact, new: Artifact) -> Iterator[tuple[str, str, bool]]:
     """Yield the name and new hash of each file of the payload and each artifact beside it, and if it is the same."""
     before, after = (
         {name: file.sha256 for name, file in one.manifest.files.items() if Path(name).name not in CIRCUMSTANCES}

@@ -13,7 +13,7 @@ from gsl.commandline.composer import compose, open_hydra
 from gsl.commandline.config import execute, prepare, resolve
 from gsl.commandline.multirun import run_jobs
 from gsl.commandline.own_effects import load_own_effects
-from gsl.commandline.own_word import spoken
+from gsl.commandline.own_word import find_trust
 from gsl.report.console import Console
 
 
@@ -43,7 +43,7 @@ def run(
     flags = [*(["--multirun"] if multirun else []), *([f"--config-dir={config_dir}"] if config_dir else [])]
     line = shlex.join(["gsl", *command.split(), *flags, *overrides])
     with open_hydra(config_dir):
-        for reason in load_own_effects(config_dir, spoken(overrides)):
+        for reason in load_own_effects(config_dir, find_trust(overrides)):
             console.status(f"left out: {reason}")
         composition = compose(command, overrides, multirun=multirun)
         if cfg:

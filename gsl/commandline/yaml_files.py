@@ -115,7 +115,7 @@ def _resolver(text: str) -> str:
     return ""
 
 
-def installed_plugins() -> Plugins:
+def load_plugins() -> Plugins:
     """Return hydra's plugins; a folder hydra_plugins where the command is typed is not imported."""
     with _without_current_folder():
         return Plugins.instance()

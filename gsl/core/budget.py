@@ -142,7 +142,7 @@ def _resident() -> float:
         return 0.0
 
 
-def repeated(names: Iterable[str]) -> str | None:
+def find_repeat(names: Iterable[str]) -> str | None:
     """Return the first name that comes twice, None if none does."""
     seen: set[str] = set()
     for name in names:

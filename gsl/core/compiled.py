@@ -38,7 +38,7 @@ class _CheckedFiles(IndexDataCacheFile):
 
     def _load_index(self) -> dict[Any, str]:
         try:
-            version, stamp, overloads = pickle.loads(self._checked(self._index_path))
+            version, stamp, overloads = pickle.loads(self._check(self._index_path))
         except OSError:
             return {}
         return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
@@ -47,7 +47,7 @@ class _CheckedFiles(IndexDataCacheFile):
         self._write(self._index_path, (self._version, self._source_stamp, overloads))
 
     def _load_data(self, name: str) -> Any:
-        return pickle.loads(self._checked(self._data_path(name)))
+        return pickle.loads(self._check(self._data_path(name)))
 
     def _save_data(self, name: str, data: Any) -> None:
         self._write(self._data_path(name), data)
@@ -57,7 +57,7 @@ class _CheckedFiles(IndexDataCacheFile):
         with self._open_for_write(path) as file:
             file.write(hashlib.sha256(contents).digest() + contents)
 
-    def _checked(self, path: str) -> bytes:
+    def _check(self, path: str) -> bytes:
         stored = Path(path).read_bytes()
         if hashlib.sha256(stored[_HASH:]).digest() != stored[:_HASH]:
             _say_once(self._cache_path)

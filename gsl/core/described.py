@@ -45,12 +45,12 @@ def rebuilt(told: Any, *, trust: Collection[str] = (), where: str = "") -> Any:
         ConfigError: A setting is wrong, or names a class that is not there or may not be imported.
     """
     check_code(told, trust, where)
-    return _built(told, where)
+    return _build(told, where)
 
 
-def _built(told: Any, where: str) -> Any:
+def _build(told: Any, where: str) -> Any:
     if isinstance(told, Mapping):
-        settings = {key: _built(value, f"{where}.{key}".lstrip(".")) for key, value in told.items()}
+        settings = {key: _build(value, f"{where}.{key}".lstrip(".")) for key, value in told.items()}
         if TARGET not in settings:
             return settings
         kind = class_of(settings.pop(TARGET), where)
@@ -59,5 +59,5 @@ def _built(told: Any, where: str) -> Any:
         except ConfigError as error:
             raise error.under(where) from error
     if isinstance(told, list | tuple):
-        return [_built(value, f"{where}.{index}".lstrip(".")) for index, value in enumerate(told)]
+        return [_build(value, f"{where}.{index}".lstrip(".")) for index, value in enumerate(told)]
     return told

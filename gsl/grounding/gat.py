@@ -231,7 +231,7 @@ class TransformationRun:
         position, every, action = self._senses.position(observation)[self._known], action, action[self._known]
         real.see(position, self._senses.sensed(observation))
         window = real.complete(action)
-        wanted, trust = self._wanted(window)
+        wanted, trust = self._predict(window)
         sim.see(position, ())
         inverse = grounding.inverse.action(sim.complete(action), action, wanted)
         sent = ground(action, inverse, self._alpha * trust)
@@ -248,7 +248,7 @@ class TransformationRun:
         every[self._known] = sent
         return every
 
-    def _wanted(self, window: np.ndarray) -> tuple[np.ndarray, float | np.ndarray]:
+    def _predict(self, window: np.ndarray) -> tuple[np.ndarray, float | np.ndarray]:
         """What f says, and how far to believe it: from 1 up to the gate to 0 at twice that, joint by joint."""
         gate, forward = self._grounding.gate, self._grounding.forward
         if gate is None or not isinstance(forward, Ensemble):

@@ -62,7 +62,7 @@ class Counts:
         return cls(arrays["seen"], about["kind"])
 
 
-def counted(episodes: Sequence[Trajectory], cells: int, choices: int) -> np.ndarray:
+def count_transitions(episodes: Sequence[Trajectory], cells: int, choices: int) -> np.ndarray:
     """Return how often each transition occurs in some episodes, shape (S, A, S); actions are those carried out.
 
     Raises:

@@ -19,7 +19,7 @@ from gsl.real_robot.judging import Verdict, by_distance, judge
 from gsl.rollout.parallel import Job, trajectories
 from gsl.rollout.rollout import Scenario
 from gsl.runner.guard import Guard
-from gsl.runner.request import GROUND, HELD, NAME, due, stored_request
+from gsl.runner.request import GROUND, HELD, NAME, due, read_stored
 from gsl.storage import manifest
 from gsl.storage.answer_checks import check_answers
 from gsl.storage.answers import Answered, answer_files, read_answers
@@ -137,7 +137,7 @@ def _write_request(folder: Path, request: Mapping[str, Any]) -> bool:
     if not folder.exists() or (folder.is_dir() and not (folder / NAME).exists() and not answer_files(folder)):
         return False
     try:
-        return bool(stored_request(folder)["hash"] == request["hash"])
+        return bool(read_stored(folder)["hash"] == request["hash"])
     except ArtifactError:
         return False
 

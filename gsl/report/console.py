@@ -55,7 +55,7 @@ class Console:
         self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
     ) -> None:
         """Print a table of results on stdout, of a `part` on stderr; with JSON it is left to `result`."""
-        title, caption = visible(self._titled(title)), visible(caption or "")
+        title, caption = visible(self._title(title)), visible(caption or "")
         columns = [visible(column) for column in columns]
         rows = [_visible_cells(row) for row in rows]
         _log.info("%s", "\n".join([title, *("\t".join(map(str, row)) for row in [columns, *rows]), caption]))
@@ -118,7 +118,7 @@ class Console:
     @contextmanager
     def live_table(self, title: str, columns: Sequence[str]) -> Iterator[LiveTable]:
         """Show a growing table on a terminal, else each row as a line; the final table is for `table`."""
-        title = visible(self._titled(title))
+        title = visible(self._title(title))
         if not self._stderr.is_terminal or self._live is not None:
             self._lines = LineTable(title, columns, self.status)
             try:
@@ -135,7 +135,7 @@ class Console:
             finally:
                 self._live = None
 
-    def _titled(self, title: str) -> str:
+    def _title(self, title: str) -> str:
         return f"{self._part}: {title}" if self._part else title
 
     @cached_property

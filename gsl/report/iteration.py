@@ -65,7 +65,7 @@ class Rounds:
         if self.rising or (first and evaluation.metrics["gain"]["value"] > 0.0):
             self.best = evaluation
         in_the_air = f" + {self._flight.episodes} in the air" if first and self._flight else ""
-        return self._added(str(len(self._done)), evaluation.metrics, f"{cost}{in_the_air}", first=first)
+        return self._add(str(len(self._done)), evaluation.metrics, f"{cost}{in_the_air}", first=first)
 
     def refused(self, why: str, collected: int) -> tuple[str, ...]:
         """Take in an iteration that ended at its grounding, after some real episodes, and return its row."""
@@ -80,7 +80,7 @@ class Rounds:
     def add_beside(self, evaluation: Artifact) -> list[tuple[str, ...]]:
         """Take in what is shown for comparison, and return its rows."""
         self._beside = evaluation
-        return self._added("no grounding", evaluation.metrics, str(evaluation.metrics["real_episodes"]), first=False)
+        return self._add("no grounding", evaluation.metrics, str(evaluation.metrics["real_episodes"]), first=False)
 
     @property
     def verdict(self) -> str:
@@ -181,18 +181,18 @@ class Rounds:
         document = json.loads((evaluation.folder / EVALUATION).read_text(encoding="utf-8"))
         return search(label, document, shown=self._unit.factor, returned=evaluation.metrics["best"], start=start)
 
-    def _added(self, label: str, metrics: Mapping[str, Any], cost: str, *, first: bool) -> list[tuple[str, ...]]:
+    def _add(self, label: str, metrics: Mapping[str, Any], cost: str, *, first: bool) -> list[tuple[str, ...]]:
         simulated, gain = metrics["returned_value_sim"], metrics["gain"]
         expected = "" if simulated is None else self._unit.bare(simulated)
         told = format_gain(gain["share"]) or self._unit.shown(gain["value"], sign=True)
-        zero: tuple[str, ...] = ("0", "π0", "", *self._measured(metrics["baseline"]), "", "")
+        zero: tuple[str, ...] = ("0", "π0", "", *self._format_measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
         name = BEGUN.get(metrics["best"], metrics["best"])
-        rows.append((label, name, expected, *self._measured(metrics["returned"]), told, cost))
+        rows.append((label, name, expected, *self._format_measured(metrics["returned"]), told, cost))
         self.rows += rows
         return rows
 
-    def _measured(self, summary: Mapping[str, Any]) -> tuple[str, str, str]:
+    def _format_measured(self, summary: Mapping[str, Any]) -> tuple[str, str, str]:
         return (
             self._unit.bare(summary["value"]),
             self._unit.interval(summary["interval"]),

@@ -114,7 +114,7 @@ class Player:
         rows, fell, stopped = [], False, ""
         actor = self.watch.call("the policy's start", Actor, self.request, episode, patience=FIRST)
         self._senses = Senses(self._layout)
-        self._called("begin", episode)
+        self._call("begin", episode)
         self.clock.begin()
         tick, now, broken = 0, 0.0, False
         seen = self._read(now)
@@ -157,9 +157,9 @@ class Player:
             self.guard.start(self.guard.last)
             self._ramp(np.array(episode["posture"], dtype=float), back=True)
         except Lies:
-            self._called("end")
+            self._call("end")
             raise
-        self._called("end")
+        self._call("end")
 
     def after_a_hang(self, *, named: bool) -> str:
         """Return what became of the robot after something hung, and what hung unless that was `named`; else nothing."""
@@ -173,7 +173,7 @@ class Player:
         return seen.observation[self._layout["position"]]
 
     def _read(self, now: float) -> Seen:
-        seen = self._senses.seen(self._called("read"), now)
+        seen = self._senses.seen(self._call("read"), now)
         self._reads, self._down = True, seen.fell
         return seen
 
@@ -185,7 +185,7 @@ class Player:
             raise RobotError("read() hangs and the robot lay down when it was last seen; nothing more is sent to it")
         return None
 
-    def _called(self, name: str, *words: Any) -> Any:
+    def _call(self, name: str, *words: Any) -> Any:
         """Call a function of the robot, none where it has none; the first reading may have to open a connection."""
         function = getattr(self.robot, name, lambda *words: None)
         slow = name in ("begin", "end") or (name == "read" and not self._reads)
@@ -202,7 +202,7 @@ class Player:
         self.guard.take(target, now)  # first: if send() breaks off, the robot may have it
         self._following.sent(target, now)
         self.moving = True
-        self._called("send", target.copy())
+        self._call("send", target.copy())
         return ""
 
     def _check_late(self, episode: Mapping[str, Any], now: float) -> None:
@@ -243,7 +243,7 @@ class Player:
         asked = [f"{group}.{joint}" for group in groups for joint in self.guard.joints]
         return ["episode", "step", "time", *asked, *names_of(self._layout), *(self._more or ()), *ENDS]
 
-    def _told(self, seen: Seen) -> list[float]:
+    def _read_senses(self, seen: Seen) -> list[float]:
         """Return what the robot tells beyond the request, in order."""
         for name in self._more or ():
             if name not in seen.more and name.startswith("base."):
@@ -256,4 +256,4 @@ class Player:
     ) -> list[Any]:  # fmt: skip
         asked = [*action.tolist(), *(sent.tolist() if self.request["action_noise"] else ())]
         number = self.request["episodes"].index(episode)
-        return [number, tick, now, *asked, *seen.observation.tolist(), *self._told(seen), fell, stopped]
+        return [number, tick, now, *asked, *seen.observation.tolist(), *self._read_senses(seen), fell, stopped]

@@ -43,7 +43,7 @@ class Guard:
         if target.shape != self.last.shape:
             return f"{len(self.joints)} targets are due, one a joint, not {target.size}"
         if not np.isfinite(target).all():
-            return self._told(~np.isfinite(target), "the target is not a finite number")
+            return self._report(~np.isfinite(target), "the target is not a finite number")
         change = np.abs(target - self.last)
         since = now - self._window + 0.5 * self._period  # ticks are not to the microsecond
         way = sum((way for at, way in self._ways if at > since), change)
@@ -55,7 +55,8 @@ class Guard:
             (way, self.path, 1.0, "the target moves {:.4g} rad in " + seconds + ", more than the {:.4g} rad allowed"),
         )
         found = (
-            self._told(~(sign * (value - bound) <= _ROUNDING), text, value, bound) for value, bound, sign, text in rules
+            self._report(~(sign * (value - bound) <= _ROUNDING), text, value, bound)
+            for value, bound, sign, text in rules
         )
         return next(filter(None, found), "")
 
@@ -69,14 +70,16 @@ class Guard:
     def beyond(self, position: np.ndarray) -> str:
         """Return which joint was found so far outside of its range that nothing should move it, nothing if none."""
         outside = np.maximum(self.lower - position, position - self.upper)
-        return self._told(~(outside <= BEYOND), "is at {:.4g} rad, {:.4g} rad outside of its range", position, outside)
+        return self._report(
+            ~(outside <= BEYOND), "is at {:.4g} rad, {:.4g} rad outside of its range", position, outside
+        )
 
     def away(self, position: np.ndarray, within: float) -> str:
         """Return which joint is further from the last target than `within` [rad], nothing if none is."""
         off = np.abs(position - self.last)
-        return self._told(~(off <= within), "is {:.4g} rad off", off)
+        return self._report(~(off <= within), "is {:.4g} rad off", off)
 
-    def _told(self, wrong: np.ndarray, text: str, *values: np.ndarray) -> str:
+    def _report(self, wrong: np.ndarray, text: str, *values: np.ndarray) -> str:
         if not wrong.any():
             return ""
         joint = int(np.argmax(wrong))

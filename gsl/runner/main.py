@@ -127,7 +127,7 @@ class Sitting:
         log = self._asked.log
         self._watched(self._player.begin, log, journal.table(log)[0] if log.exists() else None)
         if not self._asked.episode:
-            for episode in self._unmeasured():
+            for episode in self._list_unmeasured():
                 say(f"{episode['name']} is logged, but nobody has said how far it came")
                 self._measure(episode, fell=False)
         for episode in self._sitting():
@@ -138,7 +138,7 @@ class Sitting:
         return 0
 
     def _tell_missing(self) -> None:
-        missing, unmeasured = self._due(), ", ".join(one["name"] for one in self._unmeasured())
+        missing, unmeasured = self._due(), ", ".join(one["name"] for one in self._list_unmeasured())
         if missing:
             say(f"{len(missing)} episodes are missing")
         if unmeasured:
@@ -146,7 +146,7 @@ class Sitting:
         if not missing and not unmeasured:
             say(f"all is answered: {self._asked.log}")
 
-    def _unmeasured(self) -> list[Mapping[str, Any]]:
+    def _list_unmeasured(self) -> list[Mapping[str, Any]]:
         """Return the logged episodes, without a fall, of which nobody knows how far they came."""
         log, episodes = self._asked.log, self._request["episodes"]
         if not self._request["distance"] or not log.exists() or "base.position.x" in journal.table(log)[0]:

@@ -32,7 +32,7 @@ def read_request(folder: Path, trust: Collection[str] = ()) -> dict[str, Any]:
         ArtifactError: There is none, it is of another version, or it was changed.
         ConfigError: Its policy is code of somebody else.
     """
-    request = stored_request(folder)
+    request = read_stored(folder)
     if any("commands" not in episode for episode in request["episodes"]):
         policy = request.get("policy")
         check_code(policy, trust, "policy")
@@ -40,7 +40,7 @@ def read_request(folder: Path, trust: Collection[str] = ()) -> dict[str, Any]:
     return request
 
 
-def stored_request(folder: Path) -> dict[str, Any]:
+def read_stored(folder: Path) -> dict[str, Any]:
     """Return the request of a folder to be compared with another; who acts on it needs `read_request`.
 
     Raises:

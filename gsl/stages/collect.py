@@ -73,7 +73,7 @@ class Collect:
         policy = playing(self.policy, layout)
         scenario = Scenario(self.world, self.task, policy, self.role, exploration(self.action_noise, layout))
         pieces = policy.programme if isinstance(policy, Programmed) else self._pieces()
-        episodes = self._played(scenario, pieces, console)
+        episodes = self._play(scenario, pieces, console)
         about = {
             "robot": getattr(self.world, "robot", getattr(self.world, "env_id", "")),
             "role": self.role,
@@ -99,7 +99,7 @@ class Collect:
             "value": None if isinstance(policy, Programmed) else float(np.mean(own)),
         }
 
-    def _played(self, scenario: Scenario, pieces: Sequence[Piece], console: Console) -> list[Trajectory]:
+    def _play(self, scenario: Scenario, pieces: Sequence[Piece], console: Console) -> list[Trajectory]:
         """Return the episodes, of a robot somewhere else from its answer."""
         seeds = [derive_seed(self.seed, self.kind, self.role, index) for index in range(len(pieces))]
         jobs = [Job(piece.parameters, seed) for piece, seed in zip(pieces, seeds, strict=True)]

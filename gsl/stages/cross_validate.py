@@ -26,7 +26,7 @@ from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.in_the_air import change
 from gsl.diagnosis.simulate.simulator import mean_errors
 from gsl.diagnosis.verdict.findings import Findings
-from gsl.diagnosis.verdict.shrinkage import ceiling, removed_share
+from gsl.diagnosis.verdict.shrinkage import ceiling, compute_removed
 from gsl.effects.effect import effect_class
 from gsl.errors import ConfigError, InputError
 from gsl.report.cross_validation import (
@@ -174,7 +174,7 @@ class CrossValidate:
             verdict=found.verdict.word,
             causes=causes,
             parameters=chosen.effects,
-            removed=removed_share(exp, exp.residual(before), exp.residual(after))[0],
+            removed=compute_removed(exp, exp.residual(before), exp.residual(after))[0],
             ceiling=ceiling(exp, before, seed=self.seed),
             names=[one.name for one in _check(exp)],
             errors=errors,

@@ -30,7 +30,7 @@ from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.diagnosis_report import PAGE, REPORT, SIMULATOR, WORLD, report_of
 from gsl.validation.policy_gap import Effort, policy_gap
-from gsl.validation.real_returns import RealReturns, measured_parents, real_returns
+from gsl.validation.real_returns import RealReturns, list_parents, real_returns
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.held import refuse_hook
 from gsl.worlds.velocity_motors import check_servos
@@ -75,7 +75,7 @@ class Diagnose:
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""
         logs = log_parents(real=self.real, reference=self.reference)
-        return {**logs, **(measured_parents(self.policies) if self.policies else {})}
+        return {**logs, **(list_parents(self.policies) if self.policies else {})}
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json, report.html, the diagnosed world and the next experiment."""

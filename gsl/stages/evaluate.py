@@ -84,10 +84,10 @@ class Evaluate:
         if getattr(self.world, "action_noise", 0.0):
             warn_uncharged(self.world, console, REAL, "the world's noise")
         found = records(self.policy, self.policies)
-        measure = partial(self._measured, console=console)
+        measure = partial(self._measure, console=console)
         tried = measure(found, _CHOICE, self.episodes)
-        checked = dict(self._checked(found, tried, measure))
-        best = self._passed(checked)
+        checked = dict(self._check(found, tried, measure))
+        best = self._pick_passing(checked)
         reported = sorted({0, best})
         fresh = dict(zip(reported, measure([found[i] for i in reported], _REPORT, self.confirmation), strict=True))
         rows = [row(theta, done) for theta, done in zip(found, tried, strict=True)]
@@ -114,7 +114,7 @@ class Evaluate:
             "real_episodes": sum(map(len, [*tried, *checked.values(), *fresh.values()])),
         }
 
-    def _checked(
+    def _check(
         self, found: Sequence[PolicyRecord], tried: Sequence[list[Episode]], measure: Callable[..., list[list[Episode]]]
     ) -> Iterator[tuple[int, list[Episode]]]:
         """Yield the checks of stable policies that beat the baseline, up to the first that passes.
@@ -129,10 +129,10 @@ class Evaluate:
         for index in order:
             (checked[index],) = measure([found[index]], _CHECK, self.check)
             yield index, checked[index]
-            if self._passed(checked):
+            if self._pick_passing(checked):
                 return
 
-    def _passed(self, checked: Mapping[int, list[Episode]]) -> int:
+    def _pick_passing(self, checked: Mapping[int, list[Episode]]) -> int:
         """Return the index of the policy that has passed its check, the baseline's if none has."""
         passed = (
             index
@@ -144,7 +144,7 @@ class Evaluate:
     def _stable(self, done: Sequence[Episode]) -> bool:
         return falls(done) <= self.tolerated * len(done)
 
-    def _measured(
+    def _measure(
         self, thetas: Sequence[PolicyRecord], purpose: str, count: int, *, console: Console
     ) -> list[list[Episode]]:
         """Return the episodes of some policies; but for a report, none after a fall that is not tolerated."""

@@ -58,7 +58,7 @@ class Import:
         """Write one parquet file, and what was found as a document."""
         chosen = self._places()
         found = [one for place in self._progress(chosen, console) for one in self._episodes(place, console)]
-        told = self._told(found, chosen)
+        told = self._describe(found, chosen)
         if told["refused"] and not self.accept:
             more = f" (and {len(told['refused']) - 1} more, see --check)" if len(told["refused"]) > 1 else ""
             raise InputError(f"{self._source()}: {told['refused'][0]}{more}; accept=true takes it as it is")
@@ -83,7 +83,7 @@ class Import:
                 raise
             except InputError as error:
                 problems.append(str(error))
-        told = self._told(found, chosen) if found else {"refused": [], "warnings": []}
+        told = self._describe(found, chosen) if found else {"refused": [], "warnings": []}
         for table in tables(told) if found else ():
             console.table(*table)
         refused = [*problems, *([] if self.accept else told["refused"])]
@@ -123,7 +123,7 @@ class Import:
             one for raw in raw_episodes(place, self.mapping, self.memory * GB) for one in episodes(raw, self.mapping)
         ]
 
-    def _told(self, found: list[Episode], chosen: list[Place]) -> dict[str, Any]:
+    def _describe(self, found: list[Episode], chosen: list[Place]) -> dict[str, Any]:
         first = found[0]
         for one in found:
             if one.joints != first.joints or one.trajectory.sensors.keys() != first.trajectory.sensors.keys():

@@ -101,7 +101,7 @@ class Iterate:
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
         with console.live_table(in_unit("grounded simulation learning", self.task.unit), rounds.columns) as table:
             start = self.chain.pretrained(home / "pretrained", self.seed, console) if self.pretrained else None
-            grounding = self._diagnosed(home, rounds, console)
+            grounding = self._diagnose(home, rounds, console)
             chain = self.chain
             for number in range(1, self.iterations + 1):
                 place = home / f"iteration_{number:02d}"
@@ -122,7 +122,7 @@ class Iterate:
                 if not rounds.rising:
                     break
             if self.beside:
-                for row in rounds.add_beside(self._ungrounded(home, start, console)):
+                for row in rounds.add_beside(self._run_ungrounded(home, start, console)):
                     table.row(*row)
         returned = Path(rounds.last) / FILE if rounds.last else Path(start) if start else None
         if returned is None:
@@ -169,7 +169,7 @@ class Iterate:
     def _collected_real(self) -> int:
         return sum(self.budget.real) if REAL in evidence_of(self.grounding) else 0
 
-    def _diagnosed(self, home: Path, rounds: Rounds, console: Console) -> Grounding:
+    def _diagnose(self, home: Path, rounds: Rounds, console: Console) -> Grounding:
         """Return the grounding with its diagnosis: an excitation knows no policy, so that one serves all iterations."""
         grounding = self.chain.diagnosed(home / FIRST, self.grounding, self.seed, console)
         if flight := flown(home / FIRST, self.grounding, grounding):
@@ -178,7 +178,7 @@ class Iterate:
                 console.status(finding)
         return grounding
 
-    def _ungrounded(self, home: Path, start: str | None, console: Console) -> Artifact:
+    def _run_ungrounded(self, home: Path, start: str | None, console: Console) -> Artifact:
         place = home / FIRST
         found = self.chain.search(place / "optimize_none", NoGrounding(), start, self.seed, console)
         return self.chain.measure(place / "evaluate_none", found, self.seed, console)

@@ -92,9 +92,9 @@ class Optimize:
         )
         found = [record(self.policy, "pi0" if self.initial is None else "start", first)]
         if isinstance(self.optimizer, Search):
-            winners = [*self._searched(self.optimizer, scenario, first, GenerationLog(folder, console.status), console)]
+            winners = [*self._search(self.optimizer, scenario, first, GenerationLog(folder, console.status), console)]
         else:
-            winners = [*self._learned(self.optimizer, scenario, first, console)]
+            winners = [*self._learn(self.optimizer, scenario, first, console)]
         searched = len(winners)
         winners, screened = self._screen(bare, checked, winners, console)
         found += [winner.policy for winner in winners]
@@ -111,7 +111,7 @@ class Optimize:
             **self._drift(scenario, found, console),
         }
 
-    def _searched(
+    def _search(
         self, optimizer: Search, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Console
     ) -> Iterator[Winner]:
         """Yield the best candidate of each generation of a search."""
@@ -122,7 +122,7 @@ class Optimize:
                 candidates = check_candidates(search.ask(), len(first))
                 generation = log.read(index)
                 if generation is None:
-                    generation = self._evaluated(scenario, candidates, index, progress)
+                    generation = self._evaluate(scenario, candidates, index, progress)
                     log.append(generation)
                 else:
                     progress.advance(len(candidates) * self.rollouts)
@@ -131,7 +131,7 @@ class Optimize:
                 means = generation.means or generation.values
                 yield Winner(self._record(index, candidates[best], means[best]), generation.values[best])
 
-    def _learned(self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Console) -> Iterator[Winner]:
+    def _learn(self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Console) -> Iterator[Winner]:
         """Yield what a learner has come to after each generation."""
         seed, simulator = derive_seed(self.seed, self.kind), GroundedSimulator(scenario, first)
         total = optimizer.taken + optimizer.generations * self.rollouts
@@ -139,7 +139,7 @@ class Optimize:
             bold = self.initial is None
             steps = optimizer.learn(simulator, self.policy, first, seed, bold=bold, advance=progress.advance)
             for index, parameters in enumerate(steps):
-                value = self._evaluated(scenario, [parameters], index, progress).values[0]
+                value = self._evaluate(scenario, [parameters], index, progress).values[0]
                 yield Winner(self._record(index, parameters, value), value)
 
     def _screen(
@@ -171,7 +171,7 @@ class Optimize:
         console.status(f"{told} ({first[0]}: {100 * first[1]:.0f} %)")
         return {"drift": shares}
 
-    def _evaluated(
+    def _evaluate(
         self, scenario: Scenario, candidates: Sequence[np.ndarray], index: int, progress: Progress
     ) -> Generation:
         jobs = [

@@ -29,7 +29,7 @@ from gsl.storage.workplace import destination
 from gsl.training.learn_servo import LearnedServo, document, learn_servo
 from gsl.training.servo_verdict import problems, remarks
 from gsl.training.servo_walks import Walks, walks
-from gsl.training.torque_width import held_out_widths
+from gsl.training.torque_width import measure_widths
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.fits import fitting_step
 from gsl.worlds.held import refuse_hook
@@ -83,7 +83,7 @@ class TrainServo:
             exp, self.sim.plant, self.sim.step, labelled=bool(self.held_out), seed=self.seed,
             threads=threads(self.workers), members=self.members, walks=walked,
         )  # fmt: skip
-        model = replace(learned.model, noise=self._unexplained(exp, learned.model))
+        model = replace(learned.model, noise=self._measure_unexplained(exp, learned.model))
         further = [replace(one.model, noise=model.noise) for one in learned.further]
         write_model(folder, ServoMembers((model, *further)))
         self._write_world(folder, learned)
@@ -111,11 +111,11 @@ class TrainServo:
             raise InputError(f"{self.walks}: has another control period, {rates}; resample one of them")
         return walks(batch, exp.robot, self.sim.plant, self.sim.step, threads(self.workers))
 
-    def _unexplained(self, exp: Log, model: ServoModel) -> np.ndarray:
+    def _measure_unexplained(self, exp: Log, model: ServoModel) -> np.ndarray:
         """Return the torque noise that held-out motions leave unexplained [N·m], at every step and constant, (n, 2)."""
         group = neutral(self.sim.plant, np.random.default_rng(0)).group  # of those that keep their servo, too
         groups = {name: group[: len(exp.joints)] == g for g, name in enumerate(model.groups)}
-        widths = held_out_widths(exp, model.on(self.sim.plant), step=self.sim.step, seed=self.seed, groups=groups)
+        widths = measure_widths(exp, model.on(self.sim.plant), step=self.sim.step, seed=self.seed, groups=groups)
         return np.array([widths[name] for name in model.groups])[group]
 
     def _write_world(self, folder: Path, learned: LearnedServo) -> None:

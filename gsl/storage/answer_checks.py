@@ -91,7 +91,7 @@ def _problems(
         problem = f"half of its actions are {half:.2g} rad or more off what the policy does on what was observed"
         yield f"{problem}; is it the log of another episode, or late?"
     if not (answer.fell or answer.stopped):
-        yield from _lost(log, request)
+        yield from _find_lost(log, request)
 
 
 def actions_off(path: Path, request: Mapping[str, Any], asked: Mapping[str, Any], log: Trajectory) -> np.ndarray:
@@ -114,7 +114,7 @@ def actions_off(path: Path, request: Mapping[str, Any], asked: Mapping[str, Any]
     return np.asarray(off)
 
 
-def _lost(log: Trajectory, request: Mapping[str, Any]) -> Iterator[str]:
+def _find_lost(log: Trajectory, request: Mapping[str, Any]) -> Iterator[str]:
     """Yield joints that stand still or are far off while they are sent elsewhere, as the runner's watch has it."""
     sent = log.action if log.grounded_action is None else log.grounded_action
     period, within = request["control_period"], request["ramp"]["within"]

@@ -29,8 +29,8 @@ from gsl.storage.lineage import broken_link, out_of_date
 from gsl.storage.manifest import Manifest, Parent
 from gsl.storage.read_files import own_effects, read_files
 from gsl.storage.versions import commit, versions
-from gsl.storage.whole import explained_work, flush_tree, remove_temporary
-from gsl.storage.workplace import KEY, complete, install, locked, log_to, stoppable, workplace
+from gsl.storage.whole import explain_failures, flush_tree, remove_temporary
+from gsl.storage.workplace import KEY, complete, hold_lock, install, log_to, stoppable, workplace
 
 CONFIG = "config.yaml"
 METRICS = "metrics.json"
@@ -120,7 +120,7 @@ def build(
     identity = identify(stage.kind, config, sources, package, made=made)
     for stale in filter(None, map(out_of_date, sources.values())):
         console.status(f"warning: {stale}; the same commands again bring it up to date")
-    with locked(out), stoppable(), explained_work(out.parent):
+    with hold_lock(out), stoppable(), explain_failures(out.parent):
         forced = getattr(stage, "forced", "rebuilds it")
         if (existing := _existing(out, identity, config, force=force, forced=forced)) is not None:
             os.utime(out / manifest.NAME)
@@ -218,11 +218,11 @@ def _work(
         created=created,
         duration=time.perf_counter() - begin,
         unit=_unit(stage),
-        trust=_trusted(stage, config),
+        trust=_list_trust(stage, config),
     )
 
 
-def _trusted(stage: Stage, config: Mapping[str, Any]) -> tuple[str, ...]:
+def _list_trust(stage: Stage, config: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the modules whose code took part and that are not gsl's."""
     effects = [kind.__module__ for kind in own().values()]
     return tuple(dict.fromkeys([*modules_in(config), *effects, *getattr(stage, "trust", ())]))

@@ -69,13 +69,15 @@ def identify(
     settings = {
         name: value
         for name, value in flat(without(documents.plain(config), lambda name, _: name in WITHOUT_EFFECT)).items()
-        if not (isinstance(value, str) and (name in parents or os.path.abspath(value) in places or _made(name, made)))
+        if not (
+            isinstance(value, str) and (name in parents or os.path.abspath(value) in places or _list_made(name, made))
+        )
     }
     hashes = {role: content_hash(path) for role, path in parents.items()}
     return Identity(kind, settings, hashes, sources_hash(package))
 
 
-def _made(name: str, below: Sequence[str]) -> bool:
+def _list_made(name: str, below: Sequence[str]) -> bool:
     return name.rpartition(".")[2] in MADE and any(name.startswith(f"{part}.") for part in below)
 
 

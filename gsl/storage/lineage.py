@@ -40,10 +40,10 @@ class Ancestor:
 
 def lineage(folder: Path, seen: set[Path]) -> Ancestor:
     """Return an artifact with all that is above it, every file hashed again; what is in `seen` is not followed."""
-    return _traced("", folder, None, seen)
+    return _trace("", folder, None, seen)
 
 
-def _traced(role: str, place: Path, expected: str | None, seen: set[Path]) -> Ancestor:
+def _trace(role: str, place: Path, expected: str | None, seen: set[Path]) -> Ancestor:
     try:
         stored = None if place.is_file() else manifest.read(place)
         problem = _file_problem(place, expected) if stored is None else _problem(place, stored, expected)
@@ -52,7 +52,7 @@ def _traced(role: str, place: Path, expected: str | None, seen: set[Path]) -> An
     if stored is None or place.absolute() in seen:
         return Ancestor(role, place, stored, problem)
     seen.add(place.absolute())
-    above = [_traced(one.role, _place(place, one), one.hash, seen) for one in (*stored.parents, *stored.links)]
+    above = [_trace(one.role, _place(place, one), one.hash, seen) for one in (*stored.parents, *stored.links)]
     return Ancestor(role, place, stored, problem, above)
 
 

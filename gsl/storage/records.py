@@ -32,7 +32,7 @@ class Records:
         stored = path.read_bytes() if path.exists() else b""
         good = 0
         for line in stored.splitlines(keepends=True):
-            if (record := self._parsed(line)) is None:
+            if (record := self._parse(line)) is None:
                 break
             self._take(record, line)
             good += len(line)
@@ -62,7 +62,7 @@ class Records:
         chain = hashlib.sha256(f"{self._chain}{json.dumps(record)}".encode()).hexdigest()
         return (json.dumps({**record, CHAIN: chain}) + "\n").encode()
 
-    def _parsed(self, line: bytes) -> dict[str, Any] | None:
+    def _parse(self, line: bytes) -> dict[str, Any] | None:
         """Return the record of a line, None if it is not what was written."""
         try:
             record = json.loads(line)

@@ -91,7 +91,7 @@ def artifact_folders(reference: str | None = None, *, runs: Path = RUNS) -> list
     return folders
 
 
-def damaged_folders(runs: Path = RUNS) -> list[Path]:
+def find_damaged(runs: Path = RUNS) -> list[Path]:
     """Return the folders below `runs` that were artifacts, but whose manifest cannot be read."""
     return [folder for folder, found in _walk(runs) if found is None and manifest.resembles(folder)]
 

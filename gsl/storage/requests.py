@@ -11,7 +11,7 @@ from typing import Any
 
 from gsl.core.trust import modules_in
 from gsl.errors import ArtifactError
-from gsl.runner.request import NAME, SCHEMA_VERSION, hash_of, stored_request
+from gsl.runner.request import NAME, SCHEMA_VERSION, hash_of, read_stored
 from gsl.storage import documents
 from gsl.storage.answers import answer_files
 from gsl.storage.bundle import RUNNER, bundle
@@ -91,7 +91,7 @@ def write_request(folder: Path, request: Mapping[str, Any], warnings: Sequence[s
             raise ArtifactError(
                 folder / NAME, "is missing beside an answer to it; put it back, or move the answer away"
             )
-        stored_request(folder)
+        read_stored(folder)
         raise ArtifactError(found[0], "answers another request, which has changed since; move it away")
     files = files_of(request)
     with explain_refusal(folder.parent):
@@ -121,7 +121,7 @@ def restore(folder: Path, request: Mapping[str, Any]) -> bool:
 def _check_ours(folder: Path, new: Path) -> None:
     """Refuse a folder with a request that is damaged, or without one and with files of our names that are not ours."""
     if (folder / NAME).exists():
-        stored_request(folder)
+        read_stored(folder)
         return
     for path in (path for path in sorted(new.rglob("*")) if path.is_file() and path.name != ROBOT):
         old = folder / path.relative_to(new)

@@ -41,7 +41,7 @@ def explain_refusal(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def explained_work(folder: Path) -> Iterator[None]:
+def explain_failures(folder: Path) -> Iterator[None]:
     """Do so with a refusal to write in `folder`, its subfolders of other work left out; any other stays what it is."""
     try:
         yield

@@ -22,7 +22,7 @@ LOG = "log.txt"
 
 
 @contextmanager
-def locked(out: Path) -> Iterator[None]:
+def hold_lock(out: Path) -> Iterator[None]:
     """Hold the only right to build `out`, in a file beside it that is gone afterwards.
 
     Raises:

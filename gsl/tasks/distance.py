@@ -32,13 +32,13 @@ class Distance:
     def outcome(self, layout: Layout, trajectory: Trajectory) -> Mapping[str, float]:
         """Return the distance, a fall notwithstanding."""
         x = trajectory.sensors["base.position.x"]
-        return self._told(float(x[-1] - x[0]))
+        return self._report(float(x[-1] - x[0]))
 
     def measured(self, distance: float, *, fell: bool) -> Judged:
         """Return what a distance [m] is worth in the real world."""
-        return Judged(0.0 if fell else distance, self._told(distance))
+        return Judged(0.0 if fell else distance, self._report(distance))
 
-    def _told(self, distance: float) -> Mapping[str, float]:
+    def _report(self, distance: float) -> Mapping[str, float]:
         return {"distance [cm]": 100.0 * distance}
 
 

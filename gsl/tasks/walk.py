@@ -35,13 +35,13 @@ class Walk:
     def outcome(self, layout: Layout, trajectory: Trajectory) -> Mapping[str, float]:
         """Return the mean forward speed over the planned time, the fall notwithstanding."""
         x = trajectory.sensors["base.position.x"]
-        return self._told(float(x[-1] - x[0]))
+        return self._report(float(x[-1] - x[0]))
 
     def measured(self, distance: float, *, fell: bool) -> Judged:
         """Return what a real walk over a distance [m] is worth."""
-        return Judged(0.0 if fell else distance / self.duration, self._told(distance))
+        return Judged(0.0 if fell else distance / self.duration, self._report(distance))
 
-    def _told(self, distance: float) -> Mapping[str, float]:
+    def _report(self, distance: float) -> Mapping[str, float]:
         return {"speed [cm/s]": 100.0 * distance / self.duration}
 
 

@@ -15,7 +15,7 @@ from gsl.errors import ConfigError
 from gsl.models.calibration import mixing
 from gsl.models.choice import best, fit_network
 from gsl.models.config import ModelConfig
-from gsl.models.counts import Counts, counted
+from gsl.models.counts import Counts, count_transitions
 from gsl.models.head import POINT, Head
 from gsl.models.network import Network, Samples, unscale
 from gsl.models.states import NearestChoice, StateForward, StateInverse, encode
@@ -96,7 +96,7 @@ def _counts(folder: Path, data: Parts, kind: str) -> Mapping[str, Any]:
     """Count all transitions but those held out: there is nothing whose fit has to be stopped."""
     sizes = data.training.metadata["cells"], data.training.metadata["choices"]
     known = data.training, data.validation
-    seen = sum(counted(part.episodes, *sizes) for part in known)
+    seen = sum(count_transitions(part.episodes, *sizes) for part in known)
     assert isinstance(seen, np.ndarray)
     write_model(folder, Counts(seen, kind))
     visited = float((seen.sum(axis=2) > 0).mean())

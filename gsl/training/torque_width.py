@@ -76,7 +76,7 @@ class Moments(NamedTuple):
     step_rough: np.ndarray
 
 
-def held_out_widths(
+def measure_widths(
     log: Log, plant: Plant, shifts: np.ndarray | None = None, *, step: float, seed: int = 0,
     groups: Mapping[str, np.ndarray] | None = None,
 ) -> Mapping[str, TorqueWidth]:  # fmt: skip

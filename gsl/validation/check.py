@@ -18,7 +18,7 @@ from gsl.grounding.preparation import without_margins
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.training.data import FALLS, of_policy
 from gsl.validation.reachability import Reachability, reachability
-from gsl.validation.replay import PAST, Deviations, places, predict_no_change, replayed
+from gsl.validation.replay import PAST, Deviations, places, predict_no_change, replay_starts
 from gsl.validation.report import BARE, GROUNDED, OFF, PI0, STILL, GroundingReport
 
 REPLAYS = 60  # of each group of trajectories, at most
@@ -117,8 +117,8 @@ def _compare(env: Any, grounding: Any, episodes: Sequence[Any], seed: int) -> di
     if not starts:
         return {}
     return {
-        GROUNDED: replayed(env, grounding, starts, seed),
-        BARE: replayed(env, NoGrounding(), starts, seed),
+        GROUNDED: replay_starts(env, grounding, starts, seed),
+        BARE: replay_starts(env, NoGrounding(), starts, seed),
         STILL: predict_no_change(env.layout, starts),
     }
 

@@ -84,7 +84,7 @@ class ComplianceReport:
     def rows(self) -> list[tuple[str, ...]]:
         """Return a table for people."""
         return [
-            (group, title, *(f"{value:.3g}" for value in means.values()), *self._handed(group, quantity))
+            (group, title, *(f"{value:.3g}" for value in means.values()), *self._format_shares(group, quantity))
             for group, quantities in self.means().items()
             for (quantity, title), means in zip(QUANTITIES.items(), quantities.values(), strict=True)
         ]
@@ -96,7 +96,7 @@ class ComplianceReport:
             same = "Where the grounded joints are as stiff as the simulator's, only their motion was grounded."
             return f"{same} Whether a robot falls depends on its stiffness as well."
         parts = [
-            f"{group}: stiffness {self._told(group, 'stiffness')}, strength {self._told(group, 'torque')}"
+            f"{group}: stiffness {self._describe(group, 'stiffness')}, strength {self._describe(group, 'torque')}"
             for group in self.sim.groups
         ]
         return f"Compliance transferred, 1 where the grounded simulator yields as the robot does. {'; '.join(parts)}."
@@ -124,12 +124,12 @@ class ComplianceReport:
         robots = {SIM: self.sim, GROUNDED: self.grounded, **({REAL: self.real} if self.real else {})}
         return {"groups": self.metrics(), "by_motor": {name: one.document() for name, one in robots.items()}}
 
-    def _handed(self, group: str, quantity: str) -> tuple[str, ...]:
+    def _format_shares(self, group: str, quantity: str) -> tuple[str, ...]:
         if self.real is None:
             return ()
-        return ("",) if quantity == "damping" else (self._told(group, quantity),)
+        return ("",) if quantity == "damping" else (self._describe(group, quantity),)
 
-    def _told(self, group: str, quantity: str) -> str:
+    def _describe(self, group: str, quantity: str) -> str:
         """Return a share in words; where there was nothing to hand over, how far the grounding strays."""
         share = self.shares[group]
         if (value := getattr(share, quantity)) is not None:

@@ -12,7 +12,7 @@ from gsl.errors import InputError
 from gsl.grounding.gat import LoadedTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.models.free_run import TICKS
-from gsl.validation.replay import Place, replayed
+from gsl.validation.replay import Place, replay_starts
 
 
 def fewest(env: Any, grounding: LoadedTransformation, starts: Sequence[Place], seed: int) -> tuple[str, ...]:
@@ -47,5 +47,5 @@ def fewest(env: Any, grounding: LoadedTransformation, starts: Sequence[Place], s
 
 def _squares(env: Any, grounding: NoGrounding | LoadedTransformation, starts: Sequence[Place], seed: int) -> np.ndarray:
     """Return squared deviations of the joints after `TICKS` [rad²], shape (replays, n_joints)."""
-    squares: np.ndarray = replayed(env, grounding, starts, seed)[TICKS].joints ** 2
+    squares: np.ndarray = replay_starts(env, grounding, starts, seed)[TICKS].joints ** 2
     return squares

@@ -44,13 +44,13 @@ def policy_gap(
         console: Shown the progress.
     """
     with console.progress(2 * effort.episodes * len(measured.policies), "policies in both simulators") as progress:
-        sim, diagnosed = (_played(measured, measured.setup(one), effort, progress) for one in (before, after))
+        sim, diagnosed = (_play(measured, measured.setup(one), effort, progress) for one in (before, after))
     seed = derive_seed(effort.seed, "policy_gap")
     rows = [
         {
             "name": one.name,
-            "sim": _simulated(one_sim),
-            "diagnosed": _simulated(one_diagnosed),
+            "sim": _simulate(one_sim),
+            "diagnosed": _simulate(one_diagnosed),
             "real": _side(one.values, one.falls, stopped=one.stopped),
         }
         for one, one_sim, one_diagnosed in zip(measured.policies, sim, diagnosed, strict=True)
@@ -70,7 +70,7 @@ def policy_gap(
     return {**found, "never_stopped": rest, "caveats": _caveats(found, len(rows) - len(whole), rest)}
 
 
-def _played(measured: RealReturns, world: BulletWorld, effort: Effort, progress: Progress) -> list[list[Episode]]:
+def _play(measured: RealReturns, world: BulletWorld, effort: Effort, progress: Progress) -> list[list[Episode]]:
     """Return the episodes of each policy."""
     scenario = Scenario(world, measured.task, measured.policy, REAL, NoGrounding())
     jobs = [
@@ -82,13 +82,13 @@ def _played(measured: RealReturns, world: BulletWorld, effort: Effort, progress:
     return [done[first : first + effort.episodes] for first in range(0, len(done), effort.episodes)]
 
 
-def _simulated(done: Sequence[Episode]) -> dict[str, Any]:
+def _simulate(done: Sequence[Episode]) -> dict[str, Any]:
     return _side(np.array([one.value for one in done]), sum(one.fell for one in done), stopped=False)
 
 
 def _side(values: np.ndarray, falls: int, *, stopped: bool) -> dict[str, Any]:
     """Return the mean with its interval; a policy that was stopped at its fall has none."""
-    told = _bounded(mean_interval(values))
+    told = _bound(mean_interval(values))
     bounds = {"low": None, "high": None} if stopped else {}
     return {**told, **bounds, "falls": falls, "episodes": len(values)}
 
@@ -106,7 +106,7 @@ def _agreement(rows: Sequence[Mapping[str, Any]], seed: int) -> dict[str, Any]:
 def _gap(simulated: np.ndarray, real: np.ndarray, seed: int) -> dict[str, float | None]:
     apart = np.abs(simulated - real)
     found = bootstrap_interval(lambda chosen: float(apart[chosen].mean()), len(apart), np.random.default_rng(seed))
-    return _bounded(found)
+    return _bound(found)
 
 
 def _correlation(simulated: np.ndarray, real: np.ndarray, seed: int) -> dict[str, float | None] | None:
@@ -116,10 +116,10 @@ def _correlation(simulated: np.ndarray, real: np.ndarray, seed: int) -> dict[str
     def drawn(chosen: np.ndarray) -> float:
         return rank_correlation(simulated[chosen], real[chosen])
 
-    return _bounded(bootstrap_interval(drawn, len(real), np.random.default_rng(seed)))
+    return _bound(bootstrap_interval(drawn, len(real), np.random.default_rng(seed)))
 
 
-def _bounded(interval: Interval) -> dict[str, float | None]:
+def _bound(interval: Interval) -> dict[str, float | None]:
     names = ("value", "low", "high")
     return {name: one if np.isfinite(one) else None for name, one in zip(names, interval, strict=True)}
 

@@ -76,13 +76,13 @@ class RealReturns:
         return replace(sim, **{name: settings[name] for name in _SETUP if name in settings})
 
 
-def measured_parents(reference: str) -> dict[str, Path]:
+def list_parents(reference: str) -> dict[str, Path]:
     """Return the artifacts that are read, by role: the one that is named, the evaluations in it, what these measured.
 
     Raises:
         ArtifactError: There is no such artifact, it holds no real returns, or a part of it is gone or has changed.
     """
-    named = _resolved(reference)
+    named = _resolve(reference)
     if manifest.read(named).kind != _ITERATE:
         return {ROLE: named, f"{ROLE}.{FOUND}": _source(named)}
     parents = {ROLE: named}
@@ -98,15 +98,15 @@ def real_returns(reference: str, sim: BulletWorld, *, trust: Collection[str] = (
         ArtifactError: There is none, or its policies are of another robot, task or control period than the simulator.
         ConfigError: It names a class that is not gsl's, and whose module is not in `trust`.
     """
-    named = _resolved(reference)
+    named = _resolve(reference)
     places = _iterations(named) if manifest.read(named).kind == _ITERATE else [named]
-    configs = [_checked(place, sim) for place in places]
+    configs = [_check(place, sim) for place in places]
     config = configs[-1]
     policy = rebuilt(config["policy"], trust=trust, where="policies.policy")
     task = rebuilt(config["task"], trust=trust, where="policies.task")
     found: list[MeasuredPolicy] = []
     for place, settings in zip(places, configs, strict=True):
-        rows = _measured(place, policy, settings["episodes"], f"{place.parent.name}/" if len(places) > 1 else "")
+        rows = _measure(place, policy, settings["episodes"], f"{place.parent.name}/" if len(places) > 1 else "")
         found += rows[1:] if found else rows  # a later evaluation begins with what the one before has returned
     for one in found:
         policy.posture(one.parameters, sim.layout)
@@ -114,7 +114,7 @@ def real_returns(reference: str, sim: BulletWorld, *, trust: Collection[str] = (
     return RealReturns(task, policy, config["world"], tuple(found[k] for k in chosen), len(found))
 
 
-def _resolved(reference: str) -> Path:
+def _resolve(reference: str) -> Path:
     """Return the artifact; a run that has both an `iterate` and evaluations stands for the former."""
     try:
         place = resolve(reference, kind=_ITERATE)
@@ -142,7 +142,7 @@ def _source(evaluation: Path) -> Path:
     return source
 
 
-def _checked(evaluation: Path, sim: BulletWorld) -> dict[str, Any]:
+def _check(evaluation: Path, sim: BulletWorld) -> dict[str, Any]:
     """Return the settings of an evaluation that the simulator can repeat."""
     config = Artifact(evaluation, manifest.read(evaluation)).config
     world, task = config["world"], config["task"]
@@ -162,7 +162,7 @@ def _file(source: Path) -> Path:
     return source if source.is_file() else source / FILE
 
 
-def _measured(evaluation: Path, policy: Policy, episodes: int, prefix: str) -> list[MeasuredPolicy]:
+def _measure(evaluation: Path, policy: Policy, episodes: int, prefix: str) -> list[MeasuredPolicy]:
     """Return all policies of one evaluation; fresh episodes count instead of the `episodes` by which one was chosen."""
     table = json.loads((evaluation / EVALUATION).read_text(encoding="utf-8"))
     fresh = {row["name"]: row for row in table["confirmation"]}

@@ -76,7 +76,7 @@ def places(episodes: Sequence[Trajectory], layout: Layout, limit: int, past: int
     return [found[index] for index in chosen]
 
 
-def replayed(env: BulletEnv, grounding: Grounding, starts: Sequence[Place], seed: int) -> dict[int, Deviations]:
+def replay_starts(env: BulletEnv, grounding: Grounding, starts: Sequence[Place], seed: int) -> dict[int, Deviations]:
     """Return the deviations of a simulator with a grounding after one tick and after `TICKS`."""
     ends: dict[int, list[np.ndarray]] = {1: [], TICKS: []}
     for index, place in enumerate(starts):

@@ -165,7 +165,7 @@ class BulletEnv(gymnasium.Env):
                 edge of an uneven ground.
         """
         assert self._engine is not None, "reset comes first"
-        targets, noise = self._checked(action)[self._drive], self._plant.action_noise
+        targets, noise = self._check(action)[self._drive], self._plant.action_noise
         if noise.any():
             targets = targets + noise * self.np_random.standard_normal(len(noise))
         self._run(targets)
@@ -186,7 +186,7 @@ class BulletEnv(gymnasium.Env):
             self._engine.close()
             self._engine = None
 
-    def _checked(self, action: np.ndarray) -> np.ndarray:
+    def _check(self, action: np.ndarray) -> np.ndarray:
         values = np.asarray(action, dtype=float)
         if values.shape != (self._n,):
             raise GslError(f"an action has {self._n} desired positions, one a joint; given: shape {values.shape}")

@@ -87,7 +87,7 @@ class Camera:
         b, size = self._bullet, (finer * width, finer * height)
         eye = b.computeViewMatrixFromYawPitchRoll(list(view.target), view.distance, view.yaw - 90.0, view.pitch, 0.0, 2)
         lens = b.computeProjectionMatrixFOV(view.opening, width / height, NEAR, FAR)
-        colours, depth, seen = self._drawn(eye, lens, size)
+        colours, depth, seen = self._draw(eye, lens, size)
         places = _places(depth, eye, lens)
         shade = 1.0 - SHADOW * gaussian_filter(self._shadow(places, view), 1.5 * finer)
         image = np.where((seen == self._floor)[..., None], colours * shade[..., None], colours)
@@ -96,7 +96,7 @@ class Camera:
         averaged: np.ndarray = image.reshape(height, finer, width, finer, 3).mean(axis=(1, 3)).round().astype(np.uint8)
         return averaged
 
-    def _drawn(self, eye: Sequence[float], lens: Sequence[float], size: tuple[int, int]) -> tuple[np.ndarray, ...]:
+    def _draw(self, eye: Sequence[float], lens: Sequence[float], size: tuple[int, int]) -> tuple[np.ndarray, ...]:
         """Colours, depth and number of the body at every pixel."""
         _, _, pixels, depth, seen = self._bullet.getCameraImage(
             *size, eye, lens, lightDirection=LIGHT, lightColor=[1.0, 1.0, 1.0], shadow=0, lightAmbientCoeff=0.68,
@@ -112,7 +112,7 @@ class Camera:
         light = (np.array(view.target) + 3.0 * np.array(LIGHT) / np.linalg.norm(LIGHT)).tolist()
         eye = b.computeViewMatrix(light, list(view.target), [0.0, 0.0, 1.0])
         lens = b.computeProjectionMatrixFOV(20.0, 1.0, NEAR, FAR)
-        robot = self._drawn(eye, lens, (size, size))[2] == self._body
+        robot = self._draw(eye, lens, (size, size))[2] == self._body
         flat = np.concatenate([places, np.ones_like(places[..., :1])], axis=-1) @ _matrix(eye).T @ _matrix(lens).T
         x, y = flat[..., 0] / flat[..., 3], -flat[..., 1] / flat[..., 3]
         column, row = (np.clip((0.5 * (part + 1.0) * size).astype(int), 0, size - 1) for part in (x, y))

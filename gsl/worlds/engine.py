@@ -153,8 +153,8 @@ class Engine:
         memory.servo.commands[0] = targets
         if load is not None:
             memory.load[:] = load
-        times = memory.servo.clock[0] + np.arange(physics.substeps) * physics.step
         if self._load is not None:
+            times = memory.servo.clock[0] + np.arange(physics.substeps) * physics.step
             memory.load[:], memory.drag[:] = self._load.act(times), self._load.drag
         rest = (physics.floating, physics.substeps, physics.step, physics.period, self._drive, memory, self._base_turn)
         if self._motors is not None:

@@ -150,7 +150,7 @@ class StateEnv(gymnasium.Env):
         """Start anew; the environment gets the seed, and no options."""
         if seed is not None:
             self._rng = np.random.default_rng([seed, _STREAM])
-        with self._told():
+        with self._name_failure():
             told = self._env.reset(seed=seed)
         if not (isinstance(told, tuple) and len(told) == 2 and isinstance(told[1], Mapping)):
             raise GslError(f"{self.world.told}: its reset() returns no (observation, info)")
@@ -177,7 +177,7 @@ class StateEnv(gymnasium.Env):
             given = np.clip(self._middle + self._half * sent, self._low, self._high).astype(
                 self._env.action_space.dtype
             )
-        with self._told():
+        with self._name_failure():
             told = self._env.step(given)
         if not (isinstance(told, tuple) and len(told) == 5 and isinstance(told[4], Mapping)):
             five = "(observation, reward, terminated, truncated, info)"
@@ -196,7 +196,7 @@ class StateEnv(gymnasium.Env):
         self._env.close()
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _name_failure(self) -> Iterator[None]:
         """Tell what fails inside the user's environment as the environment's own failure."""
         try:
             yield

@@ -98,10 +98,13 @@ class Rehearsal:
             self._ready[id(rivals)] = self._against(rivals)
         rival, logged = self._ready[id(rivals)], self.simulate(truth)
         owner, motions = self.owner[logged.record], range(self.owner.max() + 1)
+        lost = np.full(logged.real.shape[2], np.inf)  # nothing explains a robot that runs away
+        away = set(owner[~np.isfinite(logged.real).all(axis=(1, 2))].tolist())
         costs = []
         for base, slopes in zip(rival.bases, rival.slopes, strict=True):
             z = self._residual(logged, base)
-            costs.append([_costs(z[owner == k], loose * slopes[:, owner == k]) for k in motions])
+            parts = ((k, owner == k) for k in motions)
+            costs.append([lost if k in away else _costs(z[part], loose * slopes[:, part]) for k, part in parts])
         odds: np.ndarray = 0.5 * np.min(costs, axis=0).sum(axis=1)
         return odds
 

@@ -143,11 +143,11 @@ def cut_log(
         comparison = compare(pieces, noise, len(robot.controlled), how.floor)
     held, by_record = _hold_out(records, pieces, asked, how.block * scored if blocks else 0)
     train, check = np.flatnonzero(~held), np.flatnonzero(held)
-    made_at = _made_at(batch)
+    made_at = _read_step(batch)
     return Log(robot, records, pieces, noise, comparison, train, check, period, by_record, order, made_at, how)
 
 
-def _made_at(batch: Batch) -> float | None:
+def _read_step(batch: Batch) -> float | None:
     world = batch.metadata.get("world")
     step = world.get("step") if isinstance(world, Mapping) else None
     return float(step) if isinstance(step, int | float) else None

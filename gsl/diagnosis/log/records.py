@@ -141,7 +141,9 @@ def _spin(turn: Rotation, period: float) -> np.ndarray:
 
 
 def slope(position: np.ndarray, period: float) -> np.ndarray:
-    """Return the velocities of a smoother through positions [rad], both of shape (T + 1, n_joints) [rad/s]."""
+    """Return a smoother's velocities [rad/s] through positions [rad], shapes (T + 1, n_joints); NaN if these diverge."""
+    if not np.isfinite(position).all():
+        return np.full_like(position, np.nan)
     length = min(SMOOTHER, len(position) - (len(position) + 1) % 2)
     return savgol_filter(position, length, min(3, length - 1), deriv=1, delta=period, axis=0, mode="interp")
 

@@ -76,10 +76,10 @@ def simulator_of(log: Log, plant: Plant, step: float, *, threads: int = 1, sprea
     step *= 0.5 if log.comparison.shaking.any() else 1.0
     if own:
         return InTheAir(plant, fitting_step(step, log.period), log.period, threads, spread)
-    return InTheAir(plant, _converged_step(log, plant, step), log.period, threads, spread, accurate=True)
+    return InTheAir(plant, _find_step(log, plant, step), log.period, threads, spread, accurate=True)
 
 
-def _converged_step(log: Log, plant: Plant, step: float) -> float:
+def _find_step(log: Log, plant: Plant, step: float) -> float:
     """Return the physics period [s], at most `step`, at which replays are a small part of the floor off."""
     windows: Any = log.pieces.take(spread_evenly(np.arange(len(log.pieces)), CHECKED)).windows
     floor = log.comparison.floor

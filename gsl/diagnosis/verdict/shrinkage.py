@@ -42,12 +42,12 @@ def shrinkage(findings: Findings, before: np.ndarray, after: np.ndarray) -> dict
     replays = {"before": before, "after": after, "calibration": calibrated}
     z = {key: log.residual(replay) for key, replay in replays.items()}
     mean = {key: _mean_square(values[log.held_out], log.used) for key, values in z.items()}
-    fraction, low, high = removed_share(log, z["before"], z["after"])
+    fraction, low, high = compute_removed(log, z["before"], z["after"])
     return {
         "floor": 1.0,
         **{key: float(np.sqrt(value.mean())) for key, value in mean.items()},
         "fraction": fraction,
-        "calibration_fraction": removed_share(log, z["before"], z["calibration"])[0],
+        "calibration_fraction": compute_removed(log, z["before"], z["calibration"])[0],
         "low": low,
         "high": high,
         "ceiling_fraction": ceiling(log, before, seed=findings.options.seed),
@@ -83,7 +83,7 @@ def _excess(z: np.ndarray, used: np.ndarray) -> float:
     return float(np.average(_mean_square(z, used), weights=used)) - 1.0
 
 
-def removed_share(log: Log, before: np.ndarray, after: np.ndarray) -> tuple[float | None, float | None, float | None]:
+def compute_removed(log: Log, before: np.ndarray, after: np.ndarray) -> tuple[float | None, float | None, float | None]:
     """Return the share of the held-out excess that is gone, with its 95 % interval by bootstrap; None if there is none.
 
     Args:

@@ -59,7 +59,7 @@ def episodes(raw: Raw, mapping: LogMapping) -> list[Episode]:
     late = int(np.searchsorted(stamps, commands[0] - SAME))
     own = stamps[late:]
     cuts = pieces(own, mapping.longest_gap * float(np.median(np.diff(stamps))))
-    label = labelled(raw, mapping)
+    label = read_label(raw, mapping)
     found = []
     for number, cut in enumerate(cuts):
         part = {"part": number + 1} if len(cuts) > 1 else {}
@@ -99,7 +99,7 @@ def _at(name: str, series: Series, at: np.ndarray) -> np.ndarray:
     return interpolate(series.stamps, series.values, at)
 
 
-def labelled(raw: Raw, mapping: LogMapping) -> dict[str, Any]:
+def read_label(raw: Raw, mapping: LogMapping) -> dict[str, Any]:
     """Return the name of an episode's motion and what else is known of it.
 
     Raises:

@@ -179,7 +179,7 @@ class _Reading(NamedTuple):
         """Return the signal and the number of rows that were left out."""
         raw = side_by_side(self.name, self.found, values, joints, self.table)[self.rows]
         stamps = seconds(self.table.path, self._stamps(values), self.mapping.time, self._column())
-        keep = self._filled(raw)
+        keep = self._find_filled(raw)
         stamps, raw, rows = stamps[keep], raw[keep], self.rows[keep]
         keep = order_rows(self.table.path, stamps, self._column(), rows, drop=self.mapping.duplicates == "drop")
         stamps, raw = stamps[keep], raw[keep]
@@ -209,7 +209,7 @@ class _Reading(NamedTuple):
             return self.mapping.time.period * np.arange(len(self.rows))
         return values[self._column()][self.rows]
 
-    def _filled(self, raw: np.ndarray) -> np.ndarray:
+    def _find_filled(self, raw: np.ndarray) -> np.ndarray:
         """Return which rows have values; empty cells are refused unless they mean that nothing is new."""
         wrong = ~np.isfinite(raw)
         empty = wrong.any(axis=1)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gsl.core.budget import repeated
+from gsl.core.budget import find_repeat
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.sizes import check_need, open_log
 from gsl.storage.importers.table import check_columns, missing_column, numbers
@@ -43,7 +43,7 @@ class TextTable:
         values = _cells(second if self.header else first, self.separator)
         self.decimal = "," if self.separator != "," and any(map(_DECIMAL_COMMA.fullmatch, values)) else "."
         check_columns(path, self.names)
-        if (name := repeated(self.names)) is not None:
+        if (name := find_repeat(self.names)) is not None:
             raise TrajectoryError(path, "there are several columns of this name; keep one", column=name)
 
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
