@@ -141,7 +141,7 @@ def _spin(turn: Rotation, period: float) -> np.ndarray:
 
 
 def slope(position: np.ndarray, period: float) -> np.ndarray:
-    """Return a smoother's velocities [rad/s] through positions [rad], shapes (T + 1, n_joints); NaN if these diverge."""
+    """Return a smoother's velocities [rad/s] through positions [rad], (T + 1, n_joints); NaN if these diverge."""
     if not np.isfinite(position).all():
         return np.full_like(position, np.nan)
     length = min(SMOOTHER, len(position) - (len(position) + 1) % 2)
