@@ -123,7 +123,7 @@ def test_where_falls_are_tolerated_a_check_has_to_be_ahead_of_the_baseline(
         asked.extend((purpose, one.name) for one in thetas if purpose == "check")
         return [_walks(*walks[purpose][one.name]) for one in thetas]
 
-    monkeypatch.setattr(Evaluate, "_measured", measured)
+    monkeypatch.setattr(Evaluate, "_measure", measured)
     thetas = {name: WALK.initial for name in ("pi0", "fast", "other", "third")}
     metrics, _ = _evaluated(tmp_path, thetas, tolerated=tolerated)
     assert (metrics["best"], metrics["failed_check"]) == (best, failed)
