@@ -21,7 +21,6 @@ from gsl_experiments.compare import Compare
 from gsl_experiments.comparison import differences, summaries
 from gsl_experiments.comparison_table import bounds, markdown, told_difference
 from gsl_experiments.noise import NoiseStudy
-from gsl_experiments.paper_cells import one_by_one
 from gsl_experiments.replays import Replay, Replays
 from gsl_experiments.reproduce import Reproduce
 from gsl_experiments.trial import Trial
@@ -98,11 +97,11 @@ def test_a_page_tells_what_is_committed(typed: list[str], tmp_path: Path) -> Non
     name = next((one.removeprefix("name=") for one in typed if one.startswith("name=")), "")
     folder = PLACE / (files[0].parent.name if len(files) == 1 else name)
     table, task = folder / "table.md", study.iterate.task
-    if isinstance(study, Reproduce):
-        assert (folder / "trials.md").read_text(encoding="utf-8") == one_by_one(trials, task)
-        text = study.table.markdown(trials, task)
-    else:
-        text = markdown(summaries(trials), trials, Unit.of(task))
+    text = (
+        study.table.markdown(trials, task)
+        if isinstance(study, Reproduce)
+        else markdown(summaries(trials), trials, Unit.of(task))
+    )
     assert text.strip() in table.read_text(encoding="utf-8")
     foretold = foretelling(trials).strip()
     assert foretold in table.read_text(encoding="utf-8")
