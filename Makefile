@@ -32,7 +32,7 @@ quick: $(INSTALLED) ## Run the tests that take no simulation of seconds; a minut
 	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n 2 -m "not slow"
 
 torture: $(INSTALLED) ## Kill commands, flip bits, feed rubbish, fill the disk; an hour (docs/reference/reliability.md).
-	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python tests/torture.py $(TORTURE)
+	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python tests/support/torture.py $(TORTURE)
 
 real: xl330 so101 menagerie go2 ## Diagnose logs of three real robots (docs/howto/shipped-logs.md); half an hour.
 

@@ -5,7 +5,7 @@
 M by the composite rigid body algorithm, bias by recursive Newton-Euler, both with spatial vectors about the base's
 origin; the sparse factorisation of M + A costs only where the tree has branches (Featherstone 2008, chapters 5, 6, 8).
 One physics step is a semi-implicit Euler step, as Bullet's is: with equal servos both agree far below an encoder's step
-(tests/test_chain.py), and this one is many times faster.
+(tests/worlds/test_chain.py), and this one is many times faster.
 The same code moves one robot and robots side by side (`lanes`).
 """
 

@@ -33,8 +33,8 @@ class Engine:
     """One client of Bullet in DIRECT mode that holds one robot; `load` removes it and loads it anew every time.
 
     With the robot go its contacts, motors and friction, and the ground has no state: a rollout has the same bits as in
-    a client that was reset, which would take more time than the loading itself (tests/test_bullet.py). An uneven ground
-    is another one every time, and everything is loaded anew.
+    a client that was reset, which would take more time than the loading itself (tests/worlds/test_bullet.py). An uneven
+    ground is another one every time, and everything is loaded anew.
 
     Args:
         plant: What to simulate.

@@ -1,0 +1,110 @@
+"""What a selection allows to say: how sure each cause is, what comes back without it, why others were passed over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from swinging_arm import arm, log
+from test_plausibility import claim
+
+from gsl.core.plant import nominal
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
+from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.options import Options
+from gsl.diagnosis.search.reference import Nominal
+from gsl.diagnosis.search.stepwise import Search, Selection
+from gsl.diagnosis.settings import SearchSettings, VerdictSettings
+from gsl.diagnosis.simulate import calibration
+from gsl.diagnosis.verdict.verdict import Judge
+
+PER_SAMPLE = np.full(8, 100.0)
+EMPTY = claim("coulomb_friction", [0.1], ("torque",))
+NONE = replace(EMPTY, candidates=(), parameters=(), costs=np.full(8, 1100.0), counts=PER_SAMPLE)
+
+
+def friction(joints: str, cost: float) -> Hypothesis:
+    one = claim("coulomb_friction", [0.1], ("torque",))
+    return replace(one, candidates=(one.candidates[0].on(joints),), costs=np.full(8, cost), counts=PER_SAMPLE)
+
+
+def with_both(one: Hypothesis, other: Hypothesis, cost: float) -> Hypothesis:
+    parts = {"candidates": one.candidates + other.candidates, "parameters": one.parameters + other.parameters}
+    return replace(one, costs=np.full(8, cost), **cast(Any, parts))
+
+
+def selection(chosen: Hypothesis, *others: Hypothesis) -> Selection:
+    return Selection(NONE, chosen, tuple(sorted([NONE, chosen, *others], key=lambda one: one.cost)), cast(Any, None))
+
+
+def test_two_causes_of_one_effect_are_each_judged_against_the_other_alone() -> None:
+    shoulder, elbow = friction("shoulder", 300.0), friction("elbow", 900.0)
+    verdict = Judge(1.0).judge(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, friction("all", 200.0)))
+    first, second = verdict.causes
+    assert first.value == pytest.approx(800 / 1004)  # elbow alone leaves 900 of 1100, of which 96 are noise
+    assert second.value == pytest.approx(200 / 1004)
+    assert verdict.word == "causes"
+
+
+def test_a_cause_in_whose_place_no_other_was_tried_is_not_certain() -> None:
+    shoulder, elbow = friction("shoulder", 300.0), friction("elbow", 900.0)
+    alone = Judge(1.0).judge(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow))
+    assert [one.rival for one in alone.causes] == [None, None]
+    assert max(one.probability for one in alone.causes) <= VerdictSettings.unrivalled
+    load = replace(claim("load_friction", [0.2], ("coefficient",)), costs=np.full(8, 900.0), counts=PER_SAMPLE)
+    rivals = with_both(shoulder, load, 200.0), with_both(elbow, load, 200.0)
+    tried = Judge(1.0).judge(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, *rivals))
+    assert [one.rival for one in tried.causes] == ["load_friction", "load_friction"]
+    assert min(one.probability for one in tried.causes) > VerdictSettings.unrivalled
+
+
+def test_a_spurious_effect_that_is_cheapest_and_fails_hides_no_other() -> None:
+    """It gains much in one sample of eight and nothing elsewhere, the right one in every sample."""
+    right, none = friction("all", 100.0), replace(NONE, costs=np.array([8000.0] + 7 * [114.0]))
+    spurious = replace(claim("torque_limit", [1.12], ("factor",)), counts=PER_SAMPLE)
+    spurious = replace(spurious, costs=np.array([0.0] + 7 * [114.0]))
+    assert spurious.cost < right.cost < none.cost
+    search = Search(cast(Any, SimpleNamespace(settings=SearchSettings())), none)
+    assert search.part_singles([spurious, right], 20.0) == ([spurious], [right])
+    assert search.part_singles([spurious], 20.0) == ([], [])
+    tried = replace(selection(right, spurious), none=none)
+    assert Judge(1.0).judge(tried).word == "inseparable"
+    verdict = Judge(1.0).judge(replace(tried, rejected=(spurious,)))
+    assert (verdict.word, verdict.causes[0].rival) == ("causes", None)
+    assert replace(tried, rejected=(spurious,)).objection(spurious) == "not surely better than a calibration"
+
+
+@pytest.mark.parametrize(
+    ("levels", "is_nothing"), [((0.5, 0.6), True), ((0.5, 1.3), False), ((1.0, 1.0), False), ((0.96, 0.96), True)]
+)
+def test_where_a_calibration_leaves_no_more_than_noise_there_is_nothing_to_explain(
+    levels: tuple[float, float], is_nothing: bool
+) -> None:
+    problem = Nominal(nominal(arm()), 0.002).problem(cut_log(log({}), arm()), Options(threads=1), lambda _: None)
+    costs, counts = np.full(8, 100.0 * np.mean(levels)), np.full(8, 100.0)
+    none = replace(NONE, costs=costs, counts=counts, levels=np.array(levels))
+    assert Search(problem, none).nothing_left() == is_nothing
+    shifts = calibration.no_shifts(2)
+    shifts[calibration.KP] = 3.0 * calibration.SPREADS[calibration.KP] * np.sqrt(len(shifts) / 2.0)
+    hiding = replace(none, fit=replace(none.fit, shifts=shifts, prior_cost=calibration.prior_cost(shifts)))
+    assert not Search(problem, hiding).nothing_left()
+
+
+@pytest.mark.parametrize(
+    ("costs", "torque", "why"),
+    [
+        (np.full(8, 110.0), 0.1, None),
+        (np.full(8, 90.0), 0.1, "little gain for another effect"),
+        (np.array([0.0] * 4 + [150.0] * 4), 0.1, "not surely better"),
+        (np.full(8, 50.0), 50.0, "a value beyond its documented range"),
+    ],
+)
+def test_what_costs_less_and_is_not_chosen_has_a_reason(costs: np.ndarray, torque: float, why: str | None) -> None:
+    chosen = friction("shoulder", 100.0)
+    more = with_both(chosen, friction("elbow", 900.0), 0.0)
+    more = replace(more, costs=costs, parameters=(*chosen.parameters, np.array([torque])))
+    assert selection(chosen).objection(more) == why
+    assert selection(chosen).objection(friction("shoulder", 90.0)) is None  # the same, fitted otherwise
