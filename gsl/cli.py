@@ -124,6 +124,24 @@ def rerun(
     raise typer.Exit(rerun(reference, settings or [], Console(json=json)))
 
 
+_RENDER = (
+    "out=FILE: .gif, .mp4, or .png for a contact sheet; slow=2: half as fast; policy=NAME of a search; episode=0 and "
+    "beside=REF of a log; seed= of the walk; trust=MODULE"
+)
+
+
+@app.command()
+def render(
+    reference: Reference,
+    settings: Annotated[list[str] | None, typer.Argument(metavar="[out=film.gif]", help=_RENDER)] = None,
+    json: Json = False,
+) -> None:
+    """Write a film of a log, or of the policy that a run returned, on the real side and in simulation."""
+    from gsl.commandline.film import render
+
+    render(reference, settings or [], Console(json=json))
+
+
 @app.command()
 def robot(
     name: Annotated[str, typer.Argument(help="Name of the robot, such as nao, or its URDF.")],

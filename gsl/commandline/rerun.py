@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from gsl.commandline.own_word import find_own_modules, find_trust
-from gsl.core.described import rebuilt
+from gsl.commandline.rebuild import rebuild
 from gsl.errors import ArtifactError, ConfigError
 from gsl.report.console import Console
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact, build
 from gsl.storage.hashing import CIRCUMSTANCES, SHORT
-from gsl.storage.identity import content_hash
 from gsl.storage.references import resolve
 
 AGAIN = "_rerun"
@@ -42,15 +40,9 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
     place = Path(words["out"]) if words.get("out") else _beside(folder)
     if place.exists():
         raise ArtifactError(place, "exists; take it away or choose another out=")
-    config = old.config
-    for parent in old.manifest.parents:
-        source = Path(os.path.relpath(folder / parent.path))
-        if content_hash(source) != parent.hash:
-            raise ArtifactError(source, f"is no longer what {folder.as_posix()} was made from")
-        _move(config, parent.role.split("."), source)
     trust = find_trust(settings)
     find_own_modules(trust)
-    stage = rebuilt(config, trust=trust)
+    stage, config = rebuild(old, trust)
     command = f"gsl rerun {folder.as_posix()}"
     new = build(stage, config=config, out=place, command=command, force=False, console=console)
     rows = list(_compare(old, new))
@@ -74,24 +66,6 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
 def _beside(folder: Path) -> Path:
     run = folder.absolute().parent
     return Path(os.path.relpath(run.with_name(run.name + AGAIN) / folder.name))
-
-
-def _move(settings: Any, role: list[str], source: Path) -> None:
-    """Let a setting that says where a parent lies say where it lies now; a name, as of a robot, stays."""
-    *above, name = role
-    for part in above:
-        settings = _entry(settings, part)
-    before = _entry(settings, name)
-    if isinstance(before, str) and ("/" in before or Path(before).suffix):
-        settings[int(name) if isinstance(settings, list) else name] = source.as_posix()
-
-
-def _entry(settings: Any, name: str) -> Any:
-    if isinstance(settings, Mapping):
-        return settings.get(name)
-    if isinstance(settings, list) and name.isdigit() and int(name) < len(settings):
-        return settings[int(name)]
-    return None
 
 
 def _compare(old: Artifact, new: Artifact) -> Iterator[tuple[str, str, bool]]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.body import lump
+from gsl.core.body import Robot, lump
 from gsl.core.interfaces import Grounding, World
 from gsl.core.observation import missing, observations
 from gsl.core.seeds import derive_seed
@@ -16,8 +16,9 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import actions
 from gsl.diagnosis.log.log import cut_log
 from gsl.grounding.none import NoGrounding
+from gsl.report.film import Shot, film
 from gsl.report.joint_trace import Traces, joint_trace
-from gsl.report.render import walk_strip
+from gsl.report.style import GROUNDED, REAL
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.validation.replay import PAST, Place, replay
 from gsl.worlds.bullet import BulletWorld
@@ -49,7 +50,7 @@ def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory) -> N
     if not isinstance(world, BulletWorld) or missing(walk, world.layout):
         return
     draw_joint(folder, Way(world, NoGrounding()), Way(world, scenario.grounding), walk)
-    walk_strip(world.plant.robot, walk, folder / WALK)
+    _draw_walk(world.plant.robot, Shot("π0", "on the real side", walk, REAL), folder)
 
 
 def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parameters: np.ndarray, seed: int) -> None:
@@ -75,7 +76,11 @@ def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parame
     walk = rollout(scenario, env, parameters, derive_seed(seed, WALK))
     env.close()
     if not missing(walk, grounded.layout):
-        walk_strip(robot, walk, folder / WALK)
+        _draw_walk(robot, Shot("returned policy", "in the grounded simulator", walk, GROUNDED), folder)
+
+
+def _draw_walk(robot: Robot, shot: Shot, folder: Path) -> None:
+    film(robot, robot.controlled, [shot], folder / WALK)
 
 
 def draw_joint(folder: Path, plain: Way, grounded: Way, real: Trajectory) -> None:

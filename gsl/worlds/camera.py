@@ -62,6 +62,7 @@ class Camera:
         ]
         self._joints = {row[1].decode(): row[0] for row in rows}
         self._centre = pybullet.getDynamicsInfo(self._body, -1, self._client)[3:5]
+        self._place = [0.0, 0.0, 0.0]
 
     def close(self) -> None:
         """Free the client."""
@@ -75,7 +76,7 @@ class Camera:
             place: Of the base's link frame in world axes [m], shape (3,).
             quaternion: Its orientation, x y z w.
         """
-        b, client = self._bullet, self._client
+        b, client, self._place = self._bullet, self._client, list(place)
         b.resetBasePositionAndOrientation(
             self._body, *b.multiplyTransforms(list(place), list(quaternion), *self._centre), physicsClientId=client
         )
@@ -84,17 +85,28 @@ class Camera:
 
     def picture(self, view: View, width: int, height: int, *, finer: int = 2) -> np.ndarray:
         """Return an image, shape (height, width, 3) of uint8, drawn `finer` times as large and averaged."""
-        b, size = self._bullet, (finer * width, finer * height)
-        eye = b.computeViewMatrixFromYawPitchRoll(list(view.target), view.distance, view.yaw - 90.0, view.pitch, 0.0, 2)
-        lens = b.computeProjectionMatrixFOV(view.opening, width / height, NEAR, FAR)
+        size = (finer * width, finer * height)
+        eye, lens = self._look(view, width / height)
         colours, depth, seen = self._draw(eye, lens, size)
         places = _places(depth, eye, lens)
-        shade = 1.0 - SHADOW * gaussian_filter(self._shadow(places, view), 1.5 * finer)
+        shade = 1.0 - SHADOW * gaussian_filter(self._shadow(places), 1.5 * finer)
         image = np.where((seen == self._floor)[..., None], colours * shade[..., None], colours)
         down = np.linspace(0.0, 1.0, size[1])[:, None, None]
         image = np.where((seen < 0)[..., None], (1.0 - down) * _SKY_TOP + down * _SKY_LOW, image)
         averaged: np.ndarray = image.reshape(height, finer, width, finer, 3).mean(axis=(1, 3)).round().astype(np.uint8)
         return averaged
+
+    def project(self, points: np.ndarray, view: View, width: int, height: int) -> np.ndarray:
+        """Return where points [m], shape (n, 3), are in a picture [pixels], shape (n, 2), right and down."""
+        eye, lens = self._look(view, width / height)
+        flat = _with_ones(points) @ _matrix(eye).T @ _matrix(lens).T
+        return 0.5 * (1.0 + flat[:, :2] / flat[:, 3:] * [1.0, -1.0]) * [width, height]
+
+    def _look(self, view: View, ratio: float) -> tuple[Sequence[float], Sequence[float]]:
+        """Matrices of the camera's place and of its lens."""
+        b = self._bullet
+        eye = b.computeViewMatrixFromYawPitchRoll(list(view.target), view.distance, view.yaw - 90.0, view.pitch, 0.0, 2)
+        return eye, b.computeProjectionMatrixFOV(view.opening, ratio, NEAR, FAR)
 
     def _draw(self, eye: Sequence[float], lens: Sequence[float], size: tuple[int, int]) -> tuple[np.ndarray, ...]:
         """Colours, depth and number of the body at every pixel."""
@@ -106,18 +118,22 @@ class Camera:
         shape = (size[1], size[0])
         return np.reshape(pixels, (*shape, 4))[..., :3].astype(float), np.reshape(depth, shape), np.reshape(seen, shape)
 
-    def _shadow(self, places: np.ndarray, view: View) -> np.ndarray:
+    def _shadow(self, places: np.ndarray) -> np.ndarray:
         """1 where the robot hides the light from a place, else 0: it is what the light itself sees there."""
         b, size = self._bullet, 400
-        light = (np.array(view.target) + 3.0 * np.array(LIGHT) / np.linalg.norm(LIGHT)).tolist()
-        eye = b.computeViewMatrix(light, list(view.target), [0.0, 0.0, 1.0])
+        light = (np.array(self._place) + 3.0 * np.array(LIGHT) / np.linalg.norm(LIGHT)).tolist()
+        eye = b.computeViewMatrix(light, self._place, [0.0, 0.0, 1.0])
         lens = b.computeProjectionMatrixFOV(20.0, 1.0, NEAR, FAR)
         robot = self._draw(eye, lens, (size, size))[2] == self._body
-        flat = np.concatenate([places, np.ones_like(places[..., :1])], axis=-1) @ _matrix(eye).T @ _matrix(lens).T
+        flat = _with_ones(places) @ _matrix(eye).T @ _matrix(lens).T
         x, y = flat[..., 0] / flat[..., 3], -flat[..., 1] / flat[..., 3]
         column, row = (np.clip((0.5 * (part + 1.0) * size).astype(int), 0, size - 1) for part in (x, y))
         inside = (np.abs(x) < 1.0) & (np.abs(y) < 1.0)
         return np.where(inside, robot[row, column], False).astype(float)
+
+
+def _with_ones(points: np.ndarray) -> np.ndarray:
+    return np.concatenate([points, np.ones_like(points[..., :1])], axis=-1)
 
 
 def _matrix(column_major: Sequence[float]) -> np.ndarray:

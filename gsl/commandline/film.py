@@ -1,0 +1,218 @@
+"""`gsl render`: a film of what an artifact's robot did, real and simulated beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from gsl.commandline.own_word import find_own_modules, find_trust
+from gsl.commandline.rebuild import rebuild
+from gsl.core.body import Robot
+from gsl.core.interfaces import REAL, SIM
+from gsl.core.seeds import derive_seed
+from gsl.core.setting import component, setting
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.core.trust import modules_in
+from gsl.core.validation import did_you_mean, make
+from gsl.errors import ArtifactError, ConfigError, InputError
+from gsl.grounding.none import NoGrounding
+from gsl.grounding.preparation import without_margins
+from gsl.report.console import Console
+from gsl.report.film import Shot, check_format, film
+from gsl.report.style import GROUNDED, SIMULATION
+from gsl.report.style import REAL as REAL_COLOUR
+from gsl.robots.catalogue import robot as robot_of
+from gsl.rollout.rollout import Scenario, rollout
+from gsl.storage import manifest
+from gsl.storage.artifact import Artifact
+from gsl.storage.policies import PolicyRecord
+from gsl.storage.policy_choice import FILE, records, vector
+from gsl.storage.references import RUNS, resolve
+from gsl.storage.trajectories import data_file, read
+from gsl.storage.whole import explain_refusal, replacing
+from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.ensemble import EnsembleWorld
+from gsl.worlds.external import ExternalRobot
+from gsl.worlds.randomised import RandomisedWorld
+
+LOGS = ("collect", "import")
+SHOWN = (*LOGS, "evaluate", "iterate", "optimize")
+
+
+@component
+class Settings:
+    """What `gsl render` takes beside the reference."""
+
+    out: Annotated[str, setting("file to write: .gif or .mp4, or .png for a contact sheet")] = "film.gif"
+    slow: Annotated[float, setting("how many times slower than real time", ge=0.1, le=100)] = 1.0
+    episode: Annotated[int, setting("which episode of a log, from 0", ge=0)] = 0
+    policy: Annotated[str, setting("which policy of a search; empty for the one that was returned")] = ""
+    beside: Annotated[str, setting("a second log, shown beside the first")] = ""
+    seed: Annotated[int, setting("of the walk", ge=0)] = 1
+
+
+@dataclass(frozen=True)
+class Cast:
+    """Who is seen in a film: a robot, and what it did where."""
+
+    robot: Robot
+    joints: tuple[str, ...]
+    shots: tuple[Shot, ...]
+
+
+def render(reference: str, words: Sequence[str], console: Console) -> None:
+    """Write a film of an artifact.
+
+    A log is shown as it was recorded. Of `evaluate` and `iterate` the returned policy walks once more, on the real side
+    if that is simulated, and in the simulator in which it was found.
+
+    Args:
+        reference: A path, or the name of a run.
+        words: Settings, as they were typed.
+        console: Where the file is named.
+
+    Raises:
+        ArtifactError: There is no such artifact, or it has nothing that moves.
+        ConfigError: A setting is wrong.
+        InputError: The robot cannot be shown.
+    """
+    settings = make(Settings, dict(_split(words)))
+    path = Path(settings.out)
+    check_format(path)
+    trust = find_trust([word for word in words if word.startswith("trust=")])
+    find_own_modules(trust)
+    folder = _find(reference)
+    kind = manifest.read(folder).kind
+    console.status(f"{folder.as_posix()}: {kind}")
+    cast = _play_logs(folder, settings) if kind in LOGS else _walk(folder, kind, settings, trust, console)
+    if not any(link.shapes for link in cast.robot.links.values()):
+        raise InputError(f"{cast.robot.name}: none of its links has a shape that could be shown")
+    with explain_refusal(path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary:
+        named = temporary.with_name(temporary.name + path.suffix.lower())
+        film(cast.robot, cast.joints, cast.shots, named, slow=settings.slow)
+        named.rename(temporary)
+    console.result({"film": path, "shown": [shot.title for shot in cast.shots]}, text=path.as_posix())
+
+
+def _split(words: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    for word in words:
+        name, sign, value = word.partition("=")
+        if not sign:
+            raise ConfigError(word, "is no setting; settings of gsl render are typed as name=value")
+        if name != "trust":
+            yield name, value
+
+
+def _find(reference: str) -> Path:
+    """Return the artifact that is meant: of a whole run, the one of `iterate`."""
+    try:
+        place = resolve(reference, kind="iterate")
+    except ArtifactError:
+        place = resolve(reference, kind=SHOWN)
+    return place.parent if place.is_file() else place
+
+
+def _play_logs(folder: Path, settings: Settings) -> Cast:
+    """Return an episode of one log, or of two."""
+    first = read(data_file(str(folder)))
+    name = str(first.metadata.get("robot", ""))
+    find_own_modules(modules_in({"robot": name}))
+    robot = robot_of(name)
+    logs = {folder.as_posix().removeprefix(f"{RUNS}/"): first}
+    if settings.beside:
+        logs[settings.beside] = read(data_file(settings.beside), joints=first.joints)
+    colours = (REAL_COLOUR, SIMULATION)
+    shots = tuple(
+        Shot(title, "", _episode(title, batch, settings.episode), colour)
+        for (title, batch), colour in zip(logs.items(), colours, strict=False)
+    )
+    return Cast(robot, first.joints, shots)
+
+
+def _episode(title: str, batch: Batch, number: int) -> Trajectory:
+    if number >= len(batch):
+        raise ConfigError("episode", f"{title} has {len(batch)}, counted from 0", given=str(number))
+    return batch.episodes[number]
+
+
+def _walk(folder: Path, kind: str, settings: Settings, trust: Sequence[str], console: Console) -> Cast:
+    """Return walks of a policy that a search found: on the real side, and in the simulator of the search."""
+    measured = _open(_last_evaluation(folder) if kind == "iterate" else folder)
+    stage, _ = rebuild(measured, trust)
+    searched = measured if kind == "optimize" else _search_of(measured)
+    source = measured.folder if not settings.policy else searched.folder if searched else resolve(stage.policies)
+    policy = _choose(records(stage.policy, str(source)), settings.policy)
+    sides = []
+    if kind != "optimize" and isinstance(stage.world, ExternalRobot):
+        console.status("the robot is not in this computer: the film shows the simulator alone")
+    elif kind != "optimize":
+        scenario = Scenario(stage.world, stage.task, stage.policy, REAL, NoGrounding()).prepare()
+        sides.append(("on the real side", scenario, REAL_COLOUR))
+    if searched:
+        search, _ = rebuild(searched, trust)
+        scenario = Scenario(search.world, search.task, search.policy, SIM, without_margins(search.grounding))
+        plain = isinstance(search.grounding, NoGrounding)
+        where, colour = ("in simulation", SIMULATION) if plain else ("in the grounded simulator", GROUNDED)
+        sides.append((where, scenario.prepare(searched.metrics), colour))
+    if not sides:
+        raise ArtifactError(folder, "its robot is elsewhere, and its policies are of no search; render a log instead")
+    robot = _robot_in(sides[0][1].world)
+    parameters, seed = vector(stage.policy, policy), derive_seed(settings.seed, "film")
+    shots = tuple(
+        Shot(policy.name, where, _roll_out(scenario, parameters, seed), colour) for where, scenario, colour in sides
+    )
+    return Cast(robot, robot.controlled, shots)
+
+
+def _open(folder: Path) -> Artifact:
+    return Artifact(folder, manifest.read(folder))
+
+
+def _last_evaluation(folder: Path) -> Path:
+    """Return the measurement whose policy a run returned, the last one otherwise."""
+    places = [folder / link.path for link in _open(folder).manifest.links if link.role == "evaluate"]
+    grounded = [place for place in places if place.name == "evaluate"] or places
+    if not grounded:
+        raise ArtifactError(folder, "has measured no policy that could be shown")
+    returned = (folder / FILE).read_bytes()
+    same = [place for place in grounded if (place / FILE).is_file() and (place / FILE).read_bytes() == returned]
+    return (same or grounded)[-1]
+
+
+def _search_of(measured: Artifact) -> Artifact | None:
+    """Return the search whose policies were measured, if they are of one."""
+    for parent in measured.manifest.parents:
+        place = measured.folder / parent.path
+        home = place if place.is_dir() else place.parent
+        if parent.role == "policies" and (home / manifest.NAME).is_file() and manifest.read(home).kind == "optimize":
+            return _open(home)
+    return None
+
+
+def _choose(found: Sequence[PolicyRecord], name: str) -> PolicyRecord:
+    """Return the policy of a name, the last one without."""
+    by_name = {record.name: record for record in found}
+    if name and name not in by_name:
+        raise ConfigError("policy", f"there is none of this name{did_you_mean(name, by_name)}", given=name)
+    return by_name[name] if name else found[-1]
+
+
+def _robot_in(world: Any) -> Robot:
+    inner = world.world if isinstance(world, EnsembleWorld | RandomisedWorld) else world
+    if not isinstance(inner, BulletWorld):
+        raise InputError("a film shows robots; this world is an environment without one")
+    return inner.plant.robot
+
+
+def _roll_out(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:
+    env = scenario.make()
+    try:
+        return rollout(scenario, env, parameters, seed)
+    finally:
+        env.close()

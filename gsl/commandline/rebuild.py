@@ -1,0 +1,51 @@
+"""The stage of an artifact once more, from what its folder says of it; a run that was moved still finds its parents."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gsl.core.described import rebuilt
+from gsl.errors import ArtifactError
+from gsl.storage.artifact import Artifact
+from gsl.storage.identity import content_hash
+
+
+def rebuild(artifact: Artifact, trust: Sequence[str]) -> tuple[Any, dict[str, Any]]:
+    """Return the stage that made an artifact, and its settings with the parents where they lie now.
+
+    Args:
+        artifact: What it made.
+        trust: Modules that are not gsl's and whose classes its settings may name.
+
+    Raises:
+        ArtifactError: A parent is no longer what the artifact was made from.
+        ConfigError: Its settings do not fit this version of gsl.
+    """
+    config = artifact.config
+    for parent in artifact.manifest.parents:
+        source = Path(os.path.relpath(artifact.folder / parent.path))
+        if content_hash(source) != parent.hash:
+            raise ArtifactError(source, f"is no longer what {artifact.folder.as_posix()} was made from")
+        _move(config, parent.role.split("."), source)
+    return rebuilt(config, trust=trust), config
+
+
+def _move(settings: Any, role: list[str], source: Path) -> None:
+    """Let a setting that says where a parent lies say where it lies now; a name, as of a robot, stays."""
+    *above, name = role
+    for part in above:
+        settings = _entry(settings, part)
+    before = _entry(settings, name)
+    if isinstance(before, str) and ("/" in before or Path(before).suffix):
+        settings[int(name) if isinstance(settings, list) else name] = source.as_posix()
+
+
+def _entry(settings: Any, name: str) -> Any:
+    if isinstance(settings, Mapping):
+        return settings.get(name)
+    if isinstance(settings, list) and name.isdigit() and int(name) < len(settings):
+        return settings[int(name)]
+    return None
