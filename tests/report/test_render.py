@@ -1,6 +1,7 @@
-"""Pictures of the robot are files of the promised size that show something."""
+"""Pictures and films of the robot show what they promise: a camera that stands still, the way, the command, the fall."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,41 +9,101 @@ import pytest
 from bodies import world
 from PIL import Image
 
+from gsl.cli import call
 from gsl.commandline.robot_files import write_robot
-from gsl.errors import ConfigError
+from gsl.errors import ConfigError, InputError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.walk_engine import WalkEngine
 from gsl.report.console import Console
-from gsl.report.render import portrait, walk_strip
+from gsl.report.film import RATE, SHEET, WIDTH, Shot, check_format, film
+from gsl.report.film_traces import HEIGHT
+from gsl.report.render import portrait
 from gsl.robots.nao import nao
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
 
+RED, GREEN = "#d55e00", "#009e73"
+
 
 @pytest.fixture(scope="module")
 def walk():
+    """0.6 s in which the robot is carried 1.8 m ahead: its own steps would be too short to be seen."""
     scenario = Scenario(world(), Walk(duration=0.6), WalkEngine(), "sim", NoGrounding())
     env = scenario.make()
-    yield rollout(scenario, env, WalkEngine().initial, 0)
+    walked = rollout(scenario, env, WalkEngine().initial, 0)
     env.close()
+    carried = {"base.position.x": np.linspace(0.0, 1.8, len(walked.time))}
+    return replace(walked, sensors={**walked.sensors, **carried}, fell=None)
+
+
+def orange(image: np.ndarray) -> np.ndarray:
+    """Where the robot's orange is."""
+    colours = image.astype(int)
+    return (colours[..., 0] > 180) & (colours[..., 2] < 80)
+
+
+def sheet(shots: list[Shot], path: Path) -> np.ndarray:
+    film(nao(), nao().controlled, shots, path)
+    return np.asarray(Image.open(path).convert("RGB"))
 
 
 def test_the_portrait_shows_a_robot_on_a_floor(tmp_path: Path) -> None:
     portrait(nao(), tmp_path / "nao.png", width=200, height=225)
-    image = np.asarray(Image.open(tmp_path / "nao.png")).astype(int)
+    image = np.asarray(Image.open(tmp_path / "nao.png"))
     assert image.shape == (225, 200, 3)
-    orange = (image[..., 0] > 180) & (image[..., 2] < 80)
-    assert 0.02 < orange.mean() < 0.3
-    rows = np.flatnonzero(orange.any(axis=1))
+    assert 0.02 < orange(image).mean() < 0.3
+    rows = np.flatnonzero(orange(image).any(axis=1))
     assert rows[0] < 0.25 * 225 and rows[-1] > 0.6 * 225, "from the ears to the knees"
 
 
-def test_a_strip_has_its_frames_side_by_side(walk, tmp_path: Path) -> None:
-    walk_strip(nao(), walk, tmp_path / "walk.png", frames=3, height=100)
-    image = np.asarray(Image.open(tmp_path / "walk.png")).astype(int)
-    assert image.shape == (100, 3 * 62, 3)
-    frames = np.split(image, 3, axis=1)
-    assert all(np.abs(one - other).mean() > 0.3 for one, other in zip(frames, frames[1:], strict=False))
+def test_a_sheet_shows_the_way_from_a_camera_that_stands_still(walk, tmp_path: Path) -> None:
+    image = sheet([Shot("", "", walk, RED)], tmp_path / "walk.png")
+    halves = np.split(image, 2, axis=1)
+    moments = [part for row in zip(*(np.split(half, SHEET // 2) for half in halves), strict=True) for part in row]
+    middles = [np.flatnonzero(orange(moment).any(axis=0)).mean() for moment in moments]
+    steps = np.diff(middles)
+    assert (steps > 0).all() and np.ptp(steps) < 0.4 * steps.mean(), "equal ways in equal times, to a tick"
+    floor = [moment[-40:-20, -40:] for moment in moments]
+    assert all(np.array_equal(part, floor[0]) for part in floor[:4]), "the floor does not move"
+
+
+def test_two_sides_stand_beside_each_other(walk, tmp_path: Path) -> None:
+    alone = sheet([Shot("a", "", walk, RED)], tmp_path / "one.png")
+    both = sheet([Shot("a", "", walk, RED), Shot("a", "", walk, GREEN)], tmp_path / "two.png")
+    assert both.shape[1] == alone.shape[1] == 2 * WIDTH
+    assert both.shape[0] == 2 * alone.shape[0]
+    left, right = np.split(both, 2, axis=1)
+    np.testing.assert_array_equal(left, right)
+
+
+def test_a_fall_is_marked_when_it_happens(walk, tmp_path: Path) -> None:
+    fell = walk.time >= 0.5 * walk.time[-1]
+    strips = [
+        np.split(sheet([Shot("", "", walked, RED)] * 2, tmp_path / "walk.png"), SHEET)
+        for walked in (walk, replace(walk, fell=fell))
+    ]
+    differ = [not np.array_equal(upright, fallen) for upright, fallen in zip(*strips, strict=True)]
+    assert differ == [False] * 4 + [True] * 4
+
+
+@pytest.mark.parametrize("slow", [1.0, 2.0])
+def test_a_film_lasts_as_long_as_the_walk_and_longer_in_slow_motion(walk, tmp_path: Path, slow: float) -> None:
+    film(nao(), nao().controlled, [Shot("walk", "", walk, RED)], tmp_path / "walk.gif", slow=slow)
+    shown = Image.open(tmp_path / "walk.gif")
+    assert shown.n_frames * shown.info["duration"] / 1000 == pytest.approx(slow * walk.time[-1], abs=1 / RATE)
+    assert shown.size[1] > HEIGHT
+
+
+def test_a_log_in_which_the_base_is_held_shows_no_way(walk, tmp_path: Path) -> None:
+    still = {name: np.full_like(values, values[0]) for name, values in walk.sensors.items()}
+    image = sheet([Shot("", "", replace(walk, sensors=still), RED)], tmp_path / "held.png")
+    columns = np.flatnonzero(orange(image[: len(image) // 2, : WIDTH // 2]).any(axis=0))
+    assert columns.mean() == pytest.approx(WIDTH / 4, abs=WIDTH / 20), "in the middle"
+
+
+def test_a_film_has_a_format(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\.gif or \.mp4"):
+        check_format(tmp_path / "walk.avi")
 
 
 def test_the_robot_command_names_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -55,3 +116,44 @@ def test_the_robot_command_names_its_files(tmp_path: Path, capsys: pytest.Captur
 def test_an_unknown_robot_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="did you mean nao"):
         write_robot("nao6", tmp_path, Console())
+
+
+@pytest.fixture(scope="module")
+def toy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of its own: a search of two generations, and its measurement."""
+    place = tmp_path_factory.mktemp("runs") / "toy"
+    common = ["preset=toy", "workers=1"]
+    search = ["grounding=none", "task.duration=1", "optimizer.generations=2"]
+    assert call(["optimize", *common, *search, f"out={place}/optimize"]) == 0
+    assert call(["evaluate", *common, "task.duration=1", f"policies={place}/optimize", f"out={place}/evaluate"]) == 0
+    return place
+
+
+def test_render_shows_a_policy_on_both_sides(toy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert call(["render", f"{toy}/evaluate", f"out={tmp_path}/new/walk.png", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert Path(document["film"]).stat().st_size > 10_000
+    assert [title.partition(" ")[2] for title in document["shown"]] == ["on the real side", "in simulation"]
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (["policy=generation_1"], "did you mean generation_"),
+        (["out=walk.avi"], ".gif or .mp4"),
+        (["speed=2"], "no such setting"),
+        (["slow=0"], "slow"),
+        (["slow=fast"], "must be a number"),
+        (["slow"], "name=value"),
+    ],
+)
+def test_render_refuses_in_one_line(
+    toy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    words: list[str], problem: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert call(["render", f"{toy}/evaluate", *words]) == 2
+    told = capsys.readouterr().err.strip().splitlines()[-1]
+    assert problem in told
+    assert not list(tmp_path.iterdir())
