@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gsl.report.style import COMMAND, GROUNDED, REAL, SIMULATION, figure, headline, label_ends, look, save
+from gsl.report.style import COMMAND, GROUNDED, HEIGHT, NARROW, REAL, SIMULATION, WIDTH, figure, headline, label_ends, look, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,13 +40,16 @@ def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = N
     save(joint_trace_figure(traces, joint, title=title, rest=rest), path)
 
 
-def joint_trace_figure(traces: Traces, joint: str, *, title: str | None = None, rest: int = 0) -> Figure:
+def joint_trace_figure(
+    traces: Traces, joint: str, *, title: str | None = None, rest: int = 0, width: float = WIDTH
+) -> Figure:
     """Return the figure of one joint in degrees; each simulator is labelled with its RMS distance from the real robot.
 
     Args:
         traces: What to draw.
         joint: Its name.
-        title: By default what grounding does to that distance.
+        title: By default what grounding does to that distance; an empty one is left out.
+        width: Of the figure [in].
         rest: Ticks in the beginning in which nothing moves, and which no distance is of.
     """
     distances = [_rms_degrees((traces.simulation - traces.real)[rest:])]
@@ -59,7 +62,7 @@ def joint_trace_figure(traces: Traces, joint: str, *, title: str | None = None, 
     if traces.sent is not None:
         lines.append(("grounded command", traces.sent, GROUNDED, 1.1, (0, (5, 3))))
     with look():
-        whole = figure(4.6)
+        whole = figure(HEIGHT if width == WIDTH else NARROW * width, width)
         axes = whole.subplots()
         for label, angle, colour, width, style in lines:
             axes.plot(traces.time, np.degrees(angle), linestyle=style, color=colour, linewidth=width, label=label)
@@ -68,8 +71,8 @@ def joint_trace_figure(traces: Traces, joint: str, *, title: str | None = None, 
         axes.set_xlabel("time [s]")
         axes.set_ylabel(f"{joint} [°]")
         ends = [(math.degrees(angle[-1]), label, colour) for label, angle, colour, _, _ in lines]
-        label_ends(axes, float(traces.time[-1]), ends, gap=0.13)
-        headline(whole, title or _finding(joint, distances))
+        label_ends(axes, float(traces.time[-1]), ends, gap=0.13 * HEIGHT / whole.get_figheight())
+        headline(whole, _finding(joint, distances) if title is None else title)
     return whole
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gsl.core.words import in_unit
-from gsl.report.style import COMMAND, INK, REAL, SIMULATION, figure, headline, label_ends, look, save
+from gsl.report.style import COMMAND, HEIGHT, INK, NARROW, REAL, SIMULATION, WIDTH, figure, headline, label_ends, look, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,19 +92,23 @@ def learning_curve(path: Path, searches: Sequence[Search], *, unit: str, title: 
     save(learning_curve_figure(searches, unit=unit, title=title), path)
 
 
-def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str) -> Figure:
+def learning_curve_figure(
+    searches: Sequence[Search], *, unit: str, title: str = "", width: float = WIDTH, among: Sequence[Search] = ()
+) -> Figure:
     """Return the figure of the searches.
 
     Args:
         searches: Panels from left to right.
         unit: Of all values.
         title: The finding, in a line.
+        width: Of the figure [in].
+        among: Searches that have the same scale.
     """
     with look():
-        whole = figure(4.6)
+        whole = figure(HEIGHT if width == WIDTH else NARROW * width, width)
         panels = whole.subplots(1, len(searches), sharey=True, squeeze=False)[0]
-        falls = any(point.falls for one in searches for point in one.points)
-        _scale(panels[0], *_limits(searches), strip=falls)
+        falls = any(point.falls for one in (*searches, *among) for point in one.points)
+        _scale(panels[0], *_limits([*searches, *among]), strip=falls)
         for axes, one in zip(panels, searches, strict=True):
             _draw(axes, one)
             axes.tick_params(labelleft=True)
@@ -166,7 +170,7 @@ def _draw(axes: Axes, one: Search) -> None:
     ends += [(simulated[-1][1], "best in\nsimulation", SIMULATION)] if simulated else []
     ends += [(standing[-1].real, "the same\nin real", REAL)] if standing and standing[-1].generation > 0 else []
     ends += [(one.confirmed.real, "chosen,\nmeasured again", INK)] if one.confirmed else []
-    label_ends(axes, axes.get_xlim()[1], ends, gap=0.12)
+    label_ends(axes, axes.get_xlim()[1], ends, gap=0.12 * HEIGHT / axes.figure.get_figheight())
 
 
 def _draw_standing(axes: Axes, standing: Sequence[Point]) -> None:
