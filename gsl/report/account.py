@@ -134,11 +134,16 @@ def _problems(folder: Path) -> str:
 
 def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     document = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
+    return Told("policies in the real world", *evaluation_table(document, unit), describe_choice(metrics, unit))
+
+
+def evaluation_table(document: Mapping[str, Any], unit: Unit) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return titles and rows of what evaluation.json holds."""
     phases = {"policies": "", "check": ", checked", "confirmation": ", fresh"}
     found = [(one, f"{one['name']}{purpose}") for phase, purpose in phases.items() for one in document[phase]]
     told = list(dict.fromkeys(name for one, _ in found for name in one["outcome"]))
     rows = [tuple(cells(one | {"interval": _bounds(one["interval"])}, name, unit, told)) for one, name in found]
-    return Told("policies in the real world", tuple(columns(told, unit)), rows, describe_choice(metrics, unit))
+    return tuple(columns(told, unit)), rows
 
 
 def _bounds(interval: list[float | None]) -> list[float]:

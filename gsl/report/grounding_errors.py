@@ -26,9 +26,7 @@ def grounding_errors(path: Path, groups: Mapping[str, Errors], *, title: str | N
     save(grounding_errors_figure(groups, title=title), path)
 
 
-def grounding_errors_figure(
-    groups: Mapping[str, Errors], *, title: str | None = None, width: float = WIDTH
-) -> Figure:
+def grounding_errors_figure(groups: Mapping[str, Errors], *, title: str | None = None, width: float = WIDTH) -> Figure:
     """Return the figure of the errors.
 
     Args:

@@ -187,7 +187,8 @@ class Rounds:
         bounds = f"{unit.shown(gain['value'], sign=True)} (95 % {unit.interval(gain['interval'], sign=True)})"
         last = "the gain" if figures["returned_iteration"] == 1 else "the last iteration's gain"
         significant = f"{last} of {bounds} is {'' if sure else 'not '}significant"
-        sentence = f"The returned policy reaches {reached} on the real side, π0 {unit.bare(before['value'])}: {significant}."
+        start = unit.bare(before["value"])
+        sentence = f"The returned policy reaches {reached} on the real side, π0 {start}: {significant}."
         return Answer(question, sentence, sure=sure, more=[self.verdict])
 
     @property

@@ -15,7 +15,7 @@ from gsl.report.grounding_errors import finding, grounding_errors_figure
 from gsl.report.iteration import Rounds
 from gsl.report.joint_trace import Traces
 from gsl.report.parts import Part, bullets, element, prose, section, table
-from gsl.report.run_page import Answer, budget, curves, footfalls, joints, parameters, write_page
+from gsl.report.run_page import Change, budget, curves, footfalls, joints, parameters, write_page
 from gsl.report.svg import WIDTH, svg
 
 _GROUPS = {"pi0": "of π0", "off_pi0": "off π0"}
@@ -33,15 +33,6 @@ class Seen(NamedTuple):
     traces: Mapping[str, Traces] = {}
     walks: Sequence[Walk] = ()
     caption: str = ""
-
-
-class Change(NamedTuple):
-    """A policy's parameters before and after, with their names and the size of a bold step, of equal length."""
-
-    names: Sequence[str]
-    before: Sequence[float]
-    after: Sequence[float]
-    scale: Sequence[float]
 
 
 def write_iteration_page(
@@ -67,7 +58,7 @@ def write_iteration_page(
         grounding(check, rounds.diagnosis),
         joints(seen.traces, seen.caption),
         footfalls(seen.walks),
-        parameters(*change),
+        parameters(change),
         budget(rounds.budget),
     ]
     write_page(folder, rounds.answer, sections)

@@ -8,7 +8,19 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gsl.report.style import COMMAND, GROUNDED, HEIGHT, NARROW, REAL, SIMULATION, WIDTH, figure, headline, label_ends, look, save
+from gsl.report.style import (
+    COMMAND,
+    GROUNDED,
+    REAL,
+    SIMULATION,
+    WIDTH,
+    curve_figure,
+    headline,
+    label_ends,
+    label_gap,
+    look,
+    save,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,7 +74,7 @@ def joint_trace_figure(
     if traces.sent is not None:
         lines.append(("grounded command", traces.sent, GROUNDED, 1.1, (0, (5, 3))))
     with look():
-        whole = figure(HEIGHT if width == WIDTH else NARROW * width, width)
+        whole = curve_figure(width)
         axes = whole.subplots()
         for label, angle, colour, width, style in lines:
             axes.plot(traces.time, np.degrees(angle), linestyle=style, color=colour, linewidth=width, label=label)
@@ -71,7 +83,7 @@ def joint_trace_figure(
         axes.set_xlabel("time [s]")
         axes.set_ylabel(f"{joint} [°]")
         ends = [(math.degrees(angle[-1]), label, colour) for label, angle, colour, _, _ in lines]
-        label_ends(axes, float(traces.time[-1]), ends, gap=0.13 * HEIGHT / whole.get_figheight())
+        label_ends(axes, float(traces.time[-1]), ends, gap=label_gap(0.13, whole))
         headline(whole, _finding(joint, distances) if title is None else title)
     return whole
 

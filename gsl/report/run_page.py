@@ -37,6 +37,15 @@ class Answer(NamedTuple):
     more: Sequence[str] = ()
 
 
+class Change(NamedTuple):
+    """A policy's parameters before and after, with their names and the size of a bold step, of equal length."""
+
+    names: Sequence[str]
+    before: Sequence[float]
+    after: Sequence[float]
+    scale: Sequence[float]
+
+
 def write_page(folder: Path, answer: Answer, sections: Sequence[Part]) -> None:
     """Write the page of a run: the sections, and how it came about."""
     kind = "good" if answer.sure else "doubt"
@@ -57,7 +66,8 @@ def describe_origin(how: Origin | None) -> list[Part]:
     """Return the sections with lineage, settings and command; none where no stage is at work."""
     if how is None:
         return []
-    rows = [(role, one.path, one.hash[:SHORT]) for role, one in _of(how)]
+    rows = [(f"made from {one.role}", one.path, one.hash[:SHORT]) for one in how.parents]
+    rows += [(f"built {one.role}", one.path, one.hash[:SHORT]) for one in how.links]
     typed = not how.command.endswith(")") or how.command.startswith("gsl.")
     again = command(how.command) if typed else element("p", f"A part of {how.command.partition(' (')[0]}.")
     settings = folded("all settings", element("pre", element("code", how.settings)))
@@ -69,10 +79,6 @@ def describe_origin(how: Origin | None) -> list[Part]:
         ),
         section("How to repeat it", again, settings),
     ]
-
-
-def _of(how: Origin) -> list[tuple[str, object]]:
-    return [(f"made from {one.role}", one) for one in how.parents] + [(f"built {one.role}", one) for one in how.links]
 
 
 def curves(searches: Sequence[Search], unit: str) -> Markup | None:
@@ -103,19 +109,11 @@ def footfalls(walks: Sequence[Walk]) -> Markup | None:
     return section("Footfalls", drawn, note="A bar is the time in which a foot bears load.")
 
 
-def parameters(
-    names: Sequence[str], before: Sequence[float], after: Sequence[float], scale: Sequence[float]
-) -> Markup | None:
-    """Return the section with a policy's parameters before and after.
-
-    Args:
-        names: Of the parameters.
-        before: Of π0.
-        after: Of the policy that is returned.
-        scale: Size of a bold step in each.
-    """
+def parameters(change: Change) -> Markup | None:
+    """Return the section with a policy's parameters before and after."""
+    names, before, after, scale = change
     changes = [(b - a) / s if s else 0.0 for a, b, s in zip(before, after, scale, strict=True)]
-    order = range(len(names))
+    order = list(range(len(names)))
     if len(names) > PARAMETERS:
         order = sorted(sorted(order, key=lambda k: -abs(changes[k]))[:PARAMETERS])
     rows = [(names[k], f"{before[k]:.4g}", f"{after[k]:.4g}", f"{changes[k]:+.2f}") for k in order]

@@ -19,7 +19,8 @@ COMMAND, QUIET, INK = "#8c8c8c", "#d0d0d0", "#222222"
 SERVO = "#cc79a7"
 UNINFORMED, GAT, SGAT, EFFECTS = COMMAND, SIMULATION, GROUNDED, REAL  # the first know nothing of the real robot
 WIDTH, DPI = 10.0, 160  # [in], [1/in]: 1600 pixels
-HEIGHT, NARROW = 4.6, 0.62  # of curves [in], and of those on a page in shares of their width
+CURVES = 4.6  # height of a figure of curves [in]
+NARROW = 0.62  # height of one that is narrower, in shares of its width
 EDGE, TICK, PAPER = "#777777", "#555555", "#ffffff"
 OTHER = ("#222222", "#cc79a7", "#56b4e9", "#e69f00")  # of things without a colour of their own, Okabe and Ito 2008
 
@@ -78,6 +79,16 @@ def figure(height: float, width: float = WIDTH) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+
+
+def curve_figure(width: float = WIDTH) -> Figure:
+    """Return an empty figure for curves [in]."""
+    return figure(CURVES if width == WIDTH else NARROW * width, width)
+
+
+def label_gap(gap: float, figure: Figure) -> float:
+    """Return the least distance of labels in shares of a figure's height, of `gap` in shares of `CURVES`."""
+    return gap * CURVES / figure.get_figheight()
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
@@ -31,7 +31,7 @@ def svg(figure: Figure, title: str) -> Markup:
     import matplotlib
 
     drawn = io.StringIO()
-    settings = {"svg.fonttype": "none", "svg.hashsalt": title, "path.simplify_threshold": 0.2}
+    settings: Any = {"svg.fonttype": "none", "svg.hashsalt": title, "path.simplify_threshold": 0.2}
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     with look(), matplotlib.rc_context(settings), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")  # the reader's own font has it

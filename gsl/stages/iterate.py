@@ -22,7 +22,8 @@ from gsl.models.config import ModelConfig
 from gsl.optimizers.objective import Objective, Quantile, check_objective
 from gsl.policies.policy import size
 from gsl.report.iteration import Rounds, write_curve, write_table
-from gsl.report.iteration_page import Change, Seen, read_check, write_iteration_page
+from gsl.report.iteration_page import Seen, read_check, write_iteration_page
+from gsl.report.run_page import Change
 from gsl.rollout.parallel import Workers
 from gsl.rollout.rollout import Scenario
 from gsl.stages.chain import Budget

@@ -168,8 +168,10 @@ class _Work(NamedTuple):
     @property
     def links(self) -> tuple[Parent, ...]:
         """What it has built, as its manifest has it."""
-        found = self.built.items()
-        return tuple(Parent(one.manifest.kind, _relative(path, self.folder), one.manifest.contents) for path, one in found)
+        return tuple(
+            Parent(one.manifest.kind, _relative(path, self.folder), one.manifest.contents)
+            for path, one in self.built.items()
+        )
 
 
 _at_work: ContextVar[_Work | None] = ContextVar("at_work", default=None)

@@ -79,7 +79,9 @@ def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory, retu
         for name, parameters in (("π0", scenario.policy.initial), ("the returned policy", returned))
     ]
     walks = [read_footfalls("a held-out walk on the real side", walk), *simulated]
-    caption = "A real walk that nothing was learned from; both simulators start in one of its states and play its actions."
+    caption = (
+        "A real walk that nothing was learned from; both simulators start in one of its states and play its actions."
+    )
     return Seen(traces, [one for one in walks if one], caption)
 
 
@@ -122,7 +124,9 @@ def _walk(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:
 def read_footfalls(label: str, walk: Trajectory) -> Walk | None:
     """Return when each foot bears load, None where that is not known."""
     prefix = "foot_force."
-    feet = {name.removeprefix(prefix): force > LOADED for name, force in walk.sensors.items() if name.startswith(prefix)}
+    feet = {
+        name.removeprefix(prefix): force > LOADED for name, force in walk.sensors.items() if name.startswith(prefix)
+    }
     fell = float(walk.time[-1]) if walk.ended_in_a_fall else None
     return Walk(label, walk.time, feet, fell) if feet else None
 
