@@ -22,7 +22,7 @@ WIDTH, DPI = 10.0, 160  # [in], [1/in]: 1600 pixels
 CURVES = 4.6  # height of a figure of curves [in]
 NARROW = 0.62  # height of one that is narrower, in shares of its width
 EDGE, TICK, PAPER = "#777777", "#555555", "#ffffff"
-OTHER = ("#222222", "#cc79a7", "#56b4e9", "#e69f00")  # of things without a colour of their own, Okabe and Ito 2008
+HUES = ("#222222", "#cc79a7", "#56b4e9", "#e69f00")  # of things without a colour of their own, Okabe and Ito 2008
 
 ROLES = {
     REAL: "real", SIMULATION: "before", GROUNDED: "after", COMMAND: "command", QUIET: "quiet", INK: "ink",
