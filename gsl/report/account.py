@@ -15,6 +15,7 @@ from gsl.models.free_run import TICKS
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.evaluation_cells import cells, columns
 from gsl.report.headline import unit_of
+from gsl.report.markdown import read_table
 from gsl.storage.artifact import METRICS, Artifact
 from gsl.storage.diagnosis_report import report_of
 from gsl.storage.hashing import CIRCUMSTANCES
@@ -198,9 +199,7 @@ def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 def _markdown(path: Path) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return the titles and rows of the first table of a file."""
     below_title = itertools.dropwhile(lambda line: line[:1] != "|", path.read_text(encoding="utf-8").splitlines())
-    lines = itertools.takewhile(lambda line: line.startswith("|"), below_title)
-    titles, _, *rows = (tuple(cell.strip() for cell in line[1:-1].split("|")) for line in lines)
-    return titles, rows
+    return read_table(list(itertools.takewhile(lambda line: line.startswith("|"), below_title)))
 
 
 def _plain(artifact: Artifact) -> Told:

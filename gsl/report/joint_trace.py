@@ -47,9 +47,9 @@ class Traces(NamedTuple):
     name: str = "grounded simulation"
 
 
-def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = None, rest: int = 0) -> None:
-    """Write the figure of one joint as a PNG file; arguments as those of `joint_trace_figure`."""
-    save(joint_trace_figure(traces, joint, title=title, rest=rest), path)
+def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = None, rest: int = 0) -> Figure:
+    """Write the figure of one joint as a PNG file and return it; arguments as those of `joint_trace_figure`."""
+    return save(joint_trace_figure(traces, joint, title=title, rest=rest), path)
 
 
 def joint_trace_figure(

@@ -27,7 +27,8 @@ def page(template: str, sections: Sequence[Part], **values: object) -> str:
     script = _source(_SCRIPT) if any("data-choice" in one for one in present) else ""
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     style = render("style.css", light=_declare(LIGHT), dark=_declare(DARK))
-    return render(template, sections=present, style=style, script=Markup(script), script_hash=digest, **values) + "\n"
+    text = render(template, sections=present, style=style, script=Markup(script), script_hash=digest, **values)
+    return f"{text}\n"
 
 
 @functools.cache

@@ -91,10 +91,11 @@ def label_gap(gap: float, figure: Figure) -> float:
     return gap * CURVES / figure.get_figheight()
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure as a PNG file without a date in it: equal figures give equal bytes."""
+def save(figure: Figure, path: Path) -> Figure:
+    """Write a figure as a PNG file without a date in it, and return it: equal figures give equal bytes."""
     with look():
         figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    return figure
 
 
 def headline(figure: Figure, text: str) -> None:
