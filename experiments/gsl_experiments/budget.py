@@ -15,15 +15,18 @@ from gsl.core.interfaces import REAL, SIM, Grounding
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval
+from gsl.core.unit import Unit
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.models.free_run import TICKS
 from gsl.report.markdown import table
+from gsl.report.study_page import write_study_page
 from gsl.rollout.rollout import Scenario
 from gsl.stages.iterate import Iterate, check_trainable
 from gsl.training.data import FEWEST, degrees
 from gsl.validation.replay import replay_starts
+from gsl_experiments.answer import answer_difference
 from gsl_experiments.budget_curve import Line, budget_curve
 from gsl_experiments.compare import Compare
 from gsl_experiments.comparison_table import bounds, finely, told_difference
@@ -194,7 +197,13 @@ class Budget:
         (folder / TABLE).write_text(f"{table(titles, rows)}\n{PAIRED}\n\n{below}", encoding="utf-8")
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
         bases = dict(zip(panels, (without.mean, plain.mean), strict=True))
-        budget_curve(folder / FIGURE, panels, bases, "What a grounding makes of more real data, with 95 % intervals")
+        title = "What a grounding makes of more real data, with 95 % intervals"
+        picture = budget_curve(folder / FIGURE, panels, bases, title)
+        last = [one.value for one in points if (one.method, one.trajectories) == (method, self.budgets[-1])]
+        apart = mean_interval(np.subtract(last, [one.value for one in points if one.method == NONE]))
+        what = f"With {self.budgets[-1]} real trajectories, {method} minus none"
+        answer = answer_difference("How much real data does a grounding need?", what, apart, Unit.of(self.iterate.task))
+        write_study_page(folder, answer, [TABLE], [picture])
 
 
 def _cells(found: Interval, *, fine: bool = False) -> tuple[str, str]:

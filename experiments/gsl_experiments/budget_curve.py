@@ -23,9 +23,11 @@ class Line(NamedTuple):
     found: Sequence[Interval]
 
 
-def budget_curve(path: Path, panels: Mapping[str, Mapping[str, Line]], bases: Mapping[str, float], title: str) -> None:
-    """Write the figure as a PNG file; arguments as those of `budget_curve_figure`."""
-    save(budget_curve_figure(panels, bases, title), path)
+def budget_curve(
+    path: Path, panels: Mapping[str, Mapping[str, Line]], bases: Mapping[str, float], title: str
+) -> Figure:
+    """Write the figure as a PNG file and return it; arguments as those of `budget_curve_figure`."""
+    return save(budget_curve_figure(panels, bases, title), path)
 
 
 def budget_curve_figure(panels: Mapping[str, Mapping[str, Line]], bases: Mapping[str, float], title: str) -> Figure:

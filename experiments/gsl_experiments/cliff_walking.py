@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -14,15 +14,21 @@ from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import Interval, mean_interval
 from gsl.core.table import Table
+from gsl.core.unit import Unit
 from gsl.core.words import several
 from gsl.grounding.states import TableTransformation
 from gsl.models.counts import Counts
 from gsl.report.markdown import table as markdown
+from gsl.report.study_page import write_study_page
 from gsl.storage.documents import write_json
 from gsl.worlds.gymnasium import GymnasiumWorld
+from gsl_experiments.answer import answer_difference
 from gsl_experiments.noise_curve import Curve, noise_curve
 from gsl_experiments.sizes import PresetName, check_rising, sizes_of
 from gsl_experiments.table_episodes import played
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "figure_11.png"
 DOWN = 2  # π0's action everywhere: of equally good paths in the simulator it leaves the one along the edge
@@ -94,7 +100,14 @@ class Figure11:
         bounds = {noise: self._bounds(start, noise) for noise in self.noises}
         sizes = f"{sizes_of(self.preset_name)} {several(self.trials, 'trial')}."
         (folder / TABLE).write_text(f"{_table(points, bounds)}\n{sizes}\n", encoding="utf-8")
-        _draw(folder / FIGURE, points, bounds)
+        picture = _draw(folder / FIGURE, points, bounds)
+        noise = self.noises[-1]
+        each = {method: [one.value for one in _of(points, method, noise)] for method in METHODS}
+        apart = mean_interval(np.subtract(each["sgat"], each["gat"]))
+        question = "Does a stochastic grounding return more than a deterministic one as the real world gets noisier?"
+        what = f"At noise {noise:g}, sgat minus gat"
+        answer = answer_difference(question, what, apart, Unit(name="of return"))
+        write_study_page(folder, answer, [TABLE], [picture])
         return {"points": len(points), "noises": len(self.noises)}
 
     def _real(self, noise: float) -> Table:
@@ -158,11 +171,11 @@ def _told(one: Interval) -> str:
     return f"{one.mean:.2f} ({one.lower:.2f} to {one.upper:.2f})" if np.isfinite(one.upper) else f"{one.mean:.2f}"
 
 
-def _draw(path: Path, points: Sequence[Point], bounds: Mapping[float, tuple[float, float]]) -> None:
+def _draw(path: Path, points: Sequence[Point], bounds: Mapping[float, tuple[float, float]]) -> Figure:
     noises = list(bounds)
     curves = {
         method: Curve(noises, [mean_interval([one.value for one in _of(points, method, noise)]) for noise in noises])
         for method in METHODS
     }
     exact = {"real optimum": [best for _, best in bounds.values()], "edge path": [edge for edge, _ in bounds.values()]}
-    noise_curve(path, curves, exact, title="Cliff Walking: return in the real world")
+    return noise_curve(path, curves, exact, title="Cliff Walking: return in the real world")

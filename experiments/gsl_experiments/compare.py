@@ -17,6 +17,7 @@ from gsl.core.unit import Unit
 from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, evidence_of, is_learned
+from gsl.report.study_page import write_study_page
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.diagnosis_plan import flown
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
@@ -24,11 +25,14 @@ from gsl.stages.values import rank
 from gsl.storage.artifact import Artifact
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.gymnasium import try_out
+from gsl_experiments.answer import answer_comparison
 from gsl_experiments.comparison import Summary, summaries
 from gsl_experiments.comparison_table import markdown
 from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
+from gsl_experiments.paper_cells import worth
 from gsl_experiments.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl_experiments.trial import Cell, Trial
+from gsl_experiments.trials_picture import trials_figure
 from gsl_experiments.tried import foretelling, read_tried
 
 TABLE, DATA = "table.md", "trials.json"
@@ -76,7 +80,15 @@ class Compare:
         text = "\n".join(filter(None, (markdown(summary, found, Unit.of(self.iterate.task)), foretelling(found))))
         sizes = f"{sizes_of(self.preset_name)} {trials_of(self.first, self.trials)}."
         (folder / TABLE).write_text(f"{text}\n{sizes} {made}\n", encoding="utf-8")
+        task = self.iterate.task
+        picture = trials_figure(found, self.methods, worth(found, task), tolerant=self.tolerant)
+        write_study_page(folder, answer_comparison(summary, found, Unit.of(task)), [TABLE], [picture])
         return self.metrics(summary)
+
+    @property
+    def tolerant(self) -> bool:
+        """Whether a policy may fall and be stable."""
+        return self.iterate.budget.tolerated > 0.0
 
     def metrics(self, summary: Sequence[Summary]) -> dict[str, Any]:
         """Return the summaries, and the line that `gsl runs` shows."""

@@ -29,9 +29,9 @@ class Shares(NamedTuple):
 
 def move_and_yield(
     path: Path, moving: Mapping[str, Mapping[str, Dots]], yielding: Mapping[str, Mapping[str, Shares]], *, group: str
-) -> None:
-    """Write the figure as a PNG file; arguments as those of `move_and_yield_figure`."""
-    save(move_and_yield_figure(moving, yielding, group=group), path)
+) -> Figure:
+    """Write the figure as a PNG file and return it; arguments as those of `move_and_yield_figure`."""
+    return save(move_and_yield_figure(moving, yielding, group=group), path)
 
 
 def move_and_yield_figure(

@@ -9,7 +9,7 @@ from dataclasses import field, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from gsl.core.interfaces import REAL, SIM, Grounding, Search, World
 from gsl.core.layout import check_alike
@@ -23,6 +23,7 @@ from gsl.grounding.none import NoGrounding
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.policy import size
 from gsl.report.console import Console
+from gsl.report.study_page import write_study_page
 from gsl.rollout.parallel import Workers, arriving
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
@@ -33,6 +34,9 @@ from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl_experiments.noise_bars import Bars, noise_bars
 from gsl_experiments.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl_experiments.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "figure.png"
 
@@ -123,9 +127,9 @@ class NoiseStudy:
         (folder / TABLE).write_text(
             f"{table.told(*self._below)}\n{sizes_of(self.preset_name)} {made}\n", encoding="utf-8"
         )
-        self._draw(folder / FIGURE, table)
+        write_study_page(folder, table.answer, [TABLE], [self._draw(folder / FIGURE, table)])
 
-    def _draw(self, path: Path, table: NoiseTable) -> None:
+    def _draw(self, path: Path, table: NoiseTable) -> Figure:
         """Draw the returns against the noise, or against the rounds if there are several of these and one noise."""
         environments = {world.env_id for world in self.worlds.values()}
         alike = len(environments) == 1
@@ -142,7 +146,7 @@ class NoiseStudy:
             panels[f"{of}{world.replace('_', ' ')}"] = Bars(ticks, table.means(where))
         hatched = "without real data" if self.choice == SIM else "no model of real"
         title = f"Return in real, mean ± standard error ({trials_of(self.first, self.trials)}); hatched: {hatched}"
-        noise_bars(path, panels, REFERENCE, title=title, along=along, alike=alike)
+        return noise_bars(path, panels, REFERENCE, title=title, along=along, alike=alike)
 
     @property
     def _shown(self) -> dict[str, str]:

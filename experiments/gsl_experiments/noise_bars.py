@@ -28,9 +28,9 @@ class Bars(NamedTuple):
 
 def noise_bars(
     path: Path, panels: Mapping[str, Bars], reference: str, *, title: str, along: str, alike: bool = False
-) -> None:
-    """Write the figure as a PNG file; arguments as those of `noise_bars_figure`."""
-    save(noise_bars_figure(panels, reference, title=title, along=along, alike=alike), path)
+) -> Figure:
+    """Write the figure as a PNG file and return it; arguments as those of `noise_bars_figure`."""
+    return save(noise_bars_figure(panels, reference, title=title, along=along, alike=alike), path)
 
 
 def noise_bars_figure(

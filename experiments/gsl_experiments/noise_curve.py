@@ -22,9 +22,9 @@ class Curve(NamedTuple):
     found: Sequence[Interval]
 
 
-def noise_curve(path: Path, curves: Mapping[str, Curve], exact: Mapping[str, Sequence[float]], *, title: str) -> None:
-    """Write the figure as a PNG file; arguments as those of `noise_curve_figure`."""
-    save(noise_curve_figure(curves, exact, title), path)
+def noise_curve(path: Path, curves: Mapping[str, Curve], exact: Mapping[str, Sequence[float]], *, title: str) -> Figure:
+    """Write the figure as a PNG file and return it; arguments as those of `noise_curve_figure`."""
+    return save(noise_curve_figure(curves, exact, title), path)
 
 
 def noise_curve_figure(curves: Mapping[str, Curve], exact: Mapping[str, Sequence[float]], title: str) -> Figure:

@@ -9,7 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.statistics import mean_interval
+from gsl.core.unit import Unit
 from gsl.report.markdown import table as markdown
+from gsl.report.run_page import Answer
+from gsl_experiments.answer import CHOSEN, answer_difference
 
 REFERENCE, BOTH = "trained on real", {"gat", "sgat"}
 
@@ -103,6 +106,22 @@ class NoiseTable:
         titles = self._titled(*self.shown.values(), "sgat - gat (95 %)", "real steps")
         titles += ["real steps of the choice"] if self.chosen else []
         return "\n".join([markdown(titles, rows), *below, "", *self._differences(), *self._promises()])
+
+    @property
+    def answer(self) -> Answer:
+        """How much more the best learned grounding returns than none, where the noise is largest and the round last."""
+        place = max(self.places, key=lambda one: (one.noise, one.round))
+        question = "Does a learned grounding return more on the real side than none?"
+        values = {method: _values(self.points, place, method) for method in self.methods}
+        best = max(self.learned, key=lambda name: np.mean(values[name]), default=None)
+        where = f"In {place.world} at noise {place.noise:g}"
+        if best is None or "none" not in values:
+            told = (f"{self.shown[name]} {np.mean(found):.0f}" for name, found in values.items())
+            return Answer(question, f"{where}, methods return {', '.join(told)}.", sure=False)
+        apart = mean_interval(np.subtract(values[best], values["none"]))
+        return answer_difference(
+            question, f"{where}, {self.shown[best]} minus none", apart, Unit(name="of return"), CHOSEN
+        )
 
     def _promises(self) -> list[str]:
         """Return the lines of a table of what policies were worth where they were learned, and in real."""

@@ -19,6 +19,7 @@ from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.servo import LearnedServo
 from gsl.models.free_run import TICKS
+from gsl.report.study_page import write_study_page
 from gsl.rollout.rollout import Scenario
 from gsl.stages.iterate import Iterate, check_trainable
 from gsl.training.data import degrees, of_policy
@@ -160,4 +161,4 @@ class Replays:
         foretold = predictors(rows, searched(gains), self.iterate.seed)
         parts = filter(None, (shown.table(), MEASURED, *shown.about(), sizes, foretold, made))
         (folder / TABLE).write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")
-        shown.draw(folder / FIGURE)
+        write_study_page(folder, shown.answer, [TABLE], [shown.draw(folder / FIGURE)])

@@ -6,16 +6,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gsl.core.statistics import mean_interval
+from gsl.core.unit import Unit
 from gsl.report.markdown import table
+from gsl.report.run_page import Answer
+from gsl_experiments.answer import CHOSEN, answer_difference
 from gsl_experiments.comparison_table import finely, told_difference
 from gsl_experiments.gain_predictors import STANDS
 from gsl_experiments.move_and_yield import Shares, move_and_yield
 from gsl_experiments.replay import Replay
 from gsl_experiments.trial_dots import Dots, trial_dots
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TABLE, FIGURE = "table.md", "replays.png"
 TITLES = (
@@ -57,12 +64,25 @@ class Shown:
         titles += [f"{name}, {group} (joint by joint)" for name, group in yielding]
         return table(titles, [self._line(first, *cell, yielding) for cell in product(self.worlds, self.colours)])
 
+    @property
+    def answer(self) -> Answer:
+        """How much farther from the real joints the best method is than the first, in the first world."""
+        world, (first, *others) = self.worlds[0], list(self.colours)
+        far = {name: [row.joints for row in self._own(world, name)] for name in self.colours}
+        question = "Which grounding makes the simulator's joints move as the real robot's?"
+        best = min(others, key=lambda name: np.mean(far[name]), default=first)
+        if best == first:
+            return Answer(question, f"{first} is {np.mean(far[first]):.2f}° off in {world}.", sure=False)
+        apart = mean_interval(np.subtract(far[best], far[first]))
+        what = f"In {world}, distance of the joints after 0.2 s, {best} minus {first}"
+        return answer_difference(question, what, apart, Unit(name="°"), CHOSEN)
+
     def about(self) -> list[str]:
         """Return what has to be said of the table."""
         return [ABOUT] if self._measured else []
 
-    def draw(self, path: Path) -> None:
-        """Write the figure; two panels a world where compliance was measured."""
+    def draw(self, path: Path) -> Figure:
+        """Write the figure and return it; two panels a world where compliance was measured."""
         moving = {
             world: {
                 method: Dots(joints := [row.joints for row in self._own(world, method)], [False] * len(joints), colour)
@@ -72,13 +92,12 @@ class Shown:
         }
         group = STANDS if STANDS in self._measured else next(iter(self._measured), "")
         if not group:
-            trial_dots(path, moving, axis=TITLES[2], title="How far simulators are from real joints, each trial")
-            return
+            return trial_dots(path, moving, axis=TITLES[2], title="How far simulators are from real joints, each trial")
         yielding = {
             world: {method: Shares(*self._shares(world, method, group)) for method in self.colours}
             for world in self.worlds
         }
-        move_and_yield(path, moving, yielding, group=group)
+        return move_and_yield(path, moving, yielding, group=group)
 
     @property
     def _measured(self) -> dict[str, None]:

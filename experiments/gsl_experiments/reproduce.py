@@ -10,15 +10,18 @@ from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 from gsl.core.console import Console
 from gsl.core.interfaces import Search, Task
 from gsl.core.setting import component, setting
+from gsl.core.unit import Unit
 from gsl.errors import ConfigError
+from gsl.report.study_page import write_study_page
+from gsl.report.style import save
+from gsl_experiments.answer import answer_comparison
 from gsl_experiments.compare import TABLE, Compare
 from gsl_experiments.comparison import summaries
 from gsl_experiments.effort import check_search, seconds
-from gsl_experiments.method_colour import method_colour
 from gsl_experiments.paper_cells import Drawn, one_by_one
 from gsl_experiments.sizes import sizes_of, trials_of
 from gsl_experiments.trial import Trial
-from gsl_experiments.trial_dots import Dots, trial_dots
+from gsl_experiments.trials_picture import trials_figure
 from gsl_experiments.tried import foretelling
 
 FIGURE, TRIALS = "trials.png", "trials.md"
@@ -64,8 +67,11 @@ class Reproduce(Compare):
         parts = [*told, f"{sizes_of(self.preset_name)} {_sizes(self)}\n", made]
         (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
         (folder / TRIALS).write_text(one_by_one(trials, task), encoding="utf-8")
-        _draw(folder / FIGURE, trials, self, self.table.drawn(trials, task))
-        return self.metrics(summaries(trials))
+        picture = trials_figure(trials, self.methods, self.table.drawn(trials, task), tolerant=self.tolerant)
+        summary = summaries(trials)
+        answer = answer_comparison(summary, trials, Unit.of(task))
+        write_study_page(folder, answer, [TABLE, TRIALS], [save(picture, folder / FIGURE)])
+        return self.metrics(summary)
 
 
 def _named(table: PaperTable) -> set[str]:
@@ -84,18 +90,3 @@ def _sizes(study: Compare) -> str:
     measured = f"{budget.episodes} for the choice, {budget.check} for the check, {budget.confirmation} for the report"
     trials = trials_of(study.first, study.trials)
     return f"{trials}. A search: {searched}. {budget.learned.capitalize()}. Real episodes: {measured}."
-
-
-def _draw(path: Path, trials: Sequence[Trial], study: Compare, drawn: Drawn) -> None:
-    """Draw every trial, hollow where it failed, a panel each pair of worlds."""
-    panels: dict[str, dict[str, Dots]] = {}
-    further, tolerant = any(trial.iteration > 1 for trial in trials), study.iterate.budget.tolerated > 0.0
-    failures = drawn.failed or [trial.surely <= 0.0 if tolerant else trial.without for trial in trials]
-    for cell in dict.fromkeys(trial.cell for trial in trials):
-        every = zip(trials, drawn.values, failures, strict=True)
-        shown, failed = zip(*((value, one) for trial, value, one in every if trial.cell == cell), strict=True)
-        panel = f"{cell.simulator} as simulator, {cell.world} in real" if cell.simulator else cell.world
-        name = f"{cell.method}, iteration {cell.iteration}" if further else cell.method
-        panels.setdefault(panel, {})[name] = Dots(shown, failed, method_colour(study.methods[cell.method]))
-    missed = drawn.missed or f"no {'sure' if tolerant else 'stable'} improvement{' by the iteration' * further}"
-    trial_dots(path, panels, axis=drawn.axis, title=f"Every trial (hollow: {missed}), mean and 95 % interval")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from gsl.grounding.none import NoGrounding
 from gsl.models.ensemble import Forward
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.markdown import table
+from gsl.report.run_page import Answer
+from gsl.report.study_page import write_study_page
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.stages.chain_training import train_transformation
 from gsl.stages.iterate import Iterate, check_trainable
@@ -33,6 +35,9 @@ from gsl.worlds.grounded import GroundedEnv
 from gsl_experiments.duration import duration_told
 from gsl_experiments.effort import seconds_of_models
 from gsl_experiments.sizes import PresetName, sizes_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TABLE = "table.md"
 TITLES = ("joint", "simulator", "RMS distance from real [°]")
@@ -76,8 +81,8 @@ class Figure6:
         moved = slice(PAST, None)  # before, all of them rest
         found = {"ungrounded": bare[moved], "grounded": grounded[moved]}
         traces = Traces(time, command, real, bare, grounded, sent)
-        joint_trace(folder / "figure_6.png", traces, self.joint, rest=PAST)
-        return _told(folder, self, real[moved], found)
+        picture = joint_trace(folder / "figure_6.png", traces, self.joint, rest=PAST)
+        return _told(folder, self, real[moved], found, [picture])
 
 
 @component
@@ -125,12 +130,12 @@ class Figure7:
         plain = Traces(walk.time[shown], walk.action[tick : tick + ticks, index], walk.position[shown, index], bare)
         far = [f"{degrees(trace - plain.real):.1f}°" for trace in (predicted, bare)]
         title = f"{self.joint}: as f predicts it {far[0]} from the real robot, in simulation {far[1]} (RMS)"
-        joint_trace(
+        first = joint_trace(
             folder / "figure_7a.png", plain._replace(grounded=predicted, name="forward model"), self.joint, title=title
         )
-        joint_trace(folder / "figure_7b.png", plain._replace(grounded=grounded), self.joint)
+        second = joint_trace(folder / "figure_7b.png", plain._replace(grounded=grounded), self.joint)
         found = {"ungrounded": bare, "forward model": predicted, "grounded": grounded}
-        return _told(folder, self, plain.real, found)
+        return _told(folder, self, plain.real, found, [first, second])
 
 
 def trained(iterate: Iterate, home: Path, console: Console) -> LoadedTransformation:
@@ -187,7 +192,11 @@ def _predicted(forward: Forward, walk: Trajectory, tick: int, ticks: int) -> np.
 
 
 def _told(
-    folder: Path, figure: Figure6 | Figure7, real: np.ndarray, found: Mapping[str, np.ndarray]
+    folder: Path,
+    figure: Figure6 | Figure7,
+    real: np.ndarray,
+    found: Mapping[str, np.ndarray],
+    pictures: Sequence[Figure],
 ) -> Mapping[str, Any]:
     errors = {name: degrees(trace - real) for name, trace in found.items()}
     rows = [(figure.joint, name, f"{error:.2f}") for name, error in errors.items()]
@@ -195,4 +204,8 @@ def _told(
     learned = f"The grounding learned from {own} real episodes of π0 and {neighbours} around it."
     below = f"{sizes_of(figure.preset_name)} {learned}"
     (folder / TABLE).write_text(f"{table(TITLES, rows)}\n{below}\n", encoding="utf-8")
+    far = f"{errors['grounded']:.1f}° from the real robot with grounding, {errors['ungrounded']:.1f}° without"
+    sentence = f"{figure.joint} is {far} (RMS of one motion, which has no interval)."
+    answer = Answer("Does the grounded simulator move as the real robot does?", sentence, sure=False)
+    write_study_page(folder, answer, [TABLE], pictures)
     return {"joint": figure.joint, "distance_deg": errors}

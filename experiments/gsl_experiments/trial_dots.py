@@ -27,9 +27,9 @@ class Dots(NamedTuple):
     colour: str = INK
 
 
-def trial_dots(path: Path, panels: Mapping[str, Mapping[str, Dots]], *, axis: str, title: str) -> None:
-    """Write the figure as a PNG file; arguments as those of `trial_dots_figure`."""
-    save(trial_dots_figure(panels, axis=axis, title=title), path)
+def trial_dots(path: Path, panels: Mapping[str, Mapping[str, Dots]], *, axis: str, title: str) -> Figure:
+    """Write the figure as a PNG file and return it; arguments as those of `trial_dots_figure`."""
+    return save(trial_dots_figure(panels, axis=axis, title=title), path)
 
 
 def trial_dots_figure(panels: Mapping[str, Mapping[str, Dots]], *, axis: str, title: str) -> Figure:

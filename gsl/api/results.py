@@ -14,7 +14,8 @@ from gsl.grounding.diagnosis_file import read_diagnosis
 from gsl.grounding.effects import switch_on
 from gsl.report.account import account
 from gsl.storage.artifact import Artifact
-from gsl.storage.diagnosis_report import PAGE, report_of
+from gsl.storage.diagnosis_report import report_of
+from gsl.storage.hashing import PAGE
 
 _FRAME = 'style="width: 100%; height: 600px; border: 0"'
 

@@ -15,6 +15,7 @@ from gsl.models.free_run import TICKS
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.evaluation_cells import cells, columns
 from gsl.report.headline import unit_of
+from gsl.report.markdown import read_table
 from gsl.storage.artifact import METRICS, Artifact
 from gsl.storage.diagnosis_report import report_of
 from gsl.storage.hashing import CIRCUMSTANCES
@@ -134,11 +135,16 @@ def _problems(folder: Path) -> str:
 
 def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     document = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
+    return Told("policies in the real world", *evaluation_table(document, unit), describe_choice(metrics, unit))
+
+
+def evaluation_table(document: Mapping[str, Any], unit: Unit) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return titles and rows of what evaluation.json holds."""
     phases = {"policies": "", "check": ", checked", "confirmation": ", fresh"}
     found = [(one, f"{one['name']}{purpose}") for phase, purpose in phases.items() for one in document[phase]]
     told = list(dict.fromkeys(name for one, _ in found for name in one["outcome"]))
     rows = [tuple(cells(one | {"interval": _bounds(one["interval"])}, name, unit, told)) for one, name in found]
-    return Told("policies in the real world", tuple(columns(told, unit)), rows, describe_choice(metrics, unit))
+    return tuple(columns(told, unit)), rows
 
 
 def _bounds(interval: list[float | None]) -> list[float]:
@@ -193,9 +199,7 @@ def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 def _markdown(path: Path) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return the titles and rows of the first table of a file."""
     below_title = itertools.dropwhile(lambda line: line[:1] != "|", path.read_text(encoding="utf-8").splitlines())
-    lines = itertools.takewhile(lambda line: line.startswith("|"), below_title)
-    titles, _, *rows = (tuple(cell.strip() for cell in line[1:-1].split("|")) for line in lines)
-    return titles, rows
+    return read_table(list(itertools.takewhile(lambda line: line.startswith("|"), below_title)))
 
 
 def _plain(artifact: Artifact) -> Told:

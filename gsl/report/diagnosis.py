@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from gsl.report.diagnosis_answers import answers
-from gsl.report.diagnosis_html import element
+from collections.abc import Mapping
+from typing import Any
+
+from gsl.report.diagnosis_answers import cards
 from gsl.report.diagnosis_limits import limits
-from gsl.report.diagnosis_look import STYLE
 from gsl.report.diagnosis_method import calibration, caveats, method, noise_floor, self_test
 from gsl.report.diagnosis_policies import policies
 from gsl.report.diagnosis_ranking import causes, ranking
 from gsl.report.diagnosis_replays import replays
 from gsl.report.diagnosis_shrinkage import parts, shrinkage
-from gsl.report.diagnosis_verdict import headline
+from gsl.report.diagnosis_verdict import headline, verdict
 from gsl.report.diagnosis_where import growth, sides, where
-from gsl.report.diagnosis_words import Document
+from gsl.report.diagnosis_words import Document, part
+from gsl.report.page import page
+from gsl.report.parts import clean, prose
+from gsl.report.run_page import describe_origin
+from gsl.storage.artifact import origin
 
 _SECTIONS = (
     caveats,
@@ -32,12 +37,7 @@ _SECTIONS = (
     self_test,
     method,
 )
-_FRAME = (
-    '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-    '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    '<meta name="color-scheme" content="light dark">'
-    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
-)
+_MARKS = {"no_gap": "✓", "causes": "!", "inseparable": "?", "unknown": "?"}
 
 
 def report_html(document: Document) -> str:
@@ -46,6 +46,26 @@ def report_html(document: Document) -> str:
     Args:
         document: report.json; every list may be empty, every optional part None or absent.
     """
-    body = element("main", answers(document), *(told(document) for told in _SECTIONS))
-    title = element("title", f"Diagnosis: {headline(document)}")
-    return f"{_FRAME}{title}{STYLE}</head>\n<body>{body}</body></html>\n"
+    document = _clean(document)
+    data, kind = part(document, "data"), verdict(document)
+    sides = [str(data[key]) for key in ("sim", "source") if data.get(key)]
+    return page(
+        "diagnosis.html",
+        [*(told(document) for told in _SECTIONS), *describe_origin(origin())],
+        title=f"Diagnosis: {headline(document)}",
+        kind=kind,
+        mark=_MARKS[kind],
+        kicker=" against ".join(sides) or "gsl diagnose",
+        headline=headline(document),
+        summary=[prose(str(document["summary"]))] if document.get("summary") else [],
+        cards=cards(document),
+    )
+
+
+def _clean(thing: Any) -> Any:
+    """Return a document whose words can be drawn."""
+    if isinstance(thing, Mapping):
+        return {clean(str(key)): _clean(value) for key, value in thing.items()}
+    if isinstance(thing, list | tuple):
+        return [_clean(value) for value in thing]
+    return clean(thing) if isinstance(thing, str) else thing

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from gsl.report.diagnosis_html import Html, Part, bullets, element, join, prose
+from markupsafe import Markup
+
 from gsl.report.diagnosis_next import Step, steps
 from gsl.report.diagnosis_verdict import (
     alternatives,
     cause_name,
     comparison_sentence,
-    headline,
     nearest,
     shrinkage_sentence,
     sureness,
@@ -16,47 +16,26 @@ from gsl.report.diagnosis_verdict import (
     where_sentence,
 )
 from gsl.report.diagnosis_words import Document, entries, interval, name, part, value
+from gsl.report.parts import Part, bullets, command, element, join, prose
 
-_MARKS = {"no_gap": "✓", "causes": "!", "inseparable": "?", "unknown": "?"}
 
-
-def answers(document: Document) -> Html:
-    """Return the first screen."""
-    cards = [
-        _card("Where is the gap?", element("p", prose(where_sentence(document)))),
-        _card("What causes it?", _cause(document)),
-        _card(
-            "How large is it?" if verdict(document) == "no_gap" else "How far does it shrink?",
-            element("p", prose(shrinkage_sentence(document))),
-            _aside(document),
-        ),
-        _card("What next?", element("ol", *(_step(step) for step in steps(document)))),
+def cards(document: Document) -> list[tuple[str, Markup]]:
+    """Return the questions of the first screen with their answers."""
+    extent = "How large is it?" if verdict(document) == "no_gap" else "How far does it shrink?"
+    return [
+        ("Where is the gap?", element("p", prose(where_sentence(document)))),
+        ("What causes it?", _cause(document)),
+        (extent, join(element("p", prose(shrinkage_sentence(document))), _aside(document))),
+        ("What next?", element("ol", *(_step(step) for step in steps(document)))),
     ]
-    return join(_head(document), element("div", *cards, class_="answers"))
 
 
-def _head(document: Document) -> Html:
-    data, kind = part(document, "data"), verdict(document)
-    sides = [str(data[key]) for key in ("sim", "source") if data.get(key)]
-    return element(
-        "header",
-        element("p", " against ".join(sides) or "gsl diagnose", class_="kicker"),
-        element("h1", element("span", _MARKS[kind], class_="mark", aria_hidden="true"), " ", headline(document)),
-        element("p", prose(str(document["summary"]))) if document.get("summary") else None,
-        class_=f"verdict {kind}",
-    )
-
-
-def _card(question: str, *answer: Part) -> Html:
-    return element("div", element("h2", question), *answer, class_="card")
-
-
-def _aside(document: Document) -> Html | None:
+def _aside(document: Document) -> Markup | None:
     told = comparison_sentence(document)
-    return element("p", prose(told), class_="note") if told else None
+    return element("p", prose(told), kind="note") if told else None
 
 
-def _cause(document: Document) -> Html:
+def _cause(document: Document) -> Markup:
     causes = [_one(cause) for cause in entries(document, "causes")]
     groups = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
     if causes or groups:
@@ -71,13 +50,13 @@ def _nothing(document: Document) -> str:
     return f"None of the known effects. The nearest: {near}." if near else "None of the known effects."
 
 
-def _one(cause: Document) -> Html:
+def _one(cause: Document) -> Markup:
     rows = [_parameter(key, found or {}) for key, found in part(cause, "parameters").items()]
     return element(
         "div",
-        element("p", element("strong", cause_name(cause)), class_="cause"),
-        element("p", str(cause["meaning"]), class_="note") if cause.get("meaning") else None,
-        element("p", *(part for row in rows for part in row), class_="parameters") if rows else None,
+        element("p", element("strong", cause_name(cause)), kind="cause"),
+        element("p", str(cause["meaning"]), kind="note") if cause.get("meaning") else None,
+        element("p", *(part for row in rows for part in row), kind="parameters") if rows else None,
         element("p", prose(sureness(cause))) if sureness(cause) else None,
     )
 
@@ -88,7 +67,6 @@ def _parameter(key: str, found: Document) -> tuple[Part, ...]:
     return shown, " "
 
 
-def _step(step: Step) -> Html:
-    lines = [element("code", f"{line}\n") for line in step.command.splitlines()]
-    command = element("pre", *lines) if lines else None
-    return element("li", join(step.why, " ", element("span", step.more, class_="note") if step.more else None), command)
+def _step(step: Step) -> Markup:
+    more = element("span", step.more, kind="note") if step.more else None
+    return element("li", step.why, " ", more, command(step.command))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from gsl.report.diagnosis_html import Html, element, section, table
+from markupsafe import Markup
+
 from gsl.report.diagnosis_words import Document, entries, finite, in_unit, list_words, name, read_word
+from gsl.report.parts import element, section, table
 
 TOLD = 4  # in a terminal
 
 
-def limits(document: Document) -> Html | None:
+def limits(document: Document) -> Markup | None:
     """Return the effects of which there is little or none."""
     rows = [
         (

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from gsl.report.diagnosis_html import Html, Part, bullets, element, section, table
+from markupsafe import Markup
+
 from gsl.report.diagnosis_words import NONE, Document, entries, finite, level, list_words, name, part, read_word, short
+from gsl.report.parts import Part, bullets, element, facts, section, table
 
 _ENGINES = {"chain": "chain model, robot in the air", "bullet": "Bullet, with the ground"}
 
 
-def caveats(document: Document) -> Html | None:
+def caveats(document: Document) -> Markup | None:
     """Return what to be careful with."""
     told: list[Part] = [str(caveat) for caveat in entries(document, "caveats")]
     unseen = entries(document, "invisible")
@@ -20,7 +22,7 @@ def caveats(document: Document) -> Html | None:
     return section("Caveats", bullets(told))
 
 
-def calibration(document: Document) -> Html | None:
+def calibration(document: Document) -> Markup | None:
     """Return every joint's own small deviations."""
     rows = [
         (
@@ -46,7 +48,7 @@ def calibration(document: Document) -> Html | None:
     return section("Calibration", table(columns, rows) if rows else None, note=note)
 
 
-def noise_floor(document: Document) -> Html | None:
+def noise_floor(document: Document) -> Markup | None:
     """Return the noise of each joint's log."""
     found = part(document, "floor")
     rows = [
@@ -66,7 +68,7 @@ def _scale(value: object, factor: float, *, decimals: int) -> str:
     return NONE if number is None else f"{round(factor * number, decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
 
-def self_test(document: Document) -> Html | None:
+def self_test(document: Document) -> Markup | None:
     """Return how the diagnosis did on simulated logs whose cause it was not told."""
     found = part(document, "self_test")
     rows = [
@@ -88,22 +90,19 @@ def self_test(document: Document) -> Html | None:
     )
 
 
-def _answer(one: Document) -> Html:
+def _answer(one: Document) -> Markup:
     told = name(one.get("answer") or NONE)
     return element("span", told) if one.get("answer") == one.get("truth") else element("strong", f"{told} ✗")
 
 
-def method(document: Document) -> Html | None:
+def method(document: Document) -> Markup | None:
     """Return the data, the split and the command."""
     data = part(document, "data")
-    told = [*_data(data), *_describe_make(document)]
-    shown = [(title, entry) for title, entry in told if entry]
-    pairs = [part for title, entry in shown for part in (element("dt", title), element("dd", entry))]
     note = (
         "Recorded commands are replayed in the simulator in short windows: it starts where the robot was, some ticks "
         "are not scored, the next ones are. Whatever was fitted was fitted on the training records only."
     )
-    return section("How this was measured", element("dl", *pairs) if pairs else None, note=note)
+    return section("How this was measured", facts([*_data(data), *_describe_make(document)]), note=note)
 
 
 def _data(data: Document) -> Iterable[tuple[str, Part]]:

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from gsl.report.diagnosis_html import Html, bullets, element, prose, section, table
-from gsl.report.diagnosis_scatter import Pair, Span, scatter
+from markupsafe import Markup
+
+from gsl.report.charts import Pair, Span, scatter
 from gsl.report.diagnosis_words import NONE, Document, between, entries, finite, part, read_word, short
+from gsl.report.parts import bullets, element, prose, section, table
 
 _COLUMNS = {"sim": "simulator", "diagnosed": "", "real": "real"}  # the second is named by the document
 
 
-def policies(document: Document) -> Html | None:
+def policies(document: Document) -> Markup | None:
     """Return the table, the plot and what is to be said of them."""
     found = part(document, "policy_gap")
     rows, unit = entries(found, "rows"), read_word(found, "unit")
@@ -89,7 +91,7 @@ def _falls(row: Document) -> str:
     return ", ".join(f"{read_word(side, 'falls')} of {read_word(side, 'episodes')}" for side in sides)
 
 
-def _plot(found: Document, rows: list[Any]) -> Html | None:
+def _plot(found: Document, rows: list[Any]) -> Markup | None:
     factor, unit = finite(found.get("shown")) or 1.0, read_word(found, "unit")
     legend = {"before": "simulator as it was", "after": f"{_second(found)} simulator"}
     pairs = []
@@ -97,7 +99,7 @@ def _plot(found: Document, rows: list[Any]) -> Html | None:
         for row in rows:
             across, up = (_span(part(row, side), factor) for side in ("real", key))
             if across and up:
-                pairs.append(Pair(read_word(row, "name"), kind, across, up))
+                pairs.append(Pair(kind, across, up))
     return scatter(pairs, legend, x=f"real [{unit}]", y=f"simulated [{unit}]")
 
 

@@ -6,9 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from gsl.report.diagnosis_curves import Curve, line_chart
-from gsl.report.diagnosis_html import Html, element, section
+from markupsafe import Markup
+
+from gsl.report.charts import Curve, line_chart
 from gsl.report.diagnosis_words import Document, entries, finite, read_word, short
+from gsl.report.parts import element, section
 
 SHOWN = 6
 _LINES = (
@@ -19,15 +21,15 @@ _LINES = (
 )
 
 
-def replays(document: Document) -> Html | None:
+def replays(document: Document) -> Markup | None:
     """Return the replays, angles in degrees."""
     drawn = [_replay(one) for one in entries(document, "replays")[:SHOWN]]
     note = "Held-out records; at every jump the simulator is put where the robot was, then it hears only the commands."
     return section("Replays", *drawn, note=note)
 
 
-def _replay(one: Document) -> Html | None:
-    time, real = one.get("time") or [], _degrees(one.get("real"))
+def _replay(one: Document) -> Markup | None:
+    time, real = [finite(at) for at in one.get("time") or []], _degrees(one.get("real"))
     curves = [Curve(label, kind, time, _degrees(one.get(key))) for key, label, kind in _LINES if one.get(key)]
     chart = line_chart(curves, x="time [s]", y=f"{read_word(one, 'joint')} [°]")
     if chart is None:
@@ -40,7 +42,7 @@ def _replay(one: Document) -> Html | None:
     title = f"{read_word(one, 'joint')} in {read_word(one, 'record')}" + (
         f": {', '.join(distances)}" if distances else ""
     )
-    return element("div", element("h3", title), chart, class_="replay")
+    return element("div", element("h3", title), chart, kind="replay")
 
 
 def _degrees(angles: Sequence[Any] | None) -> list[float | None]:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from gsl.report.diagnosis_bars import Bar, bar_chart
-from gsl.report.diagnosis_html import Html, element, join, prose, section
+from markupsafe import Markup
+
+from gsl.report.charts import Bar, bar_chart
 from gsl.report.diagnosis_verdict import shrinkage_sentence
 from gsl.report.diagnosis_words import Document, entries, finite, level, part, read_word, regime, share
+from gsl.report.parts import element, join, prose, section
 
 FLOOR = 1.0
 
 
-def shrinkage(document: Document) -> Html | None:
+def shrinkage(document: Document) -> Markup | None:
     """Return the gap before, with calibration alone, with the effects, and with a learned residual."""
     found = part(document, "shrinkage")
     drawn = bar_chart(_bars(found), mark=finite(found.get("floor")) or FLOOR)
@@ -50,7 +52,7 @@ def _ceiling(found: Document) -> float | None:
     return math.sqrt(max(0.0, before**2 - fraction * (before**2 - floor**2)))
 
 
-def parts(document: Document) -> Html | None:
+def parts(document: Document) -> Markup | None:
     """Return the gap before and after, joint by joint and regime by regime."""
     found = part(document, "shrinkage")
     by_joint = [(read_word(one, "joint"), one) for one in entries(found, "by_joint")]
@@ -61,7 +63,7 @@ def parts(document: Document) -> Html | None:
     return section("Before and after", *drawn, note=note)
 
 
-def _pairs(title: str, rows: Sequence[tuple[str, Document]]) -> Html | None:
+def _pairs(title: str, rows: Sequence[tuple[str, Document]]) -> Markup | None:
     ordered = sorted(rows, key=lambda row: -(finite(row[1].get("before")) or 0.0))
     bars = [
         Bar(

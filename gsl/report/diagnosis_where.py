@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gsl.report.diagnosis_curves import Curve, line_chart
-from gsl.report.diagnosis_html import Html, element, join, section, table
+from markupsafe import Markup
+
+from gsl.report.charts import Curve, line_chart
 from gsl.report.diagnosis_verdict import Place, places
 from gsl.report.diagnosis_words import (
     REGIMES,
@@ -21,12 +22,13 @@ from gsl.report.diagnosis_words import (
     regime,
     share,
 )
+from gsl.report.parts import element, join, section, table
 
 DARKEST = 0.7  # opacity of the cell with the greatest share; words stay readable on it
 DRAWN = 4  # joints with a colour of their own
 
 
-def where(document: Document) -> Html | None:
+def where(document: Document) -> Markup | None:
     """Return the map and the list of its named cells."""
     cells = {(read_word(one, "joint"), read_word(one, "regime")): one for one in entries(document, "where")}
     if not cells:
@@ -50,7 +52,7 @@ def _name_place(place: Place) -> Sequence[str]:
     return place.joint, share(cell.get("share")), between(cell, share), level(cell.get("rms")), place.when
 
 
-def _map(cells: Mapping[tuple[str, str], Document]) -> Html:
+def _map(cells: Mapping[tuple[str, str], Document]) -> Markup:
     known = list(REGIMES)
     regimes = sorted(
         dict.fromkeys(kind for _, kind in cells), key=lambda kind: known.index(kind) if kind in known else len(known)
@@ -70,20 +72,21 @@ def _share(cell: Document) -> float:
     return finite(cell.get("share")) or 0.0
 
 
-def _cell(cell: Document | None, top: float) -> Html:
+def _cell(cell: Document | None, top: float) -> Markup:
     if cell is None:
-        return element("td", "·", class_="noise")
+        return element("td", "·", kind="noise")
     told = f"{100.0 * max(0.0, _share(cell)):.0f}"
     if not cell.get("named"):
-        return element("td", "·" if told == "0" else told, class_="noise")
+        return element("td", "·" if told == "0" else told, kind="noise")
     opacity = DARKEST * max(0.0, _share(cell)) / top if top > 0.0 else 0.0
-    return element("td", told, class_="named", style=f"--share:{opacity:.2f}")
+    return element("td", told, kind="named", style=f"--share:{opacity:.2f}")
 
 
-def growth(document: Document) -> Html | None:
+def growth(document: Document) -> Markup | None:
     """Return how the gap grows with the time since a replay began."""
     found = part(document, "horizon")
-    time, by_joint = found.get("time") or [], {joint: rms or [] for joint, rms in part(found, "rms").items()}
+    time = [finite(at) for at in found.get("time") or []]
+    by_joint = {joint: [finite(one) for one in rms or []] for joint, rms in part(found, "rms").items()}
     order = sorted(by_joint, key=lambda joint: -_last(by_joint[joint]))
     curves = [Curve(joint, f"joint{index}", time, by_joint[joint]) for index, joint in enumerate(order[:DRAWN])]
     rest = [Curve("other joints", "quiet", time, by_joint[joint]) for joint in order[DRAWN:]]
@@ -102,7 +105,7 @@ def _last(values: Sequence[Any]) -> float:
     return next((number for one in reversed(values) if (number := finite(one)) is not None), 0.0)
 
 
-def sides(document: Document) -> Html | None:
+def sides(document: Document) -> Markup | None:
     """Return the joints of the left side against those of the right."""
     rows = [
         (read_word(one, "pair"), level(one.get("left")), level(one.get("right")), probability(one.get("p")), _side(one))
@@ -120,7 +123,7 @@ def _milder(one: Document) -> float:
     return -max(finite(one.get("left")) or 0.0, finite(one.get("right")) or 0.0)
 
 
-def _side(one: Document) -> Html:
+def _side(one: Document) -> Markup:
     left, right, p = (finite(one.get(key)) for key in ("left", "right", "p"))
     if left is None or right is None or p is None or p >= 0.05:
         return join("alike")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gsl.report.style import GROUNDED, QUIET, SIMULATION, figure, headline, look, save
+from gsl.report.style import GROUNDED, QUIET, SIMULATION, WIDTH, figure, headline, look, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,23 +26,27 @@ def grounding_errors(path: Path, groups: Mapping[str, Errors], *, title: str | N
     save(grounding_errors_figure(groups, title=title), path)
 
 
-def grounding_errors_figure(groups: Mapping[str, Errors], *, title: str | None = None) -> Figure:
+def grounding_errors_figure(groups: Mapping[str, Errors], *, title: str | None = None, width: float = WIDTH) -> Figure:
     """Return the figure of the errors.
 
     Args:
         groups: Trajectories (such as `of π0`), one panel each from above.
-        title: By default what grounding does to the RMS error of each group.
+        title: By default what grounding does to the RMS error of each group; an empty one is left out.
+        width: Of the figure [in].
     """
     with look():
-        whole = figure(1.5 + 2.0 * len(groups))
+        whole = figure(1.5 + 2.0 * len(groups), width)
         panels = whole.subplots(len(groups), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
         for axes, (name, errors) in zip(panels, groups.items(), strict=True):
             _draw(axes, errors)
             axes.set_title(f"trajectories {name}", loc="left", fontsize=10.5)
             axes.set_ylabel("error after ten ticks [°]")
         panels[0].set_ylim(0.0, _top(groups))
-        panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, borderaxespad=0.2)
-        headline(whole, title or _finding(groups))
+        if width < WIDTH:
+            whole.legend(*panels[0].get_legend_handles_labels(), loc="outside upper left", ncols=3, frameon=False)
+        else:
+            panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, borderaxespad=0.2)
+        headline(whole, finding(groups) if title is None else title)
     return whole
 
 
@@ -66,7 +70,8 @@ def _top(groups: Mapping[str, Errors]) -> float:
     return 1.08 * min(max([*simulators, *still]), 2.5 * max(simulators)) or 1.0
 
 
-def _finding(groups: Mapping[str, Errors]) -> str:
+def finding(groups: Mapping[str, Errors]) -> str:
+    """Return what grounding does to the RMS error of each group, in a sentence without its full stop."""
     changes = []
     for name, errors in groups.items():
         before, after = (float(np.sqrt(np.mean(np.square(list(errors[bar].values()))))) for bar, *_ in _BARS)

@@ -13,6 +13,7 @@ from gsl.report.evaluation_cells import ends, format_ends
 from gsl.report.flight import Flight
 from gsl.report.learning_curve import Search, learning_curve, search
 from gsl.report.markdown import table
+from gsl.report.run_page import Answer
 from gsl.storage.artifact import Artifact
 from gsl.storage.policy_choice import EVALUATION
 
@@ -171,6 +172,36 @@ class Rounds:
             return f"Real side: π0 is returned{with_it}, {after}{without}"
         doubt = "" if figures["gain"]["interval"][0] > 0.0 else "; the gain is not significant"
         return f"Real side: {after}{with_it}{without}, π0 {before}{doubt}"
+
+    @property
+    def answer(self) -> Answer:
+        """The result as a page says it first: with its interval, and whether that leaves out 0."""
+        figures, unit = self.metrics(), self._unit
+        question = "Does grounded simulation learning find a better policy for the real side?"
+        after, before, gain = figures["returned"], figures["baseline"], figures["gain"]
+        reached = f"{unit.shown(after['value'])} (95 % {unit.interval(after['interval'])})"
+        if self.best is None:
+            sentence = f"No policy better than π0 was found. π0 is returned; it reaches {reached} on the real side."
+            return Answer(question, sentence, sure=False, more=[self.verdict])
+        sure = bool(gain["interval"][0] > 0.0)
+        bounds = f"{unit.shown(gain['value'], sign=True)} (95 % {unit.interval(gain['interval'], sign=True)})"
+        last = "the gain" if figures["returned_iteration"] == 1 else "the last iteration's gain"
+        significant = f"{last} of {bounds} is {'' if sure else 'not '}significant"
+        start = unit.bare(before["value"])
+        sentence = f"The returned policy reaches {reached} on the real side, π0 {start}: {significant}."
+        return Answer(question, sentence, sure=sure, more=[self.verdict])
+
+    @property
+    def budget(self) -> list[tuple[str, str]]:
+        """What real data were spent on."""
+        figures, flight = self.metrics(), self._flight
+        air = flight.episodes if flight else 0
+        measured = self._spent - self._collected - air
+        pairs = [("motions in the air", f"{air}, {flight.seconds:.0f} s" if flight else "")]
+        pairs += [("episodes to learn from", str(self._collected or "")), ("episodes to measure", str(measured))]
+        pairs += [("in all", str(figures["real_episodes"]))]
+        beside = figures["ungrounded"]
+        return [*pairs, ("for the search without grounding", str(beside["real_episodes"]) if beside else "")]
 
     @property
     def unit(self) -> str:

@@ -8,7 +8,19 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gsl.report.style import COMMAND, GROUNDED, REAL, SIMULATION, figure, headline, label_ends, look, save
+from gsl.report.style import (
+    COMMAND,
+    GROUNDED,
+    REAL,
+    SIMULATION,
+    WIDTH,
+    curve_figure,
+    headline,
+    label_ends,
+    label_gap,
+    look,
+    save,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,18 +47,21 @@ class Traces(NamedTuple):
     name: str = "grounded simulation"
 
 
-def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = None, rest: int = 0) -> None:
-    """Write the figure of one joint as a PNG file; arguments as those of `joint_trace_figure`."""
-    save(joint_trace_figure(traces, joint, title=title, rest=rest), path)
+def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = None, rest: int = 0) -> Figure:
+    """Write the figure of one joint as a PNG file and return it; arguments as those of `joint_trace_figure`."""
+    return save(joint_trace_figure(traces, joint, title=title, rest=rest), path)
 
 
-def joint_trace_figure(traces: Traces, joint: str, *, title: str | None = None, rest: int = 0) -> Figure:
+def joint_trace_figure(
+    traces: Traces, joint: str, *, title: str | None = None, rest: int = 0, width: float = WIDTH
+) -> Figure:
     """Return the figure of one joint in degrees; each simulator is labelled with its RMS distance from the real robot.
 
     Args:
         traces: What to draw.
         joint: Its name.
-        title: By default what grounding does to that distance.
+        title: By default what grounding does to that distance; an empty one is left out.
+        width: Of the figure [in].
         rest: Ticks in the beginning in which nothing moves, and which no distance is of.
     """
     distances = [_rms_degrees((traces.simulation - traces.real)[rest:])]
@@ -59,7 +74,7 @@ def joint_trace_figure(traces: Traces, joint: str, *, title: str | None = None, 
     if traces.sent is not None:
         lines.append(("grounded command", traces.sent, GROUNDED, 1.1, (0, (5, 3))))
     with look():
-        whole = figure(4.6)
+        whole = curve_figure(width)
         axes = whole.subplots()
         for label, angle, colour, width, style in lines:
             axes.plot(traces.time, np.degrees(angle), linestyle=style, color=colour, linewidth=width, label=label)
@@ -68,8 +83,8 @@ def joint_trace_figure(traces: Traces, joint: str, *, title: str | None = None, 
         axes.set_xlabel("time [s]")
         axes.set_ylabel(f"{joint} [°]")
         ends = [(math.degrees(angle[-1]), label, colour) for label, angle, colour, _, _ in lines]
-        label_ends(axes, float(traces.time[-1]), ends, gap=0.13)
-        headline(whole, title or _finding(joint, distances))
+        label_ends(axes, float(traces.time[-1]), ends, gap=label_gap(0.13, whole))
+        headline(whole, _finding(joint, distances) if title is None else title)
     return whole
 
 

@@ -8,7 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gsl.core.words import in_unit
-from gsl.report.style import COMMAND, INK, REAL, SIMULATION, figure, headline, label_ends, look, save
+from gsl.report.style import (
+    COMMAND,
+    INK,
+    REAL,
+    SIMULATION,
+    WIDTH,
+    curve_figure,
+    headline,
+    label_ends,
+    label_gap,
+    look,
+    save,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,21 +104,25 @@ def learning_curve(path: Path, searches: Sequence[Search], *, unit: str, title: 
     save(learning_curve_figure(searches, unit=unit, title=title), path)
 
 
-def learning_curve_figure(searches: Sequence[Search], *, unit: str, title: str) -> Figure:
+def learning_curve_figure(
+    searches: Sequence[Search], *, unit: str, title: str = "", width: float = WIDTH, among: Sequence[Search] = ()
+) -> Figure:
     """Return the figure of the searches.
 
     Args:
         searches: Panels from left to right.
         unit: Of all values.
         title: The finding, in a line.
+        width: Of the figure [in].
+        among: Searches that have the same scale.
     """
     with look():
-        whole = figure(4.6)
+        whole = curve_figure(width)
         panels = whole.subplots(1, len(searches), sharey=True, squeeze=False)[0]
-        falls = any(point.falls for one in searches for point in one.points)
-        _scale(panels[0], *_limits(searches), strip=falls)
+        falls = any(point.falls for one in (*searches, *among) for point in one.points)
+        _scale(panels[0], *_limits([*searches, *among]), strip=falls)
         for axes, one in zip(panels, searches, strict=True):
-            _draw(axes, one)
+            _draw(axes, one, label_gap(0.12, whole))
             axes.tick_params(labelleft=True)
         panels[0].set_ylabel(in_unit("value", unit) if unit else "return of an episode")
         headline(whole, title)
@@ -147,7 +163,7 @@ def _scale(axes: Axes, low: float, high: float, *, strip: bool) -> None:
     axes.set_ylim(bottom, top)
 
 
-def _draw(axes: Axes, one: Search) -> None:
+def _draw(axes: Axes, one: Search, gap: float) -> None:
     start, last = one.points[0], one.points[-1].generation
     simulated = [(point.generation, point.simulated) for point in one.points if point.simulated is not None]
     standing = [point for point in one.points if not point.falls]
@@ -166,7 +182,7 @@ def _draw(axes: Axes, one: Search) -> None:
     ends += [(simulated[-1][1], "best in\nsimulation", SIMULATION)] if simulated else []
     ends += [(standing[-1].real, "the same\nin real", REAL)] if standing and standing[-1].generation > 0 else []
     ends += [(one.confirmed.real, "chosen,\nmeasured again", INK)] if one.confirmed else []
-    label_ends(axes, axes.get_xlim()[1], ends, gap=0.12)
+    label_ends(axes, axes.get_xlim()[1], ends, gap=gap)
 
 
 def _draw_standing(axes: Axes, standing: Sequence[Point]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,24 +19,42 @@ COMMAND, QUIET, INK = "#8c8c8c", "#d0d0d0", "#222222"
 SERVO = "#cc79a7"
 UNINFORMED, GAT, SGAT, EFFECTS = COMMAND, SIMULATION, GROUNDED, REAL  # the first know nothing of the real robot
 WIDTH, DPI = 10.0, 160  # [in], [1/in]: 1600 pixels
+CURVES = 4.6  # height of a figure of curves [in]
+NARROW = 0.62  # height of one that is narrower, in shares of its width
+EDGE, TICK, PAPER = "#777777", "#555555", "#ffffff"
+HUES = ("#222222", "#cc79a7", "#56b4e9", "#e69f00")  # of things without a colour of their own, Okabe and Ito 2008
+
+ROLES = {
+    REAL: "real", SIMULATION: "before", GROUNDED: "after", COMMAND: "command", QUIET: "quiet", INK: "ink",
+    EDGE: "faint", TICK: "soft", PAPER: "paper",
+}  # fmt: skip
+"""What colours stand for on a page, which has another one of each in the dark."""
+COLOURS: Mapping[str, str] = {role: colour for colour, role in ROLES.items()}
+LIGHT = {"line": "#dddddd", "card": "#f6f6f4", "heat": "0, 114, 178", "warn": "#a65a00"}
+DARK = {
+    "ink": "#e9e9e7", "soft": "#b4b4b2", "faint": "#8b8b8b", "quiet": "#55595f", "paper": "#17191c",
+    "real": "#f0803c", "before": "#56b4e9", "after": "#2fbf94", "command": "#9a9a9a",
+    "line": "#3a3d42", "card": "#202327", "heat": "40, 140, 210", "warn": "#f0a850",
+}  # fmt: skip
 
 _SETTINGS: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 10.5,
     "text.color": INK,
     "axes.labelcolor": INK,
-    "axes.edgecolor": "#777777",
+    "axes.edgecolor": EDGE,
     "axes.linewidth": 0.8,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
     "axes.unicode_minus": True,
-    "xtick.color": "#555555",
-    "ytick.color": "#555555",
+    "xtick.color": TICK,
+    "ytick.color": TICK,
     "xtick.major.width": 0.8,
     "ytick.major.width": 0.8,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
+    "text.parse_math": False,
+    "figure.facecolor": PAPER,
+    "savefig.facecolor": PAPER,
 }
 
 
@@ -56,21 +74,34 @@ def look() -> Iterator[None]:
         yield
 
 
-def figure(height: float) -> Figure:
+def figure(height: float, width: float = WIDTH) -> Figure:
     """Return an empty figure [in] that no global list knows of."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+    return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure as a PNG file without a date in it: equal figures give equal bytes."""
+def curve_figure(width: float = WIDTH) -> Figure:
+    """Return an empty figure for curves [in]."""
+    return figure(CURVES if width == WIDTH else NARROW * width, width)
+
+
+def label_gap(gap: float, figure: Figure) -> float:
+    """Return the least distance of labels in shares of a figure's height, of `gap` in shares of `CURVES`."""
+    return gap * CURVES / figure.get_figheight()
+
+
+def save(figure: Figure, path: Path) -> Figure:
+    """Write a figure as a PNG file without a date in it, and return it: equal figures give equal bytes."""
     with look():
         figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    return figure
 
 
 def headline(figure: Figure, text: str) -> None:
-    """Write what there is to see above everything, at the left."""
+    """Write what there is to see above everything, at the left; nothing where a page says it."""
+    if not text:
+        return
     figure.suptitle(text, x=0.012, ha="left", fontsize=13, fontweight="bold")
 
 

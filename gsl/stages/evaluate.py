@@ -20,6 +20,8 @@ from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.policy import size
 from gsl.real_robot.errand import Errand, Order, answer_parents, ask
+from gsl.report.evaluation_page import write_evaluation_page
+from gsl.report.run_page import Change
 from gsl.rollout.parallel import Episode, Job, Workers, episodes
 from gsl.rollout.promise import promise
 from gsl.rollout.returns import falls, gain, mean, row, summary
@@ -92,13 +94,14 @@ class Evaluate:
         fresh = dict(zip(reported, measure([found[i] for i in reported], _REPORT, self.confirmation), strict=True))
         rows = [row(theta, done) for theta, done in zip(found, tried, strict=True)]
         again = [[row(found[index], done) for index, done in phase.items()] for phase in (checked, fresh)]
-        write_json(folder / EVALUATION, {"policies": rows, "check": again[0], "confirmation": again[1]})
+        document = {"policies": rows, "check": again[0], "confirmation": again[1]}
+        write_json(folder / EVALUATION, document)
         write_policies(folder / FILE, policies(self.policy, self.task, [found[best]]))
         stable = [done for done in tried[1:] if self._stable(done)]
         promised = promise(found, best, summary(fresh[best]), Unit.of(self.task))
         if promised and promised["warning"]:
             console.status(f"warning: {promised['warning']}")
-        return {
+        metrics = {
             "best": found[best].name,
             "best_generation": found[best].generation or 0,
             "returned_value_sim": found[best].value_sim,
@@ -113,6 +116,10 @@ class Evaluate:
             "policies": len(found) - 1,
             "real_episodes": sum(map(len, [*tried, *checked.values(), *fresh.values()])),
         }
+        first, chosen = (vector(self.policy, found[index]).tolist() for index in (0, best))
+        change = Change(self.policy.names, first, chosen, self.policy.scale.tolist())
+        write_evaluation_page(folder, metrics, document, change, Unit.of(self.task))
+        return metrics
 
     def _check(
         self, found: Sequence[PolicyRecord], tried: Sequence[list[Episode]], measure: Callable[..., list[list[Episode]]]

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
+
 from gsl.core.console import Console
 from gsl.core.interfaces import REAL, SIM, Grounding, Learner, Policy, Search, Task, Trainable, World
 from gsl.core.layout import check_alike
@@ -20,6 +22,8 @@ from gsl.models.config import ModelConfig
 from gsl.optimizers.objective import Objective, Quantile, check_objective
 from gsl.policies.policy import size
 from gsl.report.iteration import Rounds, write_curve, write_table
+from gsl.report.iteration_page import Seen, read_check, write_iteration_page
+from gsl.report.run_page import Change
 from gsl.rollout.parallel import Workers
 from gsl.rollout.rollout import Scenario
 from gsl.stages.chain import Budget
@@ -132,9 +136,13 @@ class Iterate:
         else:
             (folder / FILE).write_bytes(returned.read_bytes())
         yielding = with_real(home / FIRST / "optimize" / REPORT, self.real, self.seed)
-        write_table(folder, rounds, [yielding.told] if yielding else [])
+        remarks = [yielding.told] if yielding else []
+        write_table(folder, rounds, remarks)
         write_curve(folder, rounds)
-        self._draw(folder, home, first)
+        best = vector(self.policy, records(self.policy, str(folder / FILE))[-1])
+        seen = self._draw(folder, home, first, best)
+        change = Change(self.policy.names, self.policy.initial.tolist(), best.tolist(), self.policy.scale.tolist())
+        write_iteration_page(folder, rounds, seen, change, read_check(home / FIRST / "optimize" / REPORT), remarks)
         if yielding:
             console.status(yielding.told)
         return {**rounds.metrics(), SECTION: yielding.metrics() if yielding else None}
@@ -183,7 +191,7 @@ class Iterate:
         found = self.chain.search(place / "optimize_none", NoGrounding(), start, self.seed, console)
         return self.chain.measure(place / "evaluate_none", found, self.seed, console)
 
-    def _draw(self, folder: Path, home: Path, first: Grounding) -> None:
+    def _draw(self, folder: Path, home: Path, first: Grounding, returned: np.ndarray) -> Seen:
         """Draw what the first iteration's grounding makes of real motions that nothing was learned from, and a walk."""
         place = home / FIRST
         search = Artifact(place / "optimize", manifest.read(place / "optimize"))
@@ -192,10 +200,10 @@ class Iterate:
         if (place / maker / HELDOUT).is_file():
             heldout = read(place / maker / HELDOUT)
             walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
-            draw_walk_and_joint(folder, scenario, walk)
-        elif (place / EXCITATION).is_dir():
-            log, best = read(place / EXCITATION / DATA), records(self.policy, str(folder / FILE))[-1]
-            draw_flight(folder, self.sim, scenario, log, vector(self.policy, best), self.seed)
+            return draw_walk_and_joint(folder, scenario, walk, returned, self.seed)
+        if (place / EXCITATION).is_dir():
+            return draw_flight(folder, self.sim, scenario, read(place / EXCITATION / DATA), returned, self.seed)
+        return Seen()
 
 
 def check_aggregate(iterate: Iterate, groundings: Iterable[Grounding], name: str) -> None:

@@ -10,7 +10,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import yaml
 
@@ -140,13 +140,52 @@ def build(
     return _note(Artifact(out, made))
 
 
-_built: ContextVar[dict[Path, Artifact] | None] = ContextVar("built", default=None)
-"""What the stage that is at work has built beside itself, by absolute path."""
+class Origin(NamedTuple):
+    """How what a stage is at work on comes about, for its page.
+
+    Attributes:
+        command: As it was typed.
+        settings: All of them, as config.yaml has them.
+        parents: What it is made from.
+        links: What it has built beside itself so far.
+    """
+
+    command: str
+    settings: str
+    parents: tuple[Parent, ...]
+    links: tuple[Parent, ...]
+
+
+class _Work(NamedTuple):
+    """A stage at work in `folder`; `built` is what it has built beside itself, by absolute path."""
+
+    command: str
+    settings: str
+    parents: tuple[Parent, ...]
+    built: dict[Path, Artifact]
+    folder: Path
+
+    @property
+    def links(self) -> tuple[Parent, ...]:
+        """What it has built, as its manifest has it."""
+        return tuple(
+            Parent(one.manifest.kind, _relative(path, self.folder), one.manifest.contents)
+            for path, one in self.built.items()
+        )
+
+
+_at_work: ContextVar[_Work | None] = ContextVar("at_work", default=None)
+
+
+def origin() -> Origin | None:
+    """Return how the artifact of the stage that is at work comes about, None where no stage is."""
+    work = _at_work.get()
+    return Origin(work.command, work.settings, work.parents, work.links) if work else None
 
 
 def _note(artifact: Artifact) -> Artifact:
-    if (built := _built.get()) is not None:
-        built[artifact.folder.absolute()] = artifact
+    if (work := _at_work.get()) is not None:
+        work.built[artifact.folder.absolute()] = artifact
     return artifact
 
 
@@ -191,16 +230,19 @@ def _work(
     (folder / CONFIG).write_text(settings, encoding="utf-8")
     with log_to(folder) as logger:
         logger.info("%s begins: %s", identity.kind, command)
-        links: dict[Path, Artifact] = {}
-        token = _built.set(links)
+        parents = tuple(
+            Parent(role, _relative(path, folder), identity.parents[role]) for role, path in _sources(stage).items()
+        )
+        work = _Work(command, settings, parents, {}, folder)
+        token = _at_work.set(work)
         try:
             metrics = stage.run(folder, console)
         finally:
-            _built.reset(token)
+            _at_work.reset(token)
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
     documents.write_json(folder / METRICS, metrics)
-    parents = _parents(stage, identity, folder)
+    _check_parents(stage, identity)
     remove_temporary(folder)  # of a worker that was killed
     return Manifest(
         kind=identity.kind,
@@ -208,9 +250,7 @@ def _work(
         command=command,
         files={name: file for name, file in manifest.inventory(folder).items() if name != KEY},
         parents=parents,
-        links=tuple(
-            Parent(one.manifest.kind, _relative(path, folder), one.manifest.contents) for path, one in links.items()
-        ),
+        links=work.links,
         seeds=identity.seeds,
         sources=identity.sources,
         versions=versions(),
@@ -233,8 +273,8 @@ def _unit(stage: Stage) -> dict[str, Any] | None:
     return None if task is None else Unit.of(task)._asdict()
 
 
-def _parents(stage: Stage, identity: Identity, folder: Path) -> tuple[Parent, ...]:
-    """Return what the stage was made from; refuse what is no longer as it was when the work began: it may be of either.
+def _check_parents(stage: Stage, identity: Identity) -> None:
+    """Refuse what is no longer as it was when the work began: it may be of either.
 
     Raises:
         GslError: A parent was changed meanwhile.
@@ -249,7 +289,6 @@ def _parents(stage: Stage, identity: Identity, folder: Path) -> tuple[Parent, ..
         if not same:
             what = f"{role} ({path or 'gone'})"
             raise GslError(f"{what}: was changed while {identity.kind} was at work; run the command again")
-    return tuple(Parent(role, _relative(path, folder), identity.parents[role]) for role, path in sources.items())
 
 
 def _relative(path: Path, folder: Path) -> str:

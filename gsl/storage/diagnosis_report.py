@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-REPORT, PAGE, COMMANDS = "report.json", "report.html", "next_experiment.json"
+REPORT, COMMANDS = "report.json", "next_experiment.json"
 DIGITS = 6  # of an effect's numbers in a world file
 WORLD, SIMULATOR = "world/diagnosed.yaml", "world/simulator.yaml"
 

@@ -10,7 +10,8 @@ from pathlib import Path
 PACKAGE = Path(__file__).parents[1]
 SHORT = 12
 """Characters of a hash that are shown."""
-CIRCUMSTANCES = ("manifest.json", "config.yaml", "log.txt")
+PAGE = "report.html"
+CIRCUMSTANCES = ("manifest.json", "config.yaml", "log.txt", PAGE)
 
 
 def file_hash(path: Path) -> str:
@@ -22,8 +23,8 @@ def file_hash(path: Path) -> str:
 def contents_hash(kind: str, hashes: Mapping[str, str]) -> str:
     """Return the hash of an artifact's contents from the hashes of its files by name.
 
-    Manifests, settings and logs tell how the contents came about, with times and paths in them; they do not count, so
-    that the same work done again leaves what was built on it valid.
+    Manifests, settings, logs and pages say how the contents came about, with commands and paths in them; they do not
+    count, so that the same work done again leaves what was built on it valid.
     """
     lines = [f"{name} {sha}" for name, sha in sorted(hashes.items()) if Path(name).name not in CIRCUMSTANCES]
     return hashlib.sha256("\n".join([kind, *lines]).encode()).hexdigest()

@@ -10,13 +10,17 @@ import numpy as np
 
 from gsl.core.body import Robot, lump
 from gsl.core.interfaces import Grounding, World
+from gsl.core.layout import Layout
 from gsl.core.observation import missing, observations
 from gsl.core.seeds import derive_seed
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import actions
 from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.log.records import LOADED
 from gsl.grounding.none import NoGrounding
 from gsl.report.film import Shot, film
+from gsl.report.footfalls import Walk
+from gsl.report.iteration_page import Seen
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.style import GROUNDED, REAL
 from gsl.rollout.rollout import Scenario, rollout
@@ -36,7 +40,25 @@ class Way(NamedTuple):
     grounding: Grounding
 
 
-def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory) -> None:
+class _Listening:
+    """A grounding that keeps what it sends."""
+
+    def __init__(self, inner: Grounding) -> None:
+        self._inner, self.sent = inner, list[np.ndarray]()
+        self.span = getattr(inner, "span", 0)
+
+    def start(self, layout: Layout, rng: np.random.Generator) -> _Listening:
+        """Return itself at the beginning of an episode."""
+        self._run = self._inner.start(layout, rng)
+        return self
+
+    def transform(self, observation: np.ndarray, action: np.ndarray) -> np.ndarray:
+        """Return what the grounding sends."""
+        self.sent.append(self._run.transform(observation, action))
+        return self.sent[-1]
+
+
+def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory, returned: np.ndarray, seed: int) -> Seen:
     """Draw a real walk that no model has seen, and what a grounded simulator makes of its actions.
 
     Nothing is drawn where there are no joints, or nobody knows where the body was.
@@ -45,15 +67,26 @@ def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory) -> N
         folder: Where to write.
         scenario: Its grounding is ready to act.
         walk: A real trajectory.
+        returned: Parameters of the policy that is returned, shape (n_parameters,).
+        seed: Of all randomness.
     """
     world = scenario.world
     if not isinstance(world, BulletWorld) or missing(walk, world.layout):
-        return
-    draw_joint(folder, Way(world, NoGrounding()), Way(world, scenario.grounding), walk)
+        return Seen()
+    traces = draw_joint(folder, Way(world, NoGrounding()), Way(world, scenario.grounding), walk)
     _draw_walk(world.plant.robot, Shot("π0", "on the real side", walk, REAL), folder)
+    simulated = [
+        read_footfalls(f"{name} in the grounded simulator", _walk(scenario, parameters, seed))
+        for name, parameters in (("π0", scenario.policy.initial), ("the returned policy", returned))
+    ]
+    walks = [read_footfalls("a held-out walk on the real side", walk), *simulated]
+    caption = (
+        "A real walk that nothing was learned from; both simulators start in one of its states and play its actions."
+    )
+    return Seen(traces, [one for one in walks if one], caption)
 
 
-def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parameters: np.ndarray, seed: int) -> None:
+def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parameters: np.ndarray, seed: int) -> Seen:
     """Draw a held-out motion in the air, and a walk of the policy that is returned, in the grounded simulator.
 
     Args:
@@ -66,52 +99,87 @@ def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parame
     """
     grounded = _centre(scenario.world)
     if not isinstance(sim, BulletWorld) or grounded is None:
-        return
-    robot = grounded.plant.robot
+        return Seen()
+    robot, traces = grounded.plant.robot, {}
     held, steady = (replace(world, floating=False) for world in (sim, grounded))
     shown = _largest_held_out(log, held)
     if not missing(shown, held.layout):
-        draw_joint(folder, Way(held, NoGrounding()), Way(steady, NoGrounding()), shown)
+        traces = draw_joint(folder, Way(held, NoGrounding()), Way(steady, NoGrounding()), shown)
+    walks = []
+    for name, these in (("π0", scenario.policy.initial), ("the returned policy", parameters)):
+        walk = _walk(scenario, these, seed)
+        walks.append(read_footfalls(f"{name} in the grounded simulator", walk))
+    if not missing(walk, grounded.layout):
+        walk_strip(robot, walk, folder / WALK)
+    caption = "A real motion in the air that nothing was learned from; both simulators play its commands."
+    return Seen(traces, [one for one in walks if one], caption)
+
+
+def _walk(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:
     env = scenario.make()
     walk = rollout(scenario, env, parameters, derive_seed(seed, WALK))
     env.close()
+<<<<<<< HEAD
     if not missing(walk, grounded.layout):
         _draw_walk(robot, Shot("returned policy", "in the grounded simulator", walk, GROUNDED), folder)
 
 
 def _draw_walk(robot: Robot, shot: Shot, folder: Path) -> None:
     film(robot, robot.controlled, [shot], folder / WALK)
+=======
+    return walk
+>>>>>>> page
 
 
-def draw_joint(folder: Path, plain: Way, grounded: Way, real: Trajectory) -> None:
-    """Draw the joint that moves most: a real trajectory, and its actions replayed from one of its states.
+def read_footfalls(label: str, walk: Trajectory) -> Walk | None:
+    """Return when each foot bears load, None where that is not known."""
+    prefix = "foot_force."
+    feet = {
+        name.removeprefix(prefix): force > LOADED for name, force in walk.sensors.items() if name.startswith(prefix)
+    }
+    fell = float(walk.time[-1]) if walk.ended_in_a_fall else None
+    return Walk(label, walk.time, feet, fell) if feet else None
+
+
+def draw_joint(folder: Path, plain: Way, grounded: Way, real: Trajectory) -> dict[str, Traces]:
+    """Draw the joint that moves most, and return the traces of all, that one first.
 
     Args:
         folder: Where to write.
         plain: The simulator as it was.
         grounded: And grounded.
-        real: A real trajectory that nothing was learned from.
+        real: A real trajectory that nothing was learned from, whose actions are replayed from one of its states.
     """
     layout, period = plain.world.layout, plain.world.period
     tick = max(PAST, min(round(TAKEN_OVER / period), len(real) // 2))
-    sent = actions(real, carried_out=True)
-    place = Place(observations(real, layout), sent, tick)
+    issued = actions(real, carried_out=True)
+    place = Place(observations(real, layout), issued, tick)
     ticks = min(round(SHOWN / period), len(real) - tick)
-    simulated = [_observe(way, place, ticks) for way in (plain, grounded)]
+    (bare, _), (other, sent) = (_observe(way, place, ticks) for way in (plain, grounded))
     shown = slice(tick + 1, tick + 1 + ticks)
-    joint = int(np.argmax(np.ptp(real.position[shown], axis=0)))
-    command = sent[tick : tick + ticks, joint]
-    bare, other = (seen[:, joint] for seen in simulated)
-    traces = Traces(real.time[shown], command, real.position[shown, joint], bare, other)
-    joint_trace(folder / TRACE, traces, layout.joints[joint])
+    changed = not np.array_equal(sent, issued[tick : tick + ticks])
+    traces = {
+        layout.joints[k]: Traces(
+            real.time[shown],
+            issued[tick : tick + ticks, k],
+            real.position[shown, k],
+            bare[:, k],
+            other[:, k],
+            sent[:, k] if changed else None,
+        )
+        for k in np.argsort(-np.ptp(real.position[shown], axis=0), kind="stable")
+    }
+    first = next(iter(traces))
+    joint_trace(folder / TRACE, traces[first]._replace(sent=None), first)
+    return traces
 
 
-def _observe(way: Way, place: Place, ticks: int) -> np.ndarray:
-    """Return observations of a replay, shape (ticks, layout.size)."""
-    env = way.world.make()
-    seen = np.array(list(replay(env, way.grounding, place, np.random.default_rng(0), ticks)))
+def _observe(way: Way, place: Place, ticks: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the observations of a replay, shape (ticks, layout.size), and what was sent, shape (ticks, n_joints)."""
+    env, grounding = way.world.make(), _Listening(way.grounding)
+    seen = np.array(list(replay(env, grounding, place, np.random.default_rng(0), ticks)))
     env.close()
-    return seen
+    return seen, np.array(grounding.sent[-ticks:])
 
 
 def _centre(world: World | EnsembleWorld | RandomisedWorld) -> BulletWorld | None:

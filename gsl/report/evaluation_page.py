@@ -1,0 +1,46 @@
+"""The page of an evaluation: which policy is the best on the real side, and by how much?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gsl.core.unit import Unit
+from gsl.report.account import describe_choice, evaluation_table
+from gsl.report.learning_curve import search
+from gsl.report.parts import section, table
+from gsl.report.run_page import Answer, Change, budget, curves, parameters, write_page
+
+_PHASES = {"policies": "episodes to choose", "check": "episodes to check", "confirmation": "fresh episodes to report"}
+
+
+def write_evaluation_page(
+    folder: Path, metrics: Mapping[str, Any], document: Mapping[str, Any], change: Change, unit: Unit
+) -> None:
+    """Write the page.
+
+    Args:
+        folder: Where to write.
+        metrics: Of the evaluation.
+        document: What evaluation.json holds.
+        change: Of the policy, from the first to the best.
+        unit: Of the task.
+    """
+    told = describe_choice(metrics, unit)
+    gain = metrics["gain"]["interval"]
+    answer = Answer(
+        "Which of these policies is the best on the real side?",
+        f"{told[0].upper()}{told[1:]}.",
+        sure=bool(metrics["best_generation"] and gain[0] is not None and gain[0] > 0.0),
+    )
+    columns, rows = evaluation_table(document, unit)
+    searched = search("all policies", document, shown=unit.factor, returned=metrics["best"], start="π0")
+    spent = [(words, str(sum(one["episodes"] for one in document[phase]))) for phase, words in _PHASES.items()]
+    sections = [
+        section("Policies on the real side", table(columns, rows)),
+        curves([searched], unit.name),
+        parameters(change),
+        budget([*spent, ("in all", str(metrics["real_episodes"]))]),
+    ]
+    write_page(folder, answer, sections)

@@ -1,0 +1,128 @@
+"""The page of a run: its question, its answer in a sentence, what there is to see, and how it came about."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from markupsafe import Markup
+
+from gsl.report.footfalls import Walk, footfall_figure
+from gsl.report.joint_trace import Traces, joint_trace_figure
+from gsl.report.learning_curve import Search, learning_curve_figure
+from gsl.report.page import page
+from gsl.report.parts import Part, choice, command, element, facts, folded, prose, section, table
+from gsl.report.svg import WIDTH, svg
+from gsl.storage.artifact import Origin, origin
+from gsl.storage.hashing import PAGE, SHORT
+
+MARKS = {"good": "✓", "doubt": "?"}
+PARAMETERS = 40  # of a policy that are listed, the most changed first
+
+
+class Answer(NamedTuple):
+    """What comes first on a page.
+
+    Attributes:
+        question: What the run was to find out.
+        sentence: The answer, with its interval.
+        sure: Whether the answer is significant at 95 %.
+        more: Further sentences.
+    """
+
+    question: str
+    sentence: str
+    sure: bool
+    more: Sequence[str] = ()
+
+
+class Change(NamedTuple):
+    """A policy's parameters before and after, with their names and the size of a bold step, of equal length."""
+
+    names: Sequence[str]
+    before: Sequence[float]
+    after: Sequence[float]
+    scale: Sequence[float]
+
+
+def write_page(folder: Path, answer: Answer, sections: Sequence[Part]) -> None:
+    """Write the page of a run: the sections, and how it came about."""
+    kind = "good" if answer.sure else "doubt"
+    text = page(
+        "base.html",
+        [*sections, *describe_origin(origin())],
+        title=answer.sentence,
+        kind=kind,
+        mark=MARKS[kind],
+        kicker=answer.question,
+        headline=prose(answer.sentence),
+        summary=[prose(line) for line in answer.more],
+    )
+    (folder / PAGE).write_text(text, encoding="utf-8")
+
+
+def describe_origin(how: Origin | None) -> list[Part]:
+    """Return the sections with lineage, settings and command; none where no stage is at work."""
+    if how is None:
+        return []
+    rows = [(f"made from {one.role}", one.path, one.hash[:SHORT]) for one in how.parents]
+    rows += [(f"built {one.role}", one.path, one.hash[:SHORT]) for one in how.links]
+    typed = not how.command.endswith(")") or how.command.startswith("gsl.")
+    again = command(how.command) if typed else element("p", f"A part of {how.command.partition(' (')[0]}.")
+    settings = folded("all settings", element("pre", element("code", how.settings)))
+    return [
+        section(
+            "Lineage",
+            table(("role", "where", "contents"), rows) if rows else None,
+            note="Where it lies, as seen from this page. gsl lineage and gsl verify follow it to the first log.",
+        ),
+        section("How to repeat it", again, settings),
+    ]
+
+
+def curves(searches: Sequence[Search], unit: str) -> Markup | None:
+    """Return the section with the learning curves."""
+    drawn = [
+        svg(learning_curve_figure([one], unit=unit, width=WIDTH, among=searches), f"learning curve, {one.label}")
+        for one in searches
+    ]
+    note = (
+        "The best of each generation in simulation, and the same policies on the real side with 95 % intervals. "
+        "A cross marks a fall; hollow: it fell in a later test. The diamond was measured again on fresh episodes."
+    )
+    return section("Learning curves", element("div", *drawn, kind="panels"), note=note)
+
+
+def joints(traces: Mapping[str, Traces], note: str) -> Markup | None:
+    """Return the section with the traces of each joint, of which the reader chooses one."""
+    pictures = {
+        joint: svg(joint_trace_figure(one, joint, title="", width=WIDTH), f"traces of {joint}")
+        for joint, one in traces.items()
+    }
+    return section("Joint by joint", choice("joint", pictures), note=note)
+
+
+def footfalls(walks: Sequence[Walk]) -> Markup | None:
+    """Return the section with the footfall pattern of walks."""
+    drawn = svg(footfall_figure(walks, width=WIDTH), "footfall pattern") if walks else None
+    return section("Footfalls", drawn, note="A bar is the time in which a foot bears load.")
+
+
+def parameters(change: Change) -> Markup | None:
+    """Return the section with a policy's parameters before and after."""
+    names, before, after, scale = change
+    changes = [(b - a) / s if s else 0.0 for a, b, s in zip(before, after, scale, strict=True)]
+    order = list(range(len(names)))
+    if len(names) > PARAMETERS:
+        order = sorted(sorted(order, key=lambda k: -abs(changes[k]))[:PARAMETERS])
+    rows = [(names[k], f"{before[k]:.4g}", f"{after[k]:.4g}", f"{changes[k]:+.2f}") for k in order]
+    some = f" The {PARAMETERS} most changed of {len(names):,}." if len(names) > PARAMETERS else ""
+    note = f"A change is in steps of the search, which are equally bold in each parameter.{some}"
+    shown = table(("parameter", "π0", "returned", "change"), [[cell.replace("-", "−") for cell in row] for row in rows])
+    return section("The policy before and after", shown, note=note)
+
+
+def budget(pairs: Sequence[tuple[str, str]]) -> Markup | None:
+    """Return the section that says what real data were spent."""
+    return section("Real data", facts(pairs))
