@@ -9,6 +9,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any
 
+import gymnasium
 import numpy as np
 
 from gsl.core.interfaces import Policy, Simulator
@@ -64,7 +65,11 @@ class Sb3:
         trained = policy.network().model
         spaces = trained.observation_space, trained.action_space
         layout = simulator.layout
-        env: Any = DummyVecEnv(self.envs * [lambda: WiredEnv(simulator.env(), policy.wiring, layout, spaces)])
+
+        def wired() -> gymnasium.Env:
+            return WiredEnv(simulator.env(), policy.wiring, layout, spaces)
+
+        env: Any = DummyVecEnv(self.envs * [wired])
         if policy.normalise:
             env = VecNormalize.load(policy.normalise, env)
             env.training = False

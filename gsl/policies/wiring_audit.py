@@ -62,7 +62,7 @@ def audit(wiring: Wiring, ports: Ports, layout: Layout) -> Iterator[Finding]:
     parts, moves = wiring.parts(layout), wiring.moves(layout)
     yield Finding("names", f"{len(parts)} signals and {len(moves)} joints are in this world")
     yield _inputs(wiring, parts, ports.inputs)
-    yield _outputs(wiring, layout, ports.outputs)
+    yield _outputs(wiring, layout, ports)
     yield from _order(parts, moves)
     yield from _ranges(wiring, ports, layout)
 
@@ -81,8 +81,12 @@ def _inputs(wiring: Wiring, parts: tuple[Part, ...], inputs: int | None) -> Find
     return Finding("inputs", f"the network takes {inputs} numbers: {sizes}{times}")
 
 
-def _outputs(wiring: Wiring, layout: Layout, outputs: int | None) -> Finding:
+def _outputs(wiring: Wiring, layout: Layout, ports: Ports) -> Finding:
+    outputs = ports.outputs
     count = wiring.outputs(layout)
+    if layout.choices and ports.ends is not None:
+        problem = "the network acts within a range, but the actions of this world are choices"
+        return Finding("outputs", problem, "policy", refused=True)
     what = "choices" if layout.choices else "joints" if not layout.states else "actions"
     if outputs is None:
         return Finding("outputs", f"{count} {what} wait for outputs; the network does not say how many it has")
