@@ -21,3 +21,4 @@ from gsl.api.results import Verdict as Verdict
 from gsl.api.rolling import roll_out as roll_out
 from gsl.api.running import diagnose as diagnose
 from gsl.api.running import run as run
+from gsl.api.training_env import grounded_env as grounded_env

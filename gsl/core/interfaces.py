@@ -265,6 +265,10 @@ class Search(Protocol):
 class Simulator(Protocol):
     """The simulator, grounded, as a learner sees it."""
 
+    @property
+    def layout(self) -> Layout:
+        """What an observation holds, and what an action is."""
+
     def env(self) -> gymnasium.Env:
         """Return a gymnasium environment that rewards what the task rewards."""
 

@@ -40,8 +40,12 @@ def _of_environment(name: str) -> str:
     return name.partition(":")[0] if ":" in name else ""
 
 
-_MODULE: Mapping[str, Callable[[str], str]] = {TARGET: _of_class, "robot": _of_robot, "env_id": _of_environment}
+_MODULE: Mapping[str, Callable[[str], str]] = {
+    TARGET: _of_class, "robot": _of_robot, "env_id": _of_environment, "function": _of_environment,
+}  # fmt: skip
 """Settings that name code, and the module in such a name; an empty one imports nothing."""
+_PICKLES: Mapping[str, str] = {"gsl.policies.sb3.Sb3Policy": "stable_baselines3"}
+"""Components whose files hold pickles, which run code as they are read, and the library that has to be trusted."""
 
 
 def code_in(told: Any, where: str = "") -> Iterator[tuple[str, str, str]]:
@@ -52,6 +56,8 @@ def code_in(told: Any, where: str = "") -> Iterator[tuple[str, str, str]]:
         entries = [(str(index), value) for index, value in enumerate(told)]
     else:
         return
+    if isinstance(told, Mapping) and (library := _PICKLES.get(str(told.get(TARGET)))):
+        yield f"{where}.file".lstrip("."), str(told.get("file")), library
     labels = isinstance(told, Mapping) and str(told.get(TARGET)).startswith(_LABELS)
     for key, value in entries:
         path = f"{where}.{key}".lstrip(".")

@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from gsl.core.layout import Layout
 from gsl.core.table import Table
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
@@ -28,6 +29,11 @@ class GroundedSimulator:
 
     scenario: Scenario
     parameters: np.ndarray
+
+    @property
+    def layout(self) -> Layout:
+        """What an observation holds, and what an action is."""
+        return self.scenario.world.layout
 
     def env(self) -> gymnasium.Env:
         """Return a gymnasium environment."""

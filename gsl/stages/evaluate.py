@@ -28,7 +28,7 @@ from gsl.rollout.returns import falls, gain, mean, row, summary
 from gsl.rollout.rollout import Scenario
 from gsl.storage.documents import write_json
 from gsl.storage.policies import PolicyRecord, write_policies
-from gsl.storage.policy_choice import EVALUATION, FILE, policies, records, vector
+from gsl.storage.policy_choice import EVALUATION, FILE, policies, record, records, vector
 from gsl.storage.references import resolve
 from gsl.validation.uncharged import warn_uncharged
 from gsl.worlds.external import ExternalRobot
@@ -64,7 +64,7 @@ class Evaluate:
     world: Annotated[World, setting("the real world")]
     task: Annotated[Task, setting("what is measured")]
     policy: Annotated[Policy, setting("family of the policies")]
-    policies: Annotated[str, setting("policies file or optimize artifact")]
+    policies: Annotated[str | None, setting("policies file or optimize artifact; null for π0 alone")]
     episodes: Annotated[int, setting("episodes of each policy for the choice", ge=1)]
     check: Annotated[int, setting("more episodes of the fastest stable policy, which has to stay so", ge=1)]
     confirmation: Annotated[int, setting("fresh episodes of the chosen policy and of the baseline", ge=2)]
@@ -79,13 +79,14 @@ class Evaluate:
 
     def parents(self) -> Mapping[str, Path]:
         """Return where the policies come from, and what a robot somewhere else has answered."""
-        return {"policies": resolve(self.policies), **answer_parents(self.world)}
+        source = {"policies": resolve(self.policies)} if self.policies else {}
+        return {**source, **answer_parents(self.world)}
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the table of all policies and the chosen one."""
         if getattr(self.world, "action_noise", 0.0):
             warn_uncharged(self.world, console, REAL, "the world's noise")
-        found = records(self.policy, self.policies)
+        found = records(self.policy, self.policies) if self.policies else [self._start]
         measure = partial(self._measure, console=console)
         tried = measure(found, _CHOICE, self.episodes)
         checked = dict(self._check(found, tried, measure))
@@ -120,6 +121,10 @@ class Evaluate:
         change = Change(self.policy.names, first, chosen, self.policy.scale.tolist())
         write_evaluation_page(folder, metrics, document, change, Unit.of(self.task))
         return metrics
+
+    @property
+    def _start(self) -> PolicyRecord:
+        return record(self.policy, "pi0", self.policy.initial)
 
     def _check(
         self, found: Sequence[PolicyRecord], tried: Sequence[list[Episode]], measure: Callable[..., list[list[Episode]]]

@@ -110,7 +110,7 @@ def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parame
         walk = _walk(scenario, these, seed)
         walks.append(read_footfalls(f"{name} in the grounded simulator", walk))
     if not missing(walk, grounded.layout):
-        walk_strip(robot, walk, folder / WALK)
+        _draw_walk(robot, Shot("returned policy", "in the grounded simulator", walk, GROUNDED), folder)
     caption = "A real motion in the air that nothing was learned from; both simulators play its commands."
     return Seen(traces, [one for one in walks if one], caption)
 
@@ -119,16 +119,11 @@ def _walk(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:
     env = scenario.make()
     walk = rollout(scenario, env, parameters, derive_seed(seed, WALK))
     env.close()
-<<<<<<< HEAD
-    if not missing(walk, grounded.layout):
-        _draw_walk(robot, Shot("returned policy", "in the grounded simulator", walk, GROUNDED), folder)
+    return walk
 
 
 def _draw_walk(robot: Robot, shot: Shot, folder: Path) -> None:
     film(robot, robot.controlled, [shot], folder / WALK)
-=======
-    return walk
->>>>>>> page
 
 
 def read_footfalls(label: str, walk: Trajectory) -> Walk | None:

@@ -133,7 +133,10 @@ def _iterations(named: Path) -> list[Path]:
 
 def _source(evaluation: Path) -> Path:
     """Return the policies that an evaluation has measured, if they still are what they were."""
-    made_from = {one.role: one for one in manifest.read(evaluation).parents}[ROLE]
+    parents = {one.role: one for one in manifest.read(evaluation).parents}
+    if ROLE not in parents:
+        raise ArtifactError(evaluation, "measured one policy alone, so that there is nothing to rank")
+    made_from = parents[ROLE]
     source = Path(os.path.normpath(evaluation / made_from.path))
     if not source.exists():
         raise ArtifactError(source, f"is gone, but {evaluation} has measured its policies; evaluate again")

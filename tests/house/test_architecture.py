@@ -31,9 +31,17 @@ COMPOSING = ("composer", "multirun", "own_word", "yaml_files")
 ONLY = {
     "hydra": tuple(f"commandline/{name}.py" for name in COMPOSING),
     "pybullet": ("worlds/engine.py", "worlds/camera.py"),
-    "torch": ("models/fitting.py", "models/multi_step.py", "optimizers/trpo.py"),
+    "torch": (
+        "models/fitting.py",
+        "models/multi_step.py",
+        "optimizers/trpo.py",
+        "optimizers/sb3.py",
+        "policies/torchscript.py",
+        "policies/sb3.py",
+    ),
     "sb3_contrib": ("optimizers/trpo.py",),
-    "stable_baselines3": ("optimizers/trpo.py",),
+    "stable_baselines3": ("optimizers/trpo.py", "optimizers/sb3.py"),
+    "onnxruntime": ("policies/onnx.py",),
     "mujoco": ("worlds/mujoco.py",),
     "cma": ("optimizers/cma_es.py",),
 }

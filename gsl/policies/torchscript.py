@@ -1,0 +1,95 @@
+"""A policy as TorchScript, as Isaac Lab, rsl_rl, legged_gym and mjlab export it; it runs no Python of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from gsl.core.setting import component, setting
+from gsl.errors import ConfigError
+from gsl.policies.outside import File, Joints, Network, Outside, Ports, files_of, read_once
+from gsl.policies.wired import Answer
+from gsl.policies.wiring import Wiring
+
+
+@component
+class TorchScriptPolicy(Outside):
+    """A module that maps observations, shape (1, n_inputs), to outputs, shape (1, n_outputs), in single precision.
+
+    One with a memory has a method `reset`, which is called at the beginning of an episode.
+    """
+
+    file: File
+    wiring: Annotated[Wiring, setting("what it observes, and what its outputs do")] = field(default_factory=Wiring)
+    joints: Joints = ()
+
+    @property
+    def name(self) -> str:
+        """What errors call the network."""
+        return self.file
+
+    @property
+    def read_files(self) -> Mapping[str, Path]:
+        """What it is read from."""
+        return files_of(file=self.file)
+
+    def network(self) -> Network:
+        """Read the module, once a process."""
+        network: Network = read_once(TorchScript, self.file)
+        return network
+
+
+class TorchScript:
+    """A module that was read."""
+
+    def __init__(self, path: Path) -> None:
+        import torch
+
+        try:
+            load: Any = torch.jit.load
+            self._module: Any = load(str(path), map_location="cpu").eval()
+        except (RuntimeError, ValueError) as error:
+            advice = "write it with torch.jit.script(module).save(file)"
+            raise ConfigError(
+                "policy.file", f"is no TorchScript: {_first_line(error)}; {advice}", given=str(path)
+            ) from error
+        self._torch, self._where = torch, str(path)
+
+    @property
+    def ports(self) -> Ports:
+        """The width of its first and last linear layer, where these can be seen."""
+        matrices = [one for _, one in self._module.named_parameters() if one.dim() == 2]
+        if self._remembers or not matrices:
+            return Ports(None, None)
+        return Ports(int(matrices[0].shape[1]), int(matrices[-1].shape[0]))
+
+    @property
+    def _remembers(self) -> bool:
+        return hasattr(self._module, "reset")
+
+    def begin(self) -> Answer:
+        """Return it with an empty memory."""
+        if self._remembers:
+            self._module.reset()
+        return self._answer
+
+    def _answer(self, observation: np.ndarray) -> np.ndarray:
+        with self._torch.inference_mode():
+            try:
+                outputs = self._module(self._torch.from_numpy(observation.astype(np.float32)[None]))
+            except RuntimeError as error:
+                problem = f"cannot take {len(observation)} numbers: {_last_line(error)}"
+                raise ConfigError("policy.wiring.observation", problem, given=self._where) from error
+            return np.asarray((outputs[0] if isinstance(outputs, tuple) else outputs).numpy())
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().partition("\n")[0]
+
+
+def _last_line(error: Exception) -> str:
+    return str(error).strip().rpartition("\n")[2]
