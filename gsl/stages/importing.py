@@ -15,10 +15,11 @@ from gsl.report.importing import report, tables
 from gsl.storage import documents
 from gsl.storage.importers.assembly import Episode, episodes, list_unmatched
 from gsl.storage.importers.mapping import Mapping as LogMapping
-from gsl.storage.importers.places import Place, locate, places
+from gsl.storage.importers.places import Place, locate
 from gsl.storage.importers.reading import raw_episodes
 from gsl.storage.importers.signal import KNOWN
 from gsl.storage.importers.sizes import GB
+from gsl.storage.importers.source import Source, list_files, look_at
 from gsl.storage.trajectories import write
 
 FILE = "trajectories.parquet"
@@ -45,27 +46,25 @@ class Import:
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""
-        paths = {f"{one.name}/{role}".rstrip("/"): path for one in self._places() for role, path in one.files.items()}
-        files = {
-            name if file == path else f"{name}/{file.name}": file
-            for name, path in paths.items()
-            for file in ([path] if path.is_file() else sorted(path.iterdir()))
-        }
+        files = list_files(self._source(), self.mapping, self.memory * GB)
         alone = len(files) == 1
         return {"source" if alone else f"source {name}": file for name, file in files.items()}
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write one parquet file, and what was found as a document."""
-        chosen = self._places()
-        found = [one for place in self._progress(chosen, console) for one in self._episodes(place, console)]
+        chosen = look_at(self._source(), self.mapping, self.memory * GB)
+        found = [
+            one for place in self._progress(chosen, console) for one in self._episodes(place, chosen.mapping, console)
+        ]
         told = self._describe(found, chosen)
         if told["refused"] and not self.accept:
             more = f" (and {len(told['refused']) - 1} more, see --check)" if len(told["refused"]) > 1 else ""
             raise InputError(f"{self._source()}: {told['refused'][0]}{more}; accept=true takes it as it is")
-        for line in [*told["refused"], *told["warnings"]]:
-            console.status(f"warning: {line}")
+        for kind, lines in (("note", told["notes"]), ("warning", [*told["refused"], *told["warnings"]])):
+            for line in lines:
+                console.status(f"{kind}: {line}")
         documents.write_json(folder / REPORT, told)
-        write(folder / FILE, self._batch(found, told))
+        write(folder / FILE, self._batch(found, told, chosen.mapping))
         return {key: told[key] for key in ("files", "control_period", "time", "velocity", "warnings")} | {
             "episodes": len(found),
             "joints": list(found[0].joints),
@@ -75,19 +74,24 @@ class Import:
 
     def look(self, console: Console) -> dict[str, Any]:
         """Say what `run` would do, and return it with the exit code that it would have."""
-        chosen, found, problems = self._places(), list[Episode](), list[str]()
+        chosen = look_at(self._source(), self.mapping, self.memory * GB)
+        found, problems = list[Episode](), list[str]()
         for place in self._progress(chosen, console):
             try:
-                found += self._episodes(place, console)
+                found += self._episodes(place, chosen.mapping, console)
             except ConfigError:
                 raise
             except InputError as error:
                 problems.append(str(error))
-        told = self._describe(found, chosen) if found else {"refused": [], "warnings": []}
+        told = self._describe(found, chosen) if found else {"refused": [], "warnings": [], "notes": chosen.notes}
         for table in tables(told) if found else ():
             console.table(*table)
         refused = [*problems, *([] if self.accept else told["refused"])]
-        lines = [*(f"refused: {line}" for line in refused), *(f"warning: {line}" for line in told["warnings"])]
+        lines = [
+            *(f"note: {line}" for line in told["notes"]),
+            *(f"refused: {line}" for line in refused),
+            *(f"warning: {line}" for line in told["warnings"]),
+        ]
         if found:
             lines += [f"{told['time']}; velocities {told['velocity']}; control period {told['control_period']:g} s"]
         lines += [f"would be refused ({len(refused)}); nothing is written" if refused else "nothing is written"]
@@ -105,43 +109,39 @@ class Import:
             raise ConfigError("source", "has no value yet; say source=... (a file, a folder or a pattern)")
         return locate(source)
 
-    def _places(self) -> list[Place]:
-        return places(self._source(), self.mapping.files)
-
-    def _progress(self, chosen: list[Place], console: Console) -> Any:
-        with console.progress(len(chosen), "reading logs") as progress:
-            for place in chosen:
+    def _progress(self, chosen: Source, console: Console) -> Any:
+        with console.progress(len(chosen.places), "reading logs") as progress:
+            for place in chosen.places:
                 yield place
                 progress.advance()
 
-    def _episodes(self, place: Place, console: Console) -> list[Episode]:
+    def _episodes(self, place: Place, mapping: LogMapping, console: Console) -> list[Episode]:
         for path in place.files.values():
             if path.is_file() and (size := path.stat().st_size) > LARGE:
                 console.status(f"reading {path}, {size / GB:.2g} GB; with {self.memory:g} GB of memory at most")
         checkpoint()
-        return [
-            one for raw in raw_episodes(place, self.mapping, self.memory * GB) for one in episodes(raw, self.mapping)
-        ]
+        return [one for raw in raw_episodes(place, mapping, self.memory * GB) for one in episodes(raw, mapping)]
 
-    def _describe(self, found: list[Episode], chosen: list[Place]) -> dict[str, Any]:
+    def _describe(self, found: list[Episode], chosen: Source) -> dict[str, Any]:
         first = found[0]
         for one in found:
             if one.joints != first.joints or one.trajectory.sensors.keys() != first.trajectory.sensors.keys():
                 problem = f"has other joints or signals than {first.label['file']}; import it alone"
                 raise TrajectoryError(one.label["file"], problem)
-        files, period = sum(len(place.files) for place in chosen), self.mapping.period
+        files = len({path for place in chosen.places for path in place.files.values()})
+        period = self.mapping.period
         kept = f"resampled to {period:g} s (positions linearly, commands held)" if period else "rows kept as logged"
         derived = sum(one.derived for one in found)
         which = "" if derived in (0, len(found)) else f" in {derived} of {len(found)} episodes"
         velocity = f"derived from positions{which}" if derived else "as logged"
         told = report(found, files, period)
         warnings = [*told["warnings"], *list_unmatched(found, self.mapping)]
-        return {**told, "warnings": warnings, "time": kept, "velocity": velocity}
+        return {**told, "warnings": warnings, "notes": chosen.notes, "time": kept, "velocity": velocity}
 
-    def _batch(self, found: list[Episode], told: Mapping[str, Any]) -> Batch:
-        own = {name: signal.unit for name, signal in self.mapping.signals.items() if name not in KNOWN}
+    def _batch(self, found: list[Episode], told: Mapping[str, Any], mapping: LogMapping) -> Batch:
+        own = {name: signal.unit for name, signal in mapping.signals.items() if name not in KNOWN}
         about = {
-            "robot": self.mapping.robot,
+            "robot": mapping.robot,
             "role": "imported",
             "source": "gsl import",
             "units": own,

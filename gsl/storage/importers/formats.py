@@ -12,13 +12,15 @@ from gsl.storage.importers.json_table import LINES, JsonTable
 from gsl.storage.importers.parquet_table import ParquetTable
 from gsl.storage.importers.table import Table, check_columns
 from gsl.storage.importers.text_table import TextTable
+from gsl.storage.lerobot.dataset import Entry
+from gsl.storage.lerobot.episode_table import EpisodeTable
 
 TEXT, DOCUMENTS, BAGS = (".csv", ".tsv", ".txt"), (".json", *LINES), (".mcap", ".db3", ".bag")
 PACKED = tuple(f"{end}.gz" for end in (*TEXT, *DOCUMENTS))
 ENDS = (*TEXT, *DOCUMENTS, *PACKED, ".npz", ".parquet", *BAGS)
 
 
-def table(path: Path, *, topic: str, records: str, memory: float) -> Table:
+def table(path: Path, *, topic: str, records: str, memory: float, entry: Entry | None = None) -> Table:
     """Return the table in a file, of which nothing but names is read yet.
 
     Args:
@@ -26,10 +28,13 @@ def table(path: Path, *, topic: str, records: str, memory: float) -> Table:
         topic: Of a bag.
         records: Of a JSON document: path of its list of rows.
         memory: That reading it may take [bytes].
+        entry: Of a LeRobot data set, if the file is one of its.
 
     Raises:
         InputError: The format is unknown, or the file is empty, damaged or too large.
     """
+    if entry is not None:
+        return EpisodeTable(entry, memory)
     if is_bag(path):
         return BagTable(path, topic, memory)
     if not path.stat().st_size:

@@ -74,6 +74,13 @@ class Mapping:
     longest_gap: Annotated[float, setting("periods without a row, above which an episode is cut in two", gt=1)] = 10.0
     duplicates: Annotated[Literal["refuse", "drop"], setting("what to do with a stamp that comes twice")] = "refuse"
     blanks: Annotated[Literal["refuse", "skip"], setting("whether an empty cell is a mistake, or no news")] = "refuse"
+    angles: Annotated[
+        Literal["deg", "rad", "percent"] | None,
+        setting("LeRobot: what angles are in, percent being -100 to 100 of a joint's range; seen in the data if null"),
+    ] = None
+    calibration: Annotated[str | None, setting("LeRobot: the arm's calibration file, which has the joints' ranges")] = (
+        None
+    )
     name: Annotated[str, setting("name of an episode's motion, such as {motion}; that of its file if none")] = ""
     path: Annotated[str, setting("pattern of an episode's path, such as {date}/{motion}, whose parts are fields")] = ""
     about: Annotated[dict[str, Any], setting("what else is known of an episode: values, or {field} of its file")] = (

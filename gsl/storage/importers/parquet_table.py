@@ -23,15 +23,9 @@ class ParquetTable:
     first_line: int | None = None
 
     def __init__(self, path: Path, memory: float) -> None:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         self.path, self.memory = path, memory
         self.fields: Mapping[str, Any] = {}
-        try:
-            self.names: Sequence[str] = list(pq.read_schema(path).names)
-        except (pa.ArrowException, OSError) as error:
-            raise TrajectoryError(path, "is not a parquet file, or truncated or damaged; copy it again") from error
+        self.names: Sequence[str] = names_of(path)
 
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return the wanted columns."""
@@ -49,10 +43,26 @@ class ParquetTable:
             raise TrajectoryError(self.path, "is truncated or damaged; copy it again") from error
         if not table.num_rows:
             raise TrajectoryError(self.path, "has no rows; log it again")
-        return {name: _values(self.path, name, table.column(name)) for name in wanted}
+        return {name: convert(self.path, name, table.column(name)) for name in wanted}
 
 
-def _values(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:
+def names_of(path: Path) -> list[str]:
+    """Return the columns of a file.
+
+    Raises:
+        TrajectoryError: It is no parquet file, or damaged.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return list(pq.read_schema(path).names)
+    except (pa.ArrowException, OSError) as error:
+        raise TrajectoryError(path, "is not a parquet file, or truncated or damaged; copy it again") from error
+
+
+def convert(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:
+    """Return a column's numbers, truth values, stamps or texts (T,), or its lists of numbers (T, n)."""
     import pyarrow as pa
 
     kind = column.type

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from gsl.core.budget import within
 from gsl.errors import ConfigError, InputError
 from gsl.storage.importers.formats import ENDS, is_bag, readable, stem
+from gsl.storage.lerobot.dataset import Entry
 from gsl.version import PACKAGE
 
 HOME = PACKAGE.parent
@@ -24,10 +25,12 @@ class Place(NamedTuple):
     Attributes:
         name: Path below the source, without the end that tells the format.
         files: By role; the only one has the role "".
+        entry: Which episode of a LeRobot data set it is, if it is of one.
     """
 
     name: str
     files: Mapping[str, Path]
+    entry: Entry | None = None
 
 
 def locate(source: str) -> str:

@@ -106,7 +106,13 @@ def _episodes(place: Place, mapping: LogMapping, tables: Mapping[str, Table]) ->
 def _tables(place: Place, mapping: LogMapping, memory: float) -> dict[str, Table]:
     roles = dict.fromkeys(one.file for one in mapping.signals.values())
     return {
-        role: table(place.files.get(role) or place.files[""], topic=role, records=mapping.records, memory=memory)
+        role: table(
+            place.files.get(role) or place.files[""],
+            topic=role,
+            records=mapping.records,
+            memory=memory,
+            entry=place.entry,
+        )
         for role in roles
     }
 

@@ -1,0 +1,79 @@
+"""What a source holds: the places of its episodes, the files that are read, and the mapping that reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from gsl.errors import ConfigError, InputError
+from gsl.storage.importers.mapping import Mapping as LogMapping
+from gsl.storage.importers.places import Place, places
+from gsl.storage.lerobot.dataset import find_data_set, is_data_set, open_data_set
+from gsl.storage.lerobot.own_mapping import own_mapping
+
+PLAIN = "position.{joint}"  # where positions are in files in our own words, and so in none of LeRobot's
+
+
+class Source(NamedTuple):
+    """A source that has been looked at.
+
+    Attributes:
+        places: Of its episodes, in order.
+        mapping: What was asked for, or what a data set gives by itself.
+        notes: What that takes for granted.
+    """
+
+    places: list[Place]
+    mapping: LogMapping
+    notes: list[str]
+
+
+def look_at(source: str, mapping: LogMapping, memory: float) -> Source:
+    """Return the episodes of a source and how to read them.
+
+    Args:
+        source: A file, a folder, a pattern, or the folder of a LeRobot data set.
+        mapping: Asked for; one in our own words lets a data set speak for itself.
+        memory: That reading may take [bytes].
+
+    Raises:
+        InputError: There is nothing, or what there is cannot be read.
+    """
+    folder = Path(source)
+    if is_data_set(folder):
+        data = open_data_set(folder, memory)
+        notes: list[str] = []
+        if mapping.signals["position"].column == PLAIN:
+            mapping, notes = own_mapping(data, mapping, memory)
+        name = folder.resolve().name
+        return Source([Place(f"{name}/{one.name}", {"": one.file}, one) for one in data.episodes], mapping, notes)
+    for key in ("angles", "calibration"):
+        if getattr(mapping, key) is not None:
+            raise ConfigError(f"mapping.{key}", f"is for LeRobot data sets; {source} has no meta/info.json")
+    inside = find_data_set(folder / "x")
+    if inside is not None and mapping.signals["position"].column == PLAIN:
+        raise InputError(f"source = {source}: is a part of a LeRobot data set; say source={_short(inside)}, its folder")
+    return Source(places(source, mapping.files), mapping, [])
+
+
+def list_files(source: str, mapping: LogMapping, memory: float) -> Mapping[str, Path]:
+    """Return the files that are read, by a name below the source."""
+    folder = Path(source)
+    if is_data_set(folder):
+        return {path.relative_to(folder).as_posix(): path for path in open_data_set(folder, memory).files}
+    paths = {
+        f"{one.name}/{role}".rstrip("/"): path
+        for one in places(source, mapping.files)
+        for role, path in one.files.items()
+    }
+    return {
+        name if file == path else f"{name}/{file.name}": file
+        for name, path in paths.items()
+        for file in ([path] if path.is_file() else sorted(path.iterdir()))
+    }
+
+
+def _short(folder: Path) -> str:
+    here = Path.cwd()
+    return str(folder.relative_to(here)) if folder.is_relative_to(here) else str(folder)
