@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -126,28 +127,40 @@ def build(
             os.utime(out / manifest.NAME)
             if (replaced := complete(out)) is not None:
                 shutil.rmtree(replaced)
-            _note(existing)
+            note(existing)
             return existing
         if (left := complete(out)) is not None and (same := _intact(left, identity.key)) is not None:
             install(left, out)
-            return _note(Artifact(out, same))
+            return note(Artifact(out, same))
         progress, kept = getattr(stage, "progress", ""), getattr(stage, "kept", ())
         with workplace(out, identity.key, progress=progress, kept=kept) as folder:
             made = _work(stage, identity, config, folder, command, console)
             manifest.write(folder, made)
             flush_tree(folder)
             install(folder, out)
-    return _note(Artifact(out, made))
+    return note(Artifact(out, made))
 
 
 _built: ContextVar[dict[Path, Artifact] | None] = ContextVar("built", default=None)
 """What the stage that is at work has built beside itself, by absolute path."""
 
 
-def _note(artifact: Artifact) -> Artifact:
+def note(artifact: Artifact) -> Artifact:
+    """Note an artifact as a link of the stage that is at work."""
     if (built := _built.get()) is not None:
         built[artifact.folder.absolute()] = artifact
     return artifact
+
+
+@contextmanager
+def collect_links() -> Iterator[Mapping[Path, Artifact]]:
+    """Within, the artifacts that are built or are there already are collected, by absolute path."""
+    links: dict[Path, Artifact] = {}
+    token = _built.set(links)
+    try:
+        yield links
+    finally:
+        _built.reset(token)
 
 
 def _intact(folder: Path, key: str) -> Manifest | None:
@@ -191,12 +204,8 @@ def _work(
     (folder / CONFIG).write_text(settings, encoding="utf-8")
     with log_to(folder) as logger:
         logger.info("%s begins: %s", identity.kind, command)
-        links: dict[Path, Artifact] = {}
-        token = _built.set(links)
-        try:
+        with collect_links() as links:
             metrics = stage.run(folder, console)
-        finally:
-            _built.reset(token)
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
     documents.write_json(folder / METRICS, metrics)
