@@ -34,6 +34,7 @@ from gsl_experiments.effort import check_search, seconds
 from gsl_experiments.held_out import MEASURED, check_first_iteration, check_robot, held_out, starts
 from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl_experiments.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
+from gsl_experiments.tasks import in_order
 
 TABLE, DATA, FIGURE = "table.md", "points.json", "budget.png"
 NONE = "none"
@@ -111,10 +112,12 @@ class Budget:
         keys = self.recipes
         ledger.announce({key: method for (_, method, _), key in keys.items()}, self._seconds)
         ledger.judge({key: {"trial": k, "method": name, "trajectories": n} for (k, name, n), key in keys.items()})
-        for (number, method, count), key in keys.items():
+        missing: dict[int, list[tuple[int, str, int]]] = {}
+        for item, key in keys.items():
             if not ledger.take(key):
-                with console.part(f"{method}, {count} trajectories, trial {number}"):
-                    ledger.add(key, [self._point(home, method, count, number, console)._asdict()])
+                missing.setdefault(item[0], []).append(item)
+        for item, points in in_order(self, folder, missing, console):
+            ledger.add(keys[item], [point._asdict() for point in points])
         points = [Point(**row) for row in ledger.figures]
         self.tell(folder, points, ledger.close(folder / DATA))
         return {"points": len(points)}
@@ -143,6 +146,12 @@ class Budget:
         return replace(
             self.iterate, budget=replace(self.iterate.budget, real_episodes=own, real_neighbours=count - own)
         )
+
+    def results(self, home: Path, item: tuple[int, str, int], console: Console) -> list[Point]:
+        """Return the point of a method and budget in a trial."""
+        number, method, count = item
+        with console.part(f"{method}, {count} trajectories, trial {number}"):
+            return [self._point(home, method, count, number, console)]
 
     def _point(self, home: Path, method: str, count: int, number: int, console: Console) -> Point:
         name, seed = f"trial_{number:02d}", self.iterate.seed + number - 1

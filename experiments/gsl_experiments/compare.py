@@ -31,6 +31,7 @@ from gsl_experiments.comparison_table import markdown
 from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl_experiments.paper_cells import worth
 from gsl_experiments.sizes import First, PresetName, numbers, sizes_of, trials_of
+from gsl_experiments.tasks import in_order
 from gsl_experiments.trial import Cell, Trial
 from gsl_experiments.trials_picture import trials_figure
 from gsl_experiments.tried import foretelling, read_tried
@@ -121,15 +122,12 @@ class Compare:
         ledger.announce({key: cell.method for (_, cell), key in keys.items()}, seconds)
         iterations = list(range(1, self.iterate.iterations + 1))
         ledger.judge({key: {"number": k, **cell._asdict(), "iteration": iterations} for (k, cell), key in keys.items()})
+        missing: dict[int, list[tuple[int, Cell]]] = {}
         for (number, cell), key in keys.items():
-            if ledger.take(key):
-                continue
-            trials, part = [], f"{cell.worlds}, {cell.method}, trial {number}"
-            with console.part(part):
-                for trial in self._trial(home, simulators[cell.simulator], cell, number, console):
-                    trials.append(trial)
-                    console.status(f"{part}: {trial.told(Unit.of(self.iterate.task))}")
-            ledger.add(key, [trial._asdict() for trial in trials])
+            if not ledger.take(key):
+                missing.setdefault(number, []).append((number, cell))
+        for item, trials in in_order(self, folder, missing, console):
+            ledger.add(keys[item], [trial._asdict() for trial in trials])
         return [Trial.read(row) for row in ledger.figures], ledger.close(folder / DATA)
 
     @property
@@ -147,6 +145,15 @@ class Compare:
     @property
     def _simulators(self) -> Mapping[str, World]:
         return self.simulators or {"": self.iterate.sim}
+
+    def results(self, home: Path, item: tuple[int, Cell], console: Console) -> Iterator[Trial]:
+        """Yield a trial of a cell, iteration by iteration."""
+        number, cell = item
+        part = f"{cell.worlds}, {cell.method}, trial {number}"
+        with console.part(part):
+            for trial in self._trial(home, self._simulators[cell.simulator], cell, number, console):
+                console.status(f"{part}: {trial.told(Unit.of(self.iterate.task))}")
+                yield trial
 
     def _trial(self, home: Path, sim: World, cell: Cell, number: int, console: Console) -> Iterator[Trial]:
         """Yield a trial iteration by iteration."""

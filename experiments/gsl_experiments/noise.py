@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import partial
@@ -11,6 +10,7 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
+from gsl.core.console import Console
 from gsl.core.interfaces import REAL, SIM, Grounding, Search, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import seed_of_round
@@ -22,9 +22,8 @@ from gsl.grounding.effects import evidence_of, is_learned
 from gsl.grounding.none import NoGrounding
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.policy import size
-from gsl.report.console import Console
 from gsl.report.study_page import write_study_page
-from gsl.rollout.parallel import Workers, arriving
+from gsl.rollout.parallel import Workers
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.optimize import BEST
@@ -34,6 +33,7 @@ from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl_experiments.noise_bars import Bars, noise_bars
 from gsl_experiments.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl_experiments.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
+from gsl_experiments.tasks import side_by_side
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,11 +98,9 @@ class NoiseStudy:
         keys = self.recipes
         ledger.announce({key: f"trial {number}" for number, key in keys.items()})
         ledger.judge({key: {"trial": number} for number, key in keys.items()})
-        known = {number for number, key in keys.items() if ledger.take(key)}
-        jobs = [(number, home) for number in keys if number not in known]
-        with console.progress(len(jobs), "trials") as progress:
-            for index, found in arriving(_trial, self, jobs, self.workers, progress):
-                ledger.add(keys[jobs[index][0]], [one._asdict() for one in found])
+        missing = {number: [number] for number, key in keys.items() if not ledger.take(key)}
+        for number, points in side_by_side(self, folder, missing, self.workers, console):
+            ledger.add(keys[number], [point._asdict() for point in points])
         points = [Point(**row) for row in ledger.figures]
         self.tell(folder, points, ledger.close(folder / DATA))
         return {"points": len(points)}
@@ -161,9 +159,9 @@ class NoiseStudy:
     def _rounds(self) -> range:
         return range(1, self.iterate.iterations + 1)
 
-    def trial(self, number: int, home: Path) -> list[Point]:
-        """Return all points of a trial, built below `home`."""
-        seed, console = self.iterate.seed + number - 1, Console(json=True)
+    def results(self, home: Path, number: int, console: Console) -> list[Point]:
+        """Return all points of a trial."""
+        seed = self.iterate.seed + number - 1
         name, points = f"trial_{number:02d}", list[Point]()
         for world, noise in product(self.worlds, self.noises):
             real, sim = replace(self.worlds[world], action_noise=noise), self.sims.get(world)
@@ -176,9 +174,9 @@ class NoiseStudy:
                 place = below / method / name
                 first = place if is_learned(grounding) else alone / method / name
                 of = partial(Point, world, noise, method, number)
-                points += self._carried_out(of, at, grounding, first, place, start, seed)
+                points += self._carried_out(of, at, grounding, first, place, start, seed, console)
             of, place = partial(Point, world, noise, REFERENCE, number), below / "real" / name
-            for one in self._carried_out(of, replace(at, sim=real), NoGrounding(), place, place, start, seed):
+            for one in self._carried_out(of, replace(at, sim=real), NoGrounding(), place, place, start, seed, console):
                 spent = one.round * self.further.taken if isinstance(self.further, Trpo) else None
                 points.append(one._replace(real_steps=spent))
         return points
@@ -192,9 +190,10 @@ class NoiseStudy:
         place: Path,
         start: str,
         seed: int,
+        console: Console,
     ) -> Iterator[Point]:
         """Yield the rounds of a method, built at `place`, but the first search at `first`, which worlds may share."""
-        home, console, spent, choice, promised = place, Console(json=True), 0, 0, None
+        home, spent, choice, promised = place, 0, 0, None
         for number in self._rounds:
             if number > 1:
                 first = place = home / f"iteration_{number:02d}"
@@ -249,8 +248,3 @@ def _steps(place: Path) -> int:
 def _choice_steps(evaluation: Path) -> int:
     told = json.loads((evaluation / EVALUATION).read_text(encoding="utf-8"))
     return round(sum(one["episodes"] * one["outcome"]["steps"] for one in [*told["policies"], *told["check"]]))
-
-
-def _trial(frozen: bytes, job: tuple[int, Path]) -> list[Point]:
-    study: NoiseStudy = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
-    return study.trial(*job)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -21,8 +22,12 @@ from gsl.core.described import describe, rebuilt
 from gsl.core.setting import component, setting
 from gsl.core.trust import TRUST, check_code
 from gsl.core.validation import make
+from gsl.errors import ConfigError
+from gsl.rollout.cluster import Cluster, executing
+from gsl.storage.identity import flat
 
 RUNS = Path("runs")
+WORKERS = "workers"  # setting of whatever rolls out or runs trials
 LONGEST = 200  # bytes of a folder's name; file systems take 255, and temporary folders have longer ones
 
 
@@ -42,6 +47,13 @@ def _own_folder(out: str | None) -> str | None:
     return out
 
 
+def _scheduler(address: str | None) -> str | None:
+    """Return the address of a dask scheduler."""
+    if address is not None and not re.fullmatch(r"(tcp|tls|ucx|wss?)://[^/\s]+:\d{1,5}", address):
+        raise ValueError("must be the address that `dask scheduler` prints, such as tcp://host:8786")
+    return address
+
+
 @component
 class CommandSettings:
     """What a command does with its stage, as opposed to what the stage does."""
@@ -52,6 +64,24 @@ class CommandSettings:
     trust: Annotated[
         tuple[str, ...], setting("modules of your own whose code files may name"), BeforeValidator(modules_of)
     ] = ()
+    executor: Annotated[
+        Literal["local", "dask"], setting("who does rollouts and trials: processes of this machine, or a dask cluster")
+    ] = "local"
+    address: Annotated[
+        str | None,
+        setting("of the dask scheduler, such as tcp://host:8786; without it, a cluster of this machine"),
+        AfterValidator(_scheduler),
+    ] = None
+
+    def __post_init__(self) -> None:
+        """Refuse an address of which nobody would take notice."""
+        if self.address is not None and self.executor != "dask":
+            raise ConfigError("address", "is of a dask scheduler; say executor=dask, too", given=self.address)
+
+    @property
+    def cluster(self) -> Cluster | None:
+        """Who does the jobs, if it is not processes of this machine."""
+        return Cluster(self.address) if self.executor == "dask" else None
 
     def folder(self, command: str, level: str = "") -> Path:
         """Return the artifact's folder; `level` tells the jobs of a multirun apart."""
@@ -79,7 +109,8 @@ def execute(
     if getattr(stage, "only_looks", False):
         return dict(stage.look(console))
     out = own.folder(command, level)
-    artifact = build(stage, config=settings, out=out, command=line, force=own.force, console=console)
+    with executing(own.cluster):
+        artifact = build(stage, config=settings, out=out, command=line, force=own.force, console=console)
     for told in account(artifact):
         console.table(*told)
     more: Callable[[Path], dict[str, Any]] = getattr(stage, "document", lambda folder: {})
@@ -102,7 +133,9 @@ def prepare(config: Mapping[str, Any], trust: Collection[str] = ()) -> tuple[Any
     if TRUST in settings:
         settings[TRUST] = list(trust)
     stage = rebuilt(settings, trust=trust)
-    describe(stage)  # refuses what could not be written down afterwards
+    told = describe(stage)  # refuses what could not be written down afterwards
+    if own.cluster is not None and not any(name.rpartition(".")[2] == WORKERS for name in flat(told)):
+        raise ConfigError("executor", "this command gives nothing to workers; leave it out", given=own.executor)
     return stage, settings, own
 
 

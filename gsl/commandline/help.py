@@ -18,9 +18,9 @@ from gsl.commandline.composer import (
     open_hydra,
     options,
 )
-from gsl.commandline.config import CommandSettings, resolve
+from gsl.commandline.config import WORKERS, CommandSettings, resolve
 from gsl.commandline.known_settings import plain, read_declared
-from gsl.commandline.overrides import OPTIONAL_GROUPS
+from gsl.commandline.overrides import EXECUTOR_KEYS, OPTIONAL_GROUPS
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import find_trust
 from gsl.core.setting import REQUIRED, Setting, settings_of
@@ -82,6 +82,8 @@ def explain(command: str, typed: Sequence[str] = (), *, config_dir: Path | None 
                     for name, one in sections[group].items()
                     if re.search(rf"\b{group}\.{name}\b", text)
                 }
+        if not any(WORKERS in settings for settings in sections.values()):
+            sections[""] = {name: one for name, one in sections[""].items() if name not in EXECUTOR_KEYS}
         return Explanation(found, chosen, {path: one for path, one in sections.items() if one})
 
 

@@ -15,7 +15,8 @@ from pathlib import Path
 
 from gsl.errors import ConfigError, InputError
 
-COMMAND_KEYS = ("name", "out", "force", "trust")
+EXECUTOR_KEYS = ("executor", "address")  # of commands that have workers
+COMMAND_KEYS = ("name", "out", "force", "trust", *EXECUTOR_KEYS)
 """Settings of the command, not of the stage; every command takes them, whether its yaml names them or not."""
 
 OPTIONAL_GROUPS = ("experiment", "grounding")

@@ -1,7 +1,7 @@
 """Many rollouts on all cores: the result depends on the jobs, not on who does them or when.
 
-joblib spreads them (loky on one machine; `joblib.parallel_config` chooses another engine, such as dask). If a worker
-dies, what has arrived is kept and only the missing jobs are tried again.
+joblib spreads them on one machine, and dask where the user has chosen a cluster. If a worker dies, what has arrived is
+kept and only the missing jobs are tried again.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from gsl.core.own_code import name_failures
 from gsl.core.setting import setting
 from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
+from gsl.rollout.cluster import chosen_cluster
 from gsl.rollout.rollout import Scenario, rollout
 
 TRIES = 3
@@ -82,7 +83,13 @@ def arriving(
     function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Progress
 ) -> Iterator[tuple[int, Any]]:
     """Yield (index of job, `function(pickled shared, job)`) of all jobs, as they end."""
-    frozen = _pickle(shared, workers)
+    cluster = chosen_cluster()
+    frozen = _pickle(shared, alone=workers == 1 and cluster is None)
+    if cluster is not None:
+        for index, result in cluster.arriving(function, frozen, jobs, threads(workers)):
+            progress.advance()
+            yield index, result
+        return
     missing = list(range(len(jobs)))
     for _ in range(TRIES):
         for index, result in _arriving(function, frozen, jobs, tuple(missing), workers):
@@ -94,7 +101,7 @@ def arriving(
     raise GslError(f"worker processes died {TRIES} times in one batch of jobs; try workers=1 or look at free memory")
 
 
-def _pickle(shared: Any, workers: int) -> bytes:
+def _pickle(shared: Any, *, alone: bool) -> bytes:
     """Return what all workers need, pickled.
 
     Raises:
@@ -105,7 +112,7 @@ def _pickle(shared: Any, workers: int) -> bytes:
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         advice = "give its object plain fields and functions of a module, no closures"
         raise GslError(f"a component cannot go to the worker processes ({error}); {advice}") from error
-    if workers != 1 and b"__main__" in frozen:
+    if not alone and b"__main__" in frozen:
         problem = "a class of this script or notebook cannot be found by worker processes"
         raise GslError(f"{problem}; put it into a module of its own, or say workers=1")
     return frozen
@@ -121,7 +128,8 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
         yield from ((index, function(frozen, jobs[index])) for index in missing)
         return
     parent = os.getpid() if type(get_active_backend()[0]).__name__ == "LokyBackend" else 0
-    parallel = joblib.Parallel(n_jobs=workers, batch_size=1, return_as="generator_unordered")
+    # Without max_nbytes=None joblib leaves a file for every large array.
+    parallel = joblib.Parallel(n_jobs=workers, batch_size=1, max_nbytes=None, return_as="generator_unordered")
     try:
         with processes_starting():
             found = parallel(

@@ -55,7 +55,8 @@ class WiringAudit:
 
 
 def _observation(wiring: Wiring, layout: Layout) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    rows, start = [], 0
+    rows: list[tuple[str, ...]] = []
+    start = 0
     for part in wiring.parts(layout):
         end, zero = start + len(part.names) - 1, _few(part.zero)
         unit = UNITS.get(part.signal, "")
@@ -69,7 +70,9 @@ def _action(wiring: Wiring, layout: Layout) -> tuple[tuple[str, ...], list[tuple
         return ("outputs", "do"), [(f"0-{layout.choices - 1}", "the largest is the choice")]
     scale = factors(wiring.scale, wiring.outputs(layout), "policy.wiring.scale")
     pose = dict(zip(layout.joints, wiring.stance(layout), strict=True))
-    rows = [(str(k), joint, f"{pose[joint]:g}", f"{scale[k]:g}") for k, joint in enumerate(wiring.moves(layout))]
+    rows: list[tuple[str, ...]] = [
+        (str(k), joint, f"{pose[joint]:g}", f"{scale[k]:g}") for k, joint in enumerate(wiring.moves(layout))
+    ]
     return ("output", "moves", "from", "scale"), rows
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -126,18 +127,18 @@ def build(
             os.utime(out / manifest.NAME)
             if (replaced := complete(out)) is not None:
                 shutil.rmtree(replaced)
-            _note(existing)
+            note(existing)
             return existing
         if (left := complete(out)) is not None and (same := _intact(left, identity.key)) is not None:
             install(left, out)
-            return _note(Artifact(out, same))
+            return note(Artifact(out, same))
         progress, kept = getattr(stage, "progress", ""), getattr(stage, "kept", ())
         with workplace(out, identity.key, progress=progress, kept=kept) as folder:
             made = _work(stage, identity, config, folder, command, console)
             manifest.write(folder, made)
             flush_tree(folder)
             install(folder, out)
-    return _note(Artifact(out, made))
+    return note(Artifact(out, made))
 
 
 class Origin(NamedTuple):
@@ -162,7 +163,7 @@ class _Work(NamedTuple):
     command: str
     settings: str
     parents: tuple[Parent, ...]
-    built: dict[Path, Artifact]
+    built: Mapping[Path, Artifact]
     folder: Path
 
     @property
@@ -175,6 +176,8 @@ class _Work(NamedTuple):
 
 
 _at_work: ContextVar[_Work | None] = ContextVar("at_work", default=None)
+_built: ContextVar[dict[Path, Artifact] | None] = ContextVar("built", default=None)
+"""What the stage that is at work has built beside itself, by absolute path."""
 
 
 def origin() -> Origin | None:
@@ -183,10 +186,22 @@ def origin() -> Origin | None:
     return Origin(work.command, work.settings, work.parents, work.links) if work else None
 
 
-def _note(artifact: Artifact) -> Artifact:
-    if (work := _at_work.get()) is not None:
-        work.built[artifact.folder.absolute()] = artifact
+def note(artifact: Artifact) -> Artifact:
+    """Note an artifact as a link of the stage that is at work."""
+    if (built := _built.get()) is not None:
+        built[artifact.folder.absolute()] = artifact
     return artifact
+
+
+@contextmanager
+def collect_links() -> Iterator[Mapping[Path, Artifact]]:
+    """Within, the artifacts that are built or are there already are collected, by absolute path."""
+    links: dict[Path, Artifact] = {}
+    token = _built.set(links)
+    try:
+        yield links
+    finally:
+        _built.reset(token)
 
 
 def _intact(folder: Path, key: str) -> Manifest | None:
@@ -233,12 +248,13 @@ def _work(
         parents = tuple(
             Parent(role, _relative(path, folder), identity.parents[role]) for role, path in _sources(stage).items()
         )
-        work = _Work(command, settings, parents, {}, folder)
-        token = _at_work.set(work)
-        try:
-            metrics = stage.run(folder, console)
-        finally:
-            _at_work.reset(token)
+        with collect_links() as links:
+            work = _Work(command, settings, parents, links, folder)
+            token = _at_work.set(work)
+            try:
+                metrics = stage.run(folder, console)
+            finally:
+                _at_work.reset(token)
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
     documents.write_json(folder / METRICS, metrics)

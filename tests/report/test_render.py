@@ -1,4 +1,4 @@
-"""Pictures and films of the robot show what they promise: a camera that stands still, the way, the command, the fall."""
+"""Pictures and films of the robot: a camera that stands still, the way, the command, the fall."""
 
 import json
 from dataclasses import replace

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import lump
-from gsl.core.interruption import processes_starting
+from gsl.core.console import Silent
 from gsl.core.plant import GRAVITY, Plant
 from gsl.diagnosis.log.records import OnGround, Pieces
 from gsl.diagnosis.simulate.calibration import ZERO, calibrate, draw_shifts
 from gsl.diagnosis.simulate.in_the_air import Effects, change
+from gsl.rollout.parallel import in_parallel
 from gsl.worlds.engine import Engine
 from gsl.worlds.physics import Physics, Reading
 from gsl.worlds.servo_state import COMMANDS
@@ -67,11 +68,13 @@ class Walking:
         parts = [(OnGround(*(part[share] for part in windows)), heights[share]) for share in shares]
         if len(parts) == 1:
             return _replay_all(plant, physics, *parts[0])
-        # Without max_nbytes=None joblib leaves a file for every call.
-        parallel = Parallel(n_jobs=len(parts), max_nbytes=None, return_as="generator")
-        with processes_starting():
-            channels = parallel(delayed(_replay_all)(plant, physics, *part) for part in parts)
-        return np.concatenate([*channels])
+        with Silent().progress(len(parts), "") as progress:
+            return np.concatenate(in_parallel(_replay_part, (plant, physics), parts, len(parts), progress))
+
+
+def _replay_part(frozen: bytes, part: tuple[OnGround, np.ndarray]) -> np.ndarray:
+    plant, physics = pickle.loads(frozen)  # our own bytes, from the parent process
+    return _replay_all(plant, physics, *part)
 
 
 def _replay_all(plant: Plant, physics: Physics, windows: OnGround, heights: np.ndarray) -> np.ndarray:
