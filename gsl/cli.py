@@ -28,6 +28,8 @@ from gsl.version import PACKAGE, __version__
 
 Reference = Annotated[str, typer.Argument(metavar="REF", help="Path, or name of a run.")]
 
+QUIET = {"--quiet", "-q"}
+
 app = typer.Typer(
     cls=Commands,
     help="Grounded simulation learning: from a few real trajectories to a policy that works on the robot.",
@@ -175,6 +177,9 @@ def init(
 def root(
     ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", is_eager=True, help="Print the version.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Say results, warnings and errors alone; after any command.")
+    ] = False,
 ) -> None:
     """Grounded simulation learning: from a few real trajectories to a policy that works on the robot."""
     if version:
@@ -203,6 +208,8 @@ def _leave_current_folder() -> None:
 
 def call(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code, with whatever went wrong told in a line."""
+    Console.quiet = bool(QUIET.intersection(arguments))
+    arguments = [word for word in arguments if word not in QUIET]
     console = Console(json="--json" in arguments)
     if any("\0" in word for word in arguments):
         return console.error("an argument holds a null character", 2)

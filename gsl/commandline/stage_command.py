@@ -25,10 +25,17 @@ class StageCommand(TyperCommand):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write usage and options, then what can be set."""
-        from gsl.commandline.help import write_help
+        from gsl.commandline.help_cache import read_or_write
 
         super().format_help(ctx, formatter)
-        formatter.write(visible(write_help(name_of(ctx), ctx.meta.get(TYPED, []), config_dir=user_folder(ctx))))
+        command, typed, folder = name_of(ctx), ctx.meta.get(TYPED, []), user_folder(ctx)
+
+        def write() -> str:
+            from gsl.commandline.help import write_help
+
+            return write_help(command, typed, config_dir=folder)
+
+        formatter.write(visible(write() if folder else read_or_write(command, typed, write)))
 
 
 class Shown(StrEnum):

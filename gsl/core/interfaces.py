@@ -177,11 +177,7 @@ class Trainable(Grounding, Protocol):
         """Return a grounding that acts by what was learned."""
 
     def start(self, layout: Layout, rng: np.random.Generator) -> GroundingRun:
-        """Refuse to start.
-
-        Raises:
-            ConfigError: Always; what `load` returns can be started.
-        """
+        """Refuse with a ConfigError: what `load` returns can be started."""
         raise ConfigError("grounding", "has to learn first; a stage that uses it has to load what it learned")
 
 

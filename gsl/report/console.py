@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from gsl.core.console import LiveTable, Progress
 from gsl.core.interruption import checkpoint
@@ -25,7 +25,13 @@ WIDTH_WITHOUT_TERMINAL = 200
 
 
 class Console:
-    """Prints for a person, or exactly one JSON document on stdout."""
+    """Prints for a person, or exactly one JSON document on stdout.
+
+    Attributes:
+        quiet: Whether all consoles leave out what is no result, warning or error.
+    """
+
+    quiet: ClassVar[bool] = False
 
     def __init__(self, *, json: bool = False) -> None:
         self.json = json
@@ -49,7 +55,8 @@ class Console:
         _log.info("%s", text)
         if self._lines is not None:
             self._lines.interrupted = True
-        self._stderr.print(text, markup=False, highlight=False, soft_wrap=True)
+        if not self.quiet or text.startswith("warning:"):
+            self._stderr.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def table(
         self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
@@ -62,6 +69,8 @@ class Console:
         if self.json:
             return
         above_live_table = self._live is not None and self._stdout.is_terminal
+        if self.quiet and self._part:
+            return
         place = self._stderr if above_live_table or self._part else self._stdout
         place.print(title, style="bold", markup=False, highlight=False, soft_wrap=True)
         widths = fitting(columns, rows, place.width, leave_out=place.is_terminal)
@@ -105,7 +114,7 @@ class Console:
         description = visible(description)
         if self._live is not None:
             yield _Lines(total, description, self._live.caption, seconds=0.5)
-        elif not self._stderr.is_terminal:
+        elif self.quiet or not self._stderr.is_terminal:
             yield _Lines(total, description, self.status, seconds=SECONDS_BETWEEN_LINES)
         else:
             from rich.progress import Progress as Bars
@@ -119,7 +128,7 @@ class Console:
     def live_table(self, title: str, columns: Sequence[str]) -> Iterator[LiveTable]:
         """Show a growing table on a terminal, else each row as a line; the final table is for `table`."""
         title = visible(self._title(title))
-        if not self._stderr.is_terminal or self._live is not None:
+        if self.quiet or not self._stderr.is_terminal or self._live is not None:
             self._lines = LineTable(title, columns, self.status)
             try:
                 yield self._lines
@@ -162,13 +171,22 @@ class _Lines:
     def __init__(self, total: int, description: str, say: Callable[[str], None], *, seconds: float) -> None:
         self.total, self.description, self.say, self.seconds = total, description, say, seconds
         self.done, self.said = 0, time.monotonic()
+        self.begun = self.said
 
     def advance(self, steps: int = 1) -> None:
         checkpoint()
         self.done += steps
         if time.monotonic() - self.said >= self.seconds:
             self.said = time.monotonic()
-            self.say(f"{self.description}: {self.done} of {self.total}")
+            left = (self.total - self.done) * (self.said - self.begun) / self.done if self.done else 0.0
+            self.say(f"{self.description}: {self.done} of {self.total}, {_duration(left)} left")
+
+
+def _duration(seconds: float) -> str:
+    """Return a time as a person says it."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
 def _visible_cells(cells: Sequence[object]) -> list[object]:

@@ -14,7 +14,7 @@ from gsl.report.learning_curve import Search, learning_curve_figure
 from gsl.report.page import page
 from gsl.report.parts import Part, choice, command, element, facts, folded, prose, section, table
 from gsl.report.svg import WIDTH, svg
-from gsl.storage.artifact import Origin, origin
+from gsl.storage.at_work import Origin, origin
 from gsl.storage.hashing import PAGE, SHORT
 
 MARKS = {"good": "✓", "doubt": "?"}

@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, Protocol
 
 import yaml
 
@@ -25,6 +23,7 @@ from gsl.core.yaml_tree import yaml_tree
 from gsl.effects.effect import own
 from gsl.errors import ArtifactError, GslError, InputError
 from gsl.storage import documents, manifest
+from gsl.storage.at_work import Work, links_of, note, relative, work_at
 from gsl.storage.identity import Identity, changes, content_hash, identify
 from gsl.storage.lineage import broken_link, out_of_date
 from gsl.storage.manifest import Manifest, Parent
@@ -141,69 +140,6 @@ def build(
     return note(Artifact(out, made))
 
 
-class Origin(NamedTuple):
-    """How what a stage is at work on comes about, for its page.
-
-    Attributes:
-        command: As it was typed.
-        settings: All of them, as config.yaml has them.
-        parents: What it is made from.
-        links: What it has built beside itself so far.
-    """
-
-    command: str
-    settings: str
-    parents: tuple[Parent, ...]
-    links: tuple[Parent, ...]
-
-
-class _Work(NamedTuple):
-    """A stage at work in `folder`; `built` is what it has built beside itself, by absolute path."""
-
-    command: str
-    settings: str
-    parents: tuple[Parent, ...]
-    built: Mapping[Path, Artifact]
-    folder: Path
-
-    @property
-    def links(self) -> tuple[Parent, ...]:
-        """What it has built, as its manifest has it."""
-        return tuple(
-            Parent(one.manifest.kind, _relative(path, self.folder), one.manifest.contents)
-            for path, one in self.built.items()
-        )
-
-
-_at_work: ContextVar[_Work | None] = ContextVar("at_work", default=None)
-_built: ContextVar[dict[Path, Artifact] | None] = ContextVar("built", default=None)
-"""What the stage that is at work has built beside itself, by absolute path."""
-
-
-def origin() -> Origin | None:
-    """Return how the artifact of the stage that is at work comes about, None where no stage is."""
-    work = _at_work.get()
-    return Origin(work.command, work.settings, work.parents, work.links) if work else None
-
-
-def note(artifact: Artifact) -> Artifact:
-    """Note an artifact as a link of the stage that is at work."""
-    if (built := _built.get()) is not None:
-        built[artifact.folder.absolute()] = artifact
-    return artifact
-
-
-@contextmanager
-def collect_links() -> Iterator[Mapping[Path, Artifact]]:
-    """Within, the artifacts that are built or are there already are collected, by absolute path."""
-    links: dict[Path, Artifact] = {}
-    token = _built.set(links)
-    try:
-        yield links
-    finally:
-        _built.reset(token)
-
-
 def _intact(folder: Path, key: str) -> Manifest | None:
     """Return the manifest of a folder that is the artifact of this key and as it was written."""
     try:
@@ -246,15 +182,10 @@ def _work(
     with log_to(folder) as logger:
         logger.info("%s begins: %s", identity.kind, command)
         parents = tuple(
-            Parent(role, _relative(path, folder), identity.parents[role]) for role, path in _sources(stage).items()
+            Parent(role, relative(path, folder), identity.parents[role]) for role, path in _sources(stage).items()
         )
-        with collect_links() as links:
-            work = _Work(command, settings, parents, links, folder)
-            token = _at_work.set(work)
-            try:
-                metrics = stage.run(folder, console)
-            finally:
-                _at_work.reset(token)
+        with work_at(Work(command, settings, parents, folder)) as links:
+            metrics = stage.run(folder, console)
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
     documents.write_json(folder / METRICS, metrics)
@@ -266,7 +197,7 @@ def _work(
         command=command,
         files={name: file for name, file in manifest.inventory(folder).items() if name != KEY},
         parents=parents,
-        links=work.links,
+        links=links_of(links, folder),
         seeds=identity.seeds,
         sources=identity.sources,
         versions=versions(),
@@ -305,10 +236,6 @@ def _check_parents(stage: Stage, identity: Identity) -> None:
         if not same:
             what = f"{role} ({path or 'gone'})"
             raise GslError(f"{what}: was changed while {identity.kind} was at work; run the command again")
-
-
-def _relative(path: Path, folder: Path) -> str:
-    return Path(os.path.relpath(path, folder)).as_posix()
 
 
 def _sources(stage: Stage) -> dict[str, Path]:

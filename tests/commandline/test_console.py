@@ -2,11 +2,13 @@
 
 import json
 import logging
+import time
 from contextlib import suppress
 
 import pytest
 from rich.console import Console as RichConsole
 
+from gsl.cli import call
 from gsl.report.console import Console
 from gsl.report.tables import fitting
 
@@ -129,3 +131,30 @@ def test_tables_of_a_part_are_progress(capsys: pytest.CaptureFixture[str]) -> No
     out, err = capsys.readouterr()
     assert "its second round: values" in err and "gat, trial 1: errors" in err and "gat, trial 1: rounds" in err
     assert "errors" not in out and "results" in out
+
+
+def test_progress_without_a_terminal_says_how_long_it_takes(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter([0.0, 1.0, 20.0, 20.0, 25.0, 40.0, 40.0])
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    with Console().progress(8, "walking") as progress:
+        for _ in range(4):
+            progress.advance()
+    assert capsys.readouterr().err.splitlines() == ["walking: 2 of 8, 60 s left", "walking: 4 of 8, 40 s left"]
+
+
+def test_quiet_leaves_results_warnings_and_errors(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["-q", "--version"]) == 0
+    console = Console()
+    console.status("at work")
+    console.status("warning: look at this")
+    console.result({}, text="done")
+    Console.quiet = False
+    said = capsys.readouterr()
+    assert said.err == "warning: look at this\n"
+    assert said.out.splitlines()[-1] == "done"
+    assert call(["nonsense", "--quiet"]) == 2
+    assert call(["--version"]) == 0
+    console.status("at work")
+    assert "at work" in capsys.readouterr().err
