@@ -23,8 +23,7 @@ from gsl.core.visible import visible
 from gsl.core.yaml_tree import yaml_tree
 from gsl.errors import ConfigError, InputError
 from gsl.runner.request import NAME, hash_of
-from gsl.storage.manifest import HASH
-from gsl.storage.manifest import _hash as manifest_hash
+from gsl.storage.manifest import HASH, hash_entries
 from gsl.storage.requests import seal, write_request
 
 pytestmark = pytest.mark.slow
@@ -285,7 +284,7 @@ def changed(artifact: Path, **entries: object) -> None:
     """Change a manifest as a stranger would: its own hash is right."""
     stored = json.loads((artifact / "manifest.json").read_text())
     stored = {key: value for key, value in stored.items() if key != HASH} | entries
-    (artifact / "manifest.json").write_text(json.dumps({**stored, HASH: manifest_hash(stored)}))
+    (artifact / "manifest.json").write_text(json.dumps({**stored, HASH: hash_entries(stored)}))
 
 
 @pytest.mark.parametrize("name", ["../../../secret.json", "/etc/hostname", "a/../../../../secret.json"])

@@ -6,11 +6,11 @@ import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
-from unittest.mock import Mock
 
 import pytest
 from commands import done, gsl
 
+from gsl.core.console import Silent
 from gsl.errors import ArtifactError
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import ModelConfig
@@ -172,8 +172,14 @@ def test_what_cannot_be_drawn_is_refused_before_anything_is_made(arguments: str,
     assert not list(tmp_path.iterdir())
 
 
-class Silent:
-    def status(self, text: str) -> None: ...
+class Listening(Silent):
+    """A console that remembers what was said."""
+
+    def __init__(self) -> None:
+        self.said = list[str]()
+
+    def status(self, text: str) -> None:
+        self.said.append(text)
 
 
 class Figure(NamedTuple):
@@ -258,8 +264,7 @@ def test_figures_that_contradict_each_other_are_no_trial(more: dict[str, Any], p
 
 
 def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
-    said: list[str] = []
-    given, console = tmp_path / "given.json", Mock(status=said.append)
+    given, console = tmp_path / "given.json", Listening()
     given.write_text(json.dumps([{"number": 1, "value": 1.0, "recipe": "a", "made_by": "b"}]))
     path = tmp_path / "t.json"
     wanted = {"a": "none", "b": "gat", "c": "gat", "d": "sgat"}
@@ -271,7 +276,7 @@ def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
     Ledger(path, {"known": given}, Figure, console).announce({"a": "none"}, lambda: 6000.0)
     goes_on = "; a study that was stopped goes on where it was"
     known = f"1 of this study's 4 results are in {given}"
-    assert said == [
+    assert console.said == [
         f"about 1.7 hours for all of its results{goes_on}",
         *(known, f"about 75 minutes for 3 of 4 results, gat (2), sgat (1){goes_on}"),
         *(
@@ -284,7 +289,8 @@ def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
     old = tmp_path / "old.json"
     old.write_text(given.read_text())
     Ledger(old, {}, Figure, console).announce({"a": "none"}, lambda: 6000.0)
-    assert "1 of this study's 1 results in" in said[-2] and "are of another version of gsl and not taken" in said[-2]
+    assert "1 of this study's 1 results in" in console.said[-2]
+    assert "are of another version of gsl and not taken" in console.said[-2]
     other = tmp_path / "other.json"
     rows = [
         {"number": 1, "value": 1.0, "recipe": "a", "made_by": "c"},
@@ -293,13 +299,13 @@ def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
     other.write_text(json.dumps(rows))
     both = Ledger(tmp_path / "both.json", {"known.0": given, "known.1": other, "known.2": given}, Figure, console)
     both.announce(wanted)
-    assert said[-2:] == [known, known.replace("given", "other")]
+    assert console.said[-2:] == [known, known.replace("given", "other")]
     both.judge({"a": {"number": 1}, "b": {"number": 9}})
     assert both.take("a") and both.take("b")
     with pytest.raises(ArtifactError, match=r"other\.json: a trial whose settings .* say number 2 says 9; leave"):
         both.judge({"b": {"number": 2}})
     Ledger(path, {"known.0": given, "known.1": other}, Figure, console).announce({"b": "gat"})  # one of them is enough
-    assert said[-1] == f"1 of this study's 1 results are in {other}"
+    assert console.said[-1] == f"1 of this study's 1 results are in {other}"
     other.write_text(json.dumps([{**rows[0], "value": 2.0}]))
     with pytest.raises(ArtifactError, match=r"other\.json: tells a trial .* otherwise than .*given\.json; leave"):
         Ledger(path, {"known.0": given, "known.1": other}, Figure, console)

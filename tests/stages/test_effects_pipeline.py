@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import yaml
 from commands import SMALL, Said, done
 
+from gsl.core.console import Silent
 from gsl.core.setting import settings_of
 from gsl.core.validation import make
 from gsl.errors import ConfigError
 from gsl.policies.excitation import Excitation
-from gsl.stages import diagnosis_plan
 from gsl.stages.cross_validate import CrossValidate
 from gsl.stages.diagnose import Diagnose
 from gsl.stages.diagnosis_plan import DiagnosisPlan
@@ -126,15 +125,13 @@ def test_identification_fits_the_same_log_without_a_verdict(air: tuple[Path, Sai
     assert "Diagnosis: identified. 18 parameters of 17 effects were fitted at once: held out, " in said.out
 
 
-def test_what_a_plan_leaves_out_is_no_candidate(monkeypatch: pytest.MonkeyPatch) -> None:
-    stages: list[Any] = []
-    log = SimpleNamespace(folder="log")
-    monkeypatch.setattr(diagnosis_plan, "build_link", lambda stage, *_: stages.append(stage) or log)
-    plan = DiagnosisPlan(Excitation("nao"), without=("command_latency",))
-    world = BulletWorld("nao", {})
+def test_what_a_plan_leaves_out_is_no_candidate(tmp_path: Path) -> None:
+    played = Excitation("nao", motions=("steps_large",), duration=1.5)
+    plan = DiagnosisPlan(played, duels=0, nulls=0, evaluations=16, without=("command_latency",))
+    world = BulletWorld("nao", {})  # without a gap nothing is searched
     for method in ("diagnose", "identify"):
-        plan.carried_out(world, world, method, Path("home"), workers=1, seed=1, console=None)
-        assert (stages[-1].kind, stages[-1].without) == (method, ("command_latency",))
+        made = plan.carried_out(world, world, method, tmp_path, workers=1, seed=1, console=Silent())
+        assert (made.manifest.kind, made.config["without"]) == (method, ["command_latency"])
 
 
 @pytest.mark.parametrize("stage", [Diagnose, Identify, CrossValidate, DiagnosisPlan])
