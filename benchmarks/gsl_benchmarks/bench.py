@@ -47,7 +47,7 @@ EPISODES = 30  # in the file whose writing is measured
 def run_bench(console: Console) -> None:
     """Measure everything, and print a table or exactly the figures as JSON."""
     figures = measured(console)
-    rows = [_row(name, figures[name]) for name in FIGURES]
+    rows = [judge(name, figures[name]) for name in FIGURES]
     title = f"CPU time of π0 in nao_ideal, {os.cpu_count()} cores"
     console.table(title, ("figure", "is", "measured", "target", ""), rows)
     if console.json:
@@ -78,7 +78,8 @@ def measured(console: Console) -> dict[str, float]:
     }
 
 
-def _row(name: str, value: float) -> tuple[str, ...]:
+def judge(name: str, value: float) -> tuple[str, ...]:
+    """Return a figure's row: name, meaning, value, target, and whether it keeps to it."""
     meaning, target = FIGURES[name]
     digits = 4 if name.endswith("_share") else 2 if value < 10.0 else 0
     limit = "" if target is None else f"{target:g}"

@@ -87,7 +87,7 @@ def loops(scenario: Scenario, repeats: int) -> LoopCost:
     env = scenario.make()
     parameters = scenario.policy.initial
     rollout(scenario, env, parameters, 0)
-    engine: Any = env.unwrapped._engine  # type: ignore[attr-defined]
+    engine: Any = env.unwrapped.engine  # type: ignore[attr-defined]
     whole, inside, count, reloads = [], [], [], []
     for seed in range(repeats):
         begin = time.process_time()

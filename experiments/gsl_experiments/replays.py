@@ -73,7 +73,7 @@ class Replays:
         Raises:
             ConfigError: A method cannot be replayed, or there is more than one iteration.
         """
-        self._check()
+        self.check()
         study = Compare(self.iterate, self.worlds, self.methods, self.trials)
         home = folder.parent
         ledger = Ledger(home / DATA, known_parents(self.known, DATA), Replay, console)
@@ -90,7 +90,12 @@ class Replays:
         self.tell(folder, rows, ledger.close(folder / DATA))
         return {"replays": len(rows)}
 
-    def _check(self) -> None:
+    def check(self) -> None:
+        """Refuse methods that are drawn anew each time, worlds that do not go together, and further iterations.
+
+        Raises:
+            ConfigError: There is one.
+        """
         for name, grounding in self.methods.items():
             inner = innermost(grounding)
             drawn = isinstance(inner, LearnedServo) and (inner.torque_noise or inner.noise or inner.ensemble)

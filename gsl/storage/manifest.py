@@ -123,10 +123,11 @@ def strange_file(folder: Path, manifest: Manifest) -> str | None:
 def write(folder: Path, manifest: Manifest) -> None:
     """Write the manifest, which declares the artifact complete."""
     stored = dataclasses.asdict(manifest)
-    documents.write_json(folder / NAME, {**stored, HASH: _hash(stored)})
+    documents.write_json(folder / NAME, {**stored, HASH: hash_entries(stored)})
 
 
-def _hash(stored: Mapping[str, Any]) -> str:
+def hash_entries(stored: Mapping[str, Any]) -> str:
+    """Return the hash of a manifest's entries, which stands beside them."""
     return hashlib.sha256(documents.text(stored).encode()).hexdigest()
 
 
@@ -150,7 +151,7 @@ def read(folder: Path) -> Manifest:
     if version not in (SCHEMA_VERSION, WITHOUT_HASH):
         raise ArtifactError(folder / NAME, f"schema_version {version!r} is unknown; this gsl reads {SCHEMA_VERSION}")
     try:
-        if version == SCHEMA_VERSION and stored.pop(HASH) != _hash(stored):
+        if version == SCHEMA_VERSION and stored.pop(HASH) != hash_entries(stored):
             raise ArtifactError(folder / NAME, f"is damaged: it is not as it was written; {_DAMAGED}")
         parsed = _parse(stored)
     except (TypeError, AttributeError, KeyError, ValueError, RecursionError) as error:

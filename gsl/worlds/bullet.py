@@ -110,6 +110,9 @@ class BulletEnv(gymnasium.Env):
         world: Its configuration.
         plant: Another one of the same robot, such as a calibrated one; by default the world's.
         host: An environment that was reset, whose Bullet client this one uses in turn with it; see `leave`.
+
+    Attributes:
+        engine: The robot in Bullet, None before the first reset.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  gymnasium's own name and type
@@ -123,7 +126,7 @@ class BulletEnv(gymnasium.Env):
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self.layout.size,), dtype=np.float64)
         self._neutral = np.clip(np.zeros(self._n), low, high)
-        self._engine: Engine | None = None
+        self.engine: Engine | None = None
         self._middle: np.ndarray | None = None  # of an uneven ground [m], shape (2,)
         self._noise: TorqueNoise | None = None  # of this episode's torques
 
@@ -141,20 +144,20 @@ class BulletEnv(gymnasium.Env):
         super().reset(seed=seed)
         options = options or {}
         start = options.get("start") or self._at_rest(np.asarray(options.get("posture", self._neutral), dtype=float))
-        if self._engine is None:
+        if self.engine is None:
             physics = Physics(
                 self.world.step, self.world.iterations, self.world.period, self.world.floating, self.world.motors
             )
-            self._engine = Engine(self._plant, physics, None if self._host is None else self._host._engine)
+            self.engine = Engine(self._plant, physics, None if self._host is None else self._host.engine)
         before = 0 if options.get("start") else round(self.world.settle / self.world.period)
         surface = self._surface()
         self._middle = None if surface is None else start.reading.place[:2]
-        self._engine.load(start.reading, start.commands, -before * self.world.period, surface, options.get("load"))
-        reading = self._engine.read()
+        self.engine.load(start.reading, start.commands, -before * self.world.period, surface, options.get("load"))
+        reading = self.engine.read()
         self._noise = self._torque_noise()
         for _ in range(before):
             self._run(start.commands[0])
-            reading = self._engine.read()
+            reading = self.engine.read()
         return self._observe(reading), {"fell": False}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, bool]]:
@@ -164,12 +167,12 @@ class BulletEnv(gymnasium.Env):
             GslError: if the action has another size or holds what is not a finite number, or the robot has come to the
                 edge of an uneven ground.
         """
-        assert self._engine is not None, "reset comes first"
+        assert self.engine is not None, "reset comes first"
         targets, noise = self._check(action)[self._drive], self._plant.action_noise
         if noise.any():
             targets = targets + noise * self.np_random.standard_normal(len(noise))
         self._run(targets)
-        reading = self._engine.read()
+        reading = self.engine.read()
         if self._middle is not None and np.abs(reading.place[:2] - self._middle).max() > REACH:
             raise GslError(f"the robot has come to the edge of the uneven ground ({REACH} m): shorten task.duration")
         fell = self.world.floating and (reading.up < FALLEN_TILT or reading.place[2] < self._robot.upright_height)
@@ -177,14 +180,14 @@ class BulletEnv(gymnasium.Env):
 
     def leave(self) -> None:
         """Leave the client to another environment that uses it, until the next reset."""
-        if self._engine is not None:
-            self._engine.leave()
+        if self.engine is not None:
+            self.engine.leave()
 
     def close(self) -> None:
         """Free Bullet's client."""
-        if self._engine is not None:
-            self._engine.close()
-            self._engine = None
+        if self.engine is not None:
+            self.engine.close()
+            self.engine = None
 
     def _check(self, action: np.ndarray) -> np.ndarray:
         values = np.asarray(action, dtype=float)
@@ -200,8 +203,8 @@ class BulletEnv(gymnasium.Env):
     def _observe(self, reading: Reading) -> np.ndarray:
         n = self._n
         observation = np.empty(self.layout.size)
-        assert self._engine is not None
-        told = self._engine.encoders(reading)
+        assert self.engine is not None
+        told = self.engine.encoders(reading)
         observation[:n], observation[n : 2 * n] = told[0, :n] + self._plant.sensors.bias[:n], told[1, :n]
         noise = self._plant.sensors.encoder_noise[:n]
         if noise.any():
@@ -225,8 +228,8 @@ class BulletEnv(gymnasium.Env):
         return TorqueNoise(sd, round(self.world.period / self.world.step), self.np_random.spawn(1)[0])
 
     def _run(self, targets: np.ndarray) -> None:
-        assert self._engine is not None
-        self._engine.run(targets, None if self._noise is None else self._noise.draw())
+        assert self.engine is not None
+        self.engine.run(targets, None if self._noise is None else self._noise.draw())
 
     def _at_rest(self, posture: np.ndarray) -> Start:
         targets = posture[self._drive]

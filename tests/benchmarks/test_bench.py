@@ -2,7 +2,7 @@
 
 import time
 
-from gsl_benchmarks.bench import FIGURES, _row
+from gsl_benchmarks.bench import FIGURES, judge
 from gsl_benchmarks.loop import StepClock
 
 
@@ -21,9 +21,9 @@ def test_a_clock_counts_what_happens_inside_and_nothing_else() -> None:
 
 
 def test_a_figure_above_its_target_is_said_to_be_over() -> None:
-    assert _row("loop_ratio", 1.21)[2:] == ("1.21", "1.3", "ok")
-    assert _row("reload_share", 0.0123)[2:] == ("0.0123", "0.01", "over")
-    assert _row("step_us", 29.6)[2:] == ("30", "", "")
+    assert judge("loop_ratio", 1.21)[2:] == ("1.21", "1.3", "ok")
+    assert judge("reload_share", 0.0123)[2:] == ("0.0123", "0.01", "over")
+    assert judge("step_us", 29.6)[2:] == ("30", "", "")
 
 
 def test_the_figures_are_those_that_were_agreed() -> None:

@@ -29,7 +29,7 @@ from gsl_benchmarks.blind.figures import Figure, figures, reliability
 from gsl_benchmarks.blind.foreign import play_foreign
 from gsl_benchmarks.blind.jitter import jittered
 from gsl_benchmarks.blind.label import ABSENT, FOREIGN, JOINT, NULL, SAME, SINGLE, TWO, WITHHELD, Label
-from gsl_benchmarks.blind.make import PLAYERS, Workshop, _gap_of, rng_of
+from gsl_benchmarks.blind.make import PLAYERS, Workshop, measure_gap, rng_of
 from gsl_benchmarks.blind.mark import Mark, marked
 from gsl_benchmarks.blind.mix import Mix, Slot, slots
 from gsl_benchmarks.blind.programmes import Programme, drawn_programmes
@@ -311,7 +311,7 @@ def test_an_effect_is_turned_up_into_its_band(generator: str, strength: str) -> 
     plant, rng = nominal(arm()), np.random.default_rng(3)
     yardstick = Yardstick.of(plant, 0.002, PERIOD, PLAYERS[generator], programme())
     dial = drawn("command_latency", plant.robot, rng)
-    gap = _gap_of(dial, yardstick, 0.001)
+    gap = measure_gap(dial, yardstick, 0.001)
     found = turned_up(gap, strength, rng)
     assert found is not None
     low, high = BANDS[strength]

@@ -1,6 +1,7 @@
 """Configurations are composed, checked and built; whatever is wrong is one line."""
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -247,8 +248,8 @@ NEEDED = {  # what has no default
 
 
 def _choices() -> Iterator[tuple[str, ...]]:
-    """Commands with choices as they are typed: every option of a group is in a line, those of methods among them."""
-    conf = configuration_folder()
+    """Commands with choices as they are typed: each command once, and each option wherever a group is chosen."""
+    conf, seen = configuration_folder(), set[str]()
     for command in sorted(path for folder in (conf, *folders()) for path in folder.glob("*.yaml")):
         defaults = yaml.safe_load(command.read_text()).get("defaults", [])
         groups = [
@@ -258,8 +259,11 @@ def _choices() -> Iterator[tuple[str, ...]]:
         ]
         found = [typed for typed in _shares(groups, conf, command.stem) if typed]
         for number in range(max(map(len, found), default=0)):
-            chosen = (typed[min(number, len(typed) - 1)] for typed in found)
-            yield command.stem.replace("_", "-"), *chosen, *NEEDED.get(command.stem, ())
+            chosen = [typed[min(number, len(typed) - 1)] for typed in found]
+            pairs = {re.sub(r"[.].*=", "=", word) for word in chosen}  # worlds.nao_worn=nao_weak: one of worlds
+            if number == 0 or not pairs <= seen:
+                yield command.stem.replace("_", "-"), *chosen, *NEEDED.get(command.stem, ())
+            seen |= pairs
     experiments = sorted(option.stem for option in (conf / "experiment").glob("*.yaml"))
     cart = ("sim.env_id=examples.cart:Cart", "real.env_id=examples.cart:Cart")
     for name in experiments:

@@ -2,11 +2,12 @@
 
 import json
 import logging
+import re
+import sys
 import time
 from contextlib import suppress
 
 import pytest
-from rich.console import Console as RichConsole
 
 from gsl.cli import call
 from gsl.report.console import Console
@@ -79,9 +80,18 @@ def test_a_terminal_gets_a_bar_and_a_growing_table(
     assert printed.out == ""
 
 
-def test_words_of_a_growing_table_stay_whole(capsys: pytest.CaptureFixture[str]) -> None:
-    console = Console()
-    console._stderr = RichConsole(width=60, force_terminal=True, color_system=None, stderr=True)
+def on_a_terminal(monkeypatch: pytest.MonkeyPatch, columns: int) -> Console:
+    for name, value in {"FORCE_COLOR": "1", "NO_COLOR": "1", "TERM": "xterm", "COLUMNS": str(columns)}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    return Console()
+
+
+def test_words_of_a_growing_table_stay_whole(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    console = on_a_terminal(monkeypatch, 60)
     titles = ["iteration", "policy", "in simulation", "in real", "95 % interval", "falls", "gain over the last"]
     with console.live_table("rounds [cm/s]", titles) as table:
         table.row(1, "generation_01", "24.5", "25.3", "24.3 to 26.3", "0 of 3", "+8.1 %")
@@ -95,14 +105,14 @@ def test_what_is_said_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     assert caplog.messages == ["collecting"]
 
 
-def test_a_table_leaves_out_columns_that_there_is_no_room_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_leaves_out_columns_that_there_is_no_room_for(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     columns = [f"column_{k:05d}" for k in range(20)]
-    console = Console()
-    console.table("t", ["name", *columns], [["a", *range(20)]])
+    Console().table("t", ["name", *columns], [["a", *range(20)]])
     assert capsys.readouterr().out.split()[2:22] == columns  # a file has room for all
-    console._stdout = RichConsole(width=200, force_terminal=True, color_system=None)
-    console.table("t", ["name", *columns], [["a", *range(20)]])
-    heading, left_out = capsys.readouterr().out.split("8 more in a wider window: ")
+    on_a_terminal(monkeypatch, 200).table("t", ["name", *columns], [["a", *range(20)]])
+    heading, left_out = re.sub(r"\x1b\[\d*m", "", capsys.readouterr().out).split("8 more in a wider window: ")
     assert heading.split()[2:14] == columns[:12] and left_out.strip().split(", ") == columns[12:]
 
 

@@ -257,7 +257,7 @@ def learning(**how: Any) -> LearnedReplay:
 
 
 def world() -> BulletWorld:
-    return BulletWorld(robot="test_diagnosis.arm", effects={}, floating=False)
+    return BulletWorld(robot="swinging_arm.arm", effects={}, floating=False)
 
 
 def bare() -> Simulated:

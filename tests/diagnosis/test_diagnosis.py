@@ -15,7 +15,7 @@ from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import to_records
 from gsl.diagnosis.log.residual import noise_floor
-from gsl.diagnosis.search.screening import _between
+from gsl.diagnosis.search.screening import interpolate
 from gsl.diagnosis.simulate import calibration
 from gsl.diagnosis.verdict.document import document
 from gsl.effects.effect import SCOPE, Scope, apply_all, build, scope, use_own
@@ -115,7 +115,7 @@ def test_what_a_wide_range_holds_is_meant_in_factors() -> None:
     assert gain.claims_its_name(np.array([0.003])) and not gain.claims_its_name(np.array([0.002]))
     assert gain.towards(np.array([0.004]), 0.5) == pytest.approx(np.sqrt(0.004))
     cost = np.log(gain.grid[:, 0] / gain.grid[3, 0]) ** 2
-    assert _between(gain.grid, cost, 3, wide=True) == pytest.approx(gain.grid[3], rel=1e-6)
+    assert interpolate(gain.grid, cost, 3, wide=True) == pytest.approx(gain.grid[3], rel=1e-6)
 
 
 def test_two_causes_at_once() -> None:

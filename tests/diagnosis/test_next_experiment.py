@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from swinging_arm import NOISE, PERIOD, QUICK, arm
-from test_diagnosis import logged
-from test_diagnosis import motions as whole
+from swinging_arm import NOISE, PERIOD, QUICK, arm, logged
+from swinging_arm import motions as whole
 
 from gsl.core.body import Robot
 from gsl.core.plant import nominal
@@ -29,7 +28,7 @@ from gsl.worlds.held import Held
 pytestmark = pytest.mark.slow
 
 TIME = PERIOD * np.arange(150)
-ROBOTS: dict[str, Callable[[], Robot]] = {"nao": nao, "test_diagnosis.arm": arm}
+ROBOTS: dict[str, Callable[[], Robot]] = {"nao": nao, "swinging_arm.arm": arm}
 LAGS = ("command_latency", "target_smoothing", "viscous_friction", "servo_gain", "coulomb_friction")
 
 
@@ -62,7 +61,7 @@ def played(
 
 
 def choices() -> tuple[Choice, ...]:
-    return motions("test_diagnosis.arm", arm(), PERIOD)
+    return motions("swinging_arm.arm", arm(), PERIOD)
 
 
 def but(*kept: str) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from gsl.core.plant import GRAVITY, Plant, nominal
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.simulate import calibration
-from gsl.diagnosis.simulate.on_ground import Walking, _heights, _moving, jitter_error
+from gsl.diagnosis.simulate.on_ground import Walking, find_heights, jitter_error, read_motion
 from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
 from gsl.worlds.bullet import BulletWorld
@@ -45,7 +45,7 @@ def test_late_encoders_tell_of_where_joints_were() -> None:
     late = plant(sensor_delay={"delay": 0.01})
     n = len(late.robot.motors)
     measured = np.stack([np.zeros((3, n)), np.full((3, n), 2.0)], axis=1)
-    assert np.allclose(_moving(late, measured)[:, 0], 0.02)
+    assert np.allclose(read_motion(late, measured)[:, 0], 0.02)
 
 
 def test_zeros_are_calibrated_in_the_log(walk: Log) -> None:
@@ -59,14 +59,14 @@ def test_zeros_are_calibrated_in_the_log(walk: Log) -> None:
 def test_soft_ground_is_entered_as_deep_as_the_log_has_it(walk: Log) -> None:
     windows = walk.pieces.windows
     windows = windows._replace(base=windows.base.copy())
-    before = {k: _heights(plant(ground_compliance={"stiffness": k}), windows) for k in (2e3, 1e8)}
-    hard = _heights(plant(), windows)
+    before = {k: find_heights(plant(ground_compliance={"stiffness": k}), windows) for k in (2e3, 1e8)}
+    hard = find_heights(plant(), windows)
     assert np.allclose(before[1e8], hard, atol=1e-5)
     mass = nao().mass
     assert np.median(hard - before[2e3]) == pytest.approx(mass * GRAVITY / (8.0 * 2e3), rel=0.3)
     windows.base[0, 2] -= 2e-3
-    assert np.allclose(_heights(plant(), windows), hard)
-    deeper = before[2e3] - _heights(plant(ground_compliance={"stiffness": 2e3}), windows)
+    assert np.allclose(find_heights(plant(), windows), hard)
+    deeper = before[2e3] - find_heights(plant(ground_compliance={"stiffness": 2e3}), windows)
     assert 1e-3 < deeper[0] < 2e-3 and np.abs(deeper[1:]).max() < 5e-4  # the median moves a little
 
 

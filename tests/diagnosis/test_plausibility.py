@@ -117,7 +117,7 @@ def test_a_cause_whose_interval_holds_what_does_nothing_is_none(
     assert all(reason.endswith("which does nothing") for reason in find_idle(cause, 1.0).values())
 
 
-def test_what_is_dropped_leaves_the_others_within_their_ranges(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_dropped_leaves_the_others_within_their_ranges() -> None:
     """A smaller set beyond its ranges is a little cheaper; the one within them shows that an effect is superfluous."""
     parts = (
         claim("stribeck_friction", [0.2, 0.1], ("torque", "velocity")),
@@ -129,6 +129,6 @@ def test_what_is_dropped_leaves_the_others_within_their_ranges(monkeypatch: pyte
         load, candidates=stiction.candidates + load.candidates, parameters=stiction.parameters + load.parameters
     )
     nothing = replace(both, candidates=(), parameters=(), costs=np.full(8, 500.0))
-    search = Search(cast(Any, SimpleNamespace(settings=SearchSettings())), nothing)
-    monkeypatch.setattr(search, "drop", lambda chosen, k: (load, beyond)[k])
-    assert search.prune(both) is load
+    fits = {load.candidates: load, beyond.candidates: beyond}
+    problem = SimpleNamespace(settings=SearchSettings(), fit=lambda candidates, *_: fits[candidates])
+    assert Search(cast(Any, problem), nothing).prune(both) is load

@@ -152,7 +152,7 @@ def test_gains_are_set_against_how_joints_move_and_yield() -> None:
 def test_learned_servos_are_methods_unless_they_draw(tmp_path: Path) -> None:
     with open_hydra(None):
         study = prepare(resolve(compose("reproduce_replays", ["trials=1"])))[0]
-    study._check()
+    study.check()
     assert {"servo", "effects_servo"} <= {method for _, _, method in study.recipes}
     for more, line in (
         ("methods.servo.noise=0.01", "methods.servo: is drawn anew each time"),

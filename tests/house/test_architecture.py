@@ -49,10 +49,14 @@ ONLY = {
 
 def imported(path: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (name.name for name in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
+        yield from imported_by(node)
+
+
+def imported_by(node: ast.AST) -> Iterator[str]:
+    if isinstance(node, ast.Import):
+        yield from (name.name for name in node.names)
+    elif isinstance(node, ast.ImportFrom) and node.module:
+        yield node.module
 
 
 def files(place: str) -> list[Path]:
@@ -115,3 +119,37 @@ def test_only_the_console_prints() -> None:
 def test_no_file_has_two_ideas() -> None:
     long = {path.name: n for path in every_file() if (n := len(path.read_text(encoding="utf-8").splitlines())) > 300}
     assert long == {}
+
+
+PATCHES = ("setattr", "delattr", "setitem", "delitem", "patch")
+PUBLIC = {"_asdict", "_fields", "_make", "_replace", "_repr_html_"}  # of named tuples and of notebooks
+OURS = ("gsl", "gsl_experiments", "gsl_benchmarks")
+
+
+@pytest.mark.parametrize("path", sorted(TESTS.rglob("*.py")), ids=lambda path: path.stem)
+def test_tests_use_no_private_names_and_replace_none_of_our_code(path: Path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    ours, used = set[str](), list[str]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] in OURS:
+            ours |= {name.asname or name.name for name in node.names}
+            used += [name.name for name in node.names if name.name.startswith("_")]
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            used += [name for name in imported_by(node) if name.startswith("unittest.mock")]
+        elif isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
+            mine = isinstance(node.value, ast.Name) and node.value.id == "self"
+            used += [] if mine or node.attr in PUBLIC else [node.attr]
+    assert used == []
+    patches = [node for node in ast.walk(tree) if isinstance(node, ast.Call) and last_name(node.func) in PATCHES]
+    replaced = {first_name(node.args[0]) for node in patches if node.args}
+    assert not {name for name in replaced if name in ours or name.split(".")[0] in OURS}
+
+
+def last_name(node: ast.AST) -> str:
+    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+
+
+def first_name(node: ast.AST) -> str:
+    while isinstance(node, ast.Attribute):
+        node = node.value
+    return node.id if isinstance(node, ast.Name) else str(getattr(node, "value", ""))

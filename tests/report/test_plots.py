@@ -86,7 +86,7 @@ def test_a_learning_curve_has_its_title_and_a_panel_of_each_search() -> None:
     figure = learning_curve_figure([SEARCH, Search("no grounding", SEARCH.points)], unit="cm/s", title=title)
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["iteration 1", "no grounding"]
     assert figure.get_suptitle() == title
-    head, right = figure._suptitle.get_window_extent(), figure.bbox.x1  # type: ignore[attr-defined]
+    head, right = figure.texts[0].get_window_extent(), figure.bbox.x1
     assert head.x1 < right
 
 

@@ -10,7 +10,7 @@ import pytest
 from gsl.core.unit import Unit
 from gsl.report.account import describe_choice
 from gsl.report.evaluation_cells import cells
-from gsl.report.headline import _optimize
+from gsl.report.headline import headline
 from gsl.report.iteration import Rounds
 from gsl.rollout.parallel import Episode
 from gsl.rollout.returns import gain, summary
@@ -162,4 +162,6 @@ def test_a_gain_below_one_is_told() -> None:
 )
 def test_a_search_says_how_its_grounding_was_checked(checked: dict[str, Any], told: str) -> None:
     metrics = {"best_value_sim": 0.25, "generations": 2, **checked}
-    assert _optimize(metrics, Unit.of(Walk())) == f"2 generations, best 25.0 cm/s in simulation{told}"
+    manifest = SimpleNamespace(kind="optimize", unit=Unit.of(Walk())._asdict())
+    artifact = cast(Artifact, SimpleNamespace(metrics=metrics, manifest=manifest))
+    assert headline(artifact) == f"2 generations, best 25.0 cm/s in simulation{told}"

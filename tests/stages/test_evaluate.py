@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from scenarios import GROUND, QUIET
+from scripted_walks import AsScripted, Numbered, ScriptedWorld
 
 from gsl.errors import ArtifactError, ConfigError
 from gsl.policies.linear import Linear
 from gsl.policies.walk_engine import WalkEngine
-from gsl.rollout.parallel import Episode
 from gsl.stages.evaluate import Evaluate
 from gsl.storage.policies import read_policies, write_policies
 from gsl.storage.policy_choice import policies, record
@@ -31,11 +31,13 @@ FAST = _theta(max_forward=0.33, max_forward_change=0.25)
 FALLING = _theta(com_offset=-0.09)
 
 
-def _evaluated(tmp_path: Path, found: dict[str, np.ndarray], **settings: object) -> tuple[dict, dict]:
-    file = tmp_path / "candidates.json"
-    write_policies(file, policies(WALK, TASK, [record(WALK, name, theta) for name, theta in found.items()]))
+def _evaluated(
+    tmp_path: Path, found: dict[str, np.ndarray], place: tuple[Any, Any, Any] = (GROUND, TASK, WALK), **settings: object
+) -> tuple[dict, dict]:
+    file, (_, task, policy) = tmp_path / "candidates.json", place
+    write_policies(file, policies(policy, task, [record(policy, name, theta) for name, theta in found.items()]))
     sizes = {"episodes": 2, "check": 2, "confirmation": 3, **settings}
-    metrics = Evaluate(GROUND, TASK, WALK, str(file), workers=1, **sizes).run(tmp_path, QUIET)
+    metrics = Evaluate(*place, str(file), workers=1, **sizes).run(tmp_path, QUIET)
     return dict(metrics), json.loads((tmp_path / "evaluation.json").read_text())
 
 
@@ -83,10 +85,6 @@ def test_policies_of_another_family_are_refused(tmp_path: Path) -> None:
         Evaluate(GROUND, TASK, other, str(file), episodes=1, check=1, confirmation=2, workers=1).run(tmp_path, QUIET)
 
 
-def _walks(*values: float) -> list[Episode]:
-    return [Episode(value, fell=value == 0.0, steps=100, outcome={}) for value in values]
-
-
 @pytest.mark.parametrize(
     ("check", "tolerated", "best", "failed"),
     [
@@ -100,34 +98,24 @@ def _walks(*values: float) -> list[Episode]:
 )
 def test_where_falls_are_tolerated_a_check_has_to_be_ahead_of_the_baseline(
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     check: tuple[float, ...],
     tolerated: float,
     best: str,
     failed: list[str],
 ) -> None:
     """A high mean in the choice may be luck: the best of many policies on few episodes."""
+    report = (0.2, 0.2, 0.2)
     walks = {
-        "choice": {
-            "pi0": (0.1, 0.0, 0.1),
-            "fast": (0.3, 0.3, 0.3),
-            "other": (0.2, 0.2, 0.2),
-            "third": (0.15, 0.2, 0.2),
-        },
-        "check": {"pi0": (0.35, 0.35, 0.0, 0.0, 0.0, 0.0), "fast": check, "other": (0.05, 0.1), "third": (0.9, 0.9)},
-        "report": {name: (0.2, 0.2, 0.2) for name in ("pi0", "fast")},
+        "pi0": (0.1, 0.0, 0.1, *(0.35, 0.35, 0.0, 0.0, 0.0, 0.0), *report),
+        "fast": (0.3, 0.3, 0.3, *check, *report),
+        "other": (0.2, 0.2, 0.2, *(0.05, 0.1, 0.05, 0.1, 0.05, 0.1), *report),
+        "third": (0.15, 0.2, 0.2, *(0.9,) * 6),
     }
-    asked: list[tuple[str, str]] = []
-
-    def measured(self: Evaluate, thetas: Any, purpose: str, count: int, **_: Any) -> list[list[Episode]]:
-        asked.extend((purpose, one.name) for one in thetas if purpose == "check")
-        return [_walks(*walks[purpose][one.name]) for one in thetas]
-
-    monkeypatch.setattr(Evaluate, "_measure", measured)
-    thetas = {name: WALK.initial for name in ("pi0", "fast", "other", "third")}
-    metrics, _ = _evaluated(tmp_path, thetas, tolerated=tolerated)
+    place = ScriptedWorld(tuple(walks.values())), AsScripted(), Numbered()
+    numbers = {name: np.array([float(k)]) for k, name in enumerate(walks)}
+    metrics, table = _evaluated(tmp_path, numbers, place, tolerated=tolerated, episodes=3, check=6)
     assert (metrics["best"], metrics["failed_check"]) == (best, failed)
-    assert [name for _, name in asked] == ["pi0", "fast", "other"][: 2 + len(failed) // 2]
+    assert [one["name"] for one in table["check"]] == ["pi0", "fast", "other"][: 2 + len(failed) // 2]
 
 
 def test_one_episode_is_no_check_of_a_policy_that_may_fall(tmp_path: Path) -> None:

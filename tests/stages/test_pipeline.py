@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 from commands import SMALL, Said, done, gsl, started
-
-from gsl.report.iteration import Rounds
-from gsl.validation.gate import Gate
 
 pytestmark = pytest.mark.slow
 
@@ -27,30 +23,6 @@ def test_every_stage_leaves_a_complete_artifact(chain: Path) -> None:
         assert there == files | {"manifest.json"}
     stored = json.loads((chain / "runs/chain/optimize/manifest.json").read_text())
     assert {one["role"] for one in stored["parents"]} == {"grounding.forward_model", "grounding.inverse_model"}
-
-
-def test_an_iteration_whose_grounding_is_refused_leaves_what_the_one_before_found(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    judge = Gate.judge
-
-    def judged(gate: Gate, problems: Sequence[str], advice: str) -> None:
-        judge(gate, ["it is no nearer"] if "iteration_02" in gate.folder.parts else [], advice)
-
-    monkeypatch.setattr(Gate, "judge", judged)
-    monkeypatch.setattr(Rounds, "rising", True)
-    line = ("iterate", *NAMED, "grounding=gat", "optimizer.generations=1", "iterations=3")
-    said = done(*line, folder=tmp_path)
-    assert "warning: this grounding is refused: it is no nearer. Collect more data, or go on with" in said.err
-    table = (tmp_path / "runs/chain/iterate/table.md").read_text()
-    assert "| 2 | grounding refused |  |  |  |  |  | 6 |" in table
-    assert "The grounding of iteration 2 was refused: it is no nearer. " in table
-    places = [tmp_path / "runs/chain" / name for name in ("iterate", "iteration_01/evaluate")]
-    one, other = ((place / "policies.json").read_text() for place in places)
-    assert one == other and not (tmp_path / "runs/chain/iteration_02/optimize").exists()
-    assert "(unchanged)" in done(*line, folder=tmp_path).out
-    monkeypatch.setattr(Gate, "judge", lambda gate, problems, advice: judge(gate, ["it is no nearer"], advice))
-    assert "is refused: it is no nearer" in gsl(*line, "name=other", folder=tmp_path).lines[-1]
 
 
 def test_nothing_half_written_is_left_behind(chain: Path) -> None:

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import ctypes
 import errno
 import fcntl
+import importlib
 import json
 import logging
 import os
@@ -13,6 +15,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import pytest
@@ -22,6 +25,7 @@ from gsl.errors import ArtifactError, GslError
 from gsl.storage import hashing, manifest
 from gsl.storage.artifact import Artifact, build
 from gsl.storage.documents import write_json
+from gsl.storage.workplace import complete
 
 pytestmark = pytest.mark.slow
 
@@ -122,11 +126,23 @@ def test_a_changed_setting_is_refused_by_name(out: Path) -> None:
         built(Doubling(), built(Doubling(), out.with_name("b"), a=1, b=1, c=1, d=1).folder, a=2, b=2, c=2, d=2)
 
 
-def test_changed_sources_are_refused_as_gsl_itself(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    built(Doubling(), out)
-    monkeypatch.setattr("gsl.storage.identity.sources_hash", lambda _: "other")
-    with pytest.raises(ArtifactError, match="gsl itself"):
-        built(Doubling(), out)
+def own_stage(folder: Path, comment: str, monkeypatch: pytest.MonkeyPatch) -> Doubling:
+    """A stage of a module of a user's own."""
+    folder.mkdir()
+    (folder / "own_stage.py").write_text(
+        f"# {comment}\nfrom test_artifacts import Doubling\n\nclass Own(Doubling):\n    pass\n"
+    )
+    monkeypatch.delitem(sys.modules, "own_stage", raising=False)
+    monkeypatch.syspath_prepend(folder)
+    made: Doubling = importlib.import_module("own_stage").Own()
+    return made
+
+
+def test_changed_sources_are_refused_by_name(out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    built(own_stage(tmp_path / "before", "as it was", monkeypatch), out)
+    assert built(own_stage(tmp_path / "same", "as it was", monkeypatch), out).unchanged
+    with pytest.raises(ArtifactError, match="changed: gsl itself"):
+        built(own_stage(tmp_path / "after", "as it is", monkeypatch), out)
 
 
 def test_another_kind_is_refused_by_name(out: Path) -> None:
@@ -391,13 +407,18 @@ def test_a_kill_in_the_middle_of_the_renaming_loses_neither_the_old_nor_the_new(
     def ending(folder: Path) -> None:
         (folder / "progress").write_text("whole")
 
-    def dying(*_: Any) -> None:
+    flush = os.fsync
+
+    def dying(*_: Any, **__: Any) -> int:
         raise SystemExit  # as far as the folders go, the end of the process
 
-    for moment in ("exchange", "flush"):
+    def dying_at_last(descriptor: int) -> None:
+        return dying() if complete(out) else flush(descriptor)
+
+    for library, call, how in ((ctypes, "CDLL", dying), (os, "fsync", dying_at_last)):
         built(Resumable(1, ending=ending), out, force=True)
         with monkeypatch.context() as patch:
-            patch.setattr(f"gsl.storage.workplace.{moment}", dying)
+            patch.setattr(library, call, how)
             with pytest.raises(SystemExit):
                 built(Resumable(2, ending=ending), out, force=True)
         assert (out / "sub/payload.txt").read_text() == "11"
@@ -414,7 +435,7 @@ def test_the_key_is_in_no_complete_artifact_and_the_old_one_goes(
     out: Path, swap: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not swap:
-        monkeypatch.setattr("gsl.storage.workplace.exchange", lambda one, other: False)
+        monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: SimpleNamespace())  # a system without renameat2
     for number in (1, 2):
         built(Doubling(number), out, force=True)
         assert (out / "sub/payload.txt").read_text() == 2 * str(number)

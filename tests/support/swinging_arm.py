@@ -1,5 +1,6 @@
 """Simulated logs of an arm of two joints whose causes are known, and their diagnosis; it takes seconds."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -78,4 +79,11 @@ def logged(held: Held, targets: np.ndarray, noise: float, rng: np.random.Generat
 
 
 def found(effects: Mapping[str, Any], *, seed: int = 1, **options: Any) -> Findings:
-    return diagnose(log(effects, seed), nominal(arm()), 0.002, replace(QUICK, **options), lambda phase: None)
+    """What a diagnosis finds; the same question is asked once."""
+    return _found(json.dumps(effects, sort_keys=True), seed, tuple(sorted(options.items())))
+
+
+@cache
+def _found(effects: str, seed: int, options: tuple[tuple[str, Any], ...]) -> Findings:
+    made, how = log(json.loads(effects), seed), replace(QUICK, **dict(options))
+    return diagnose(made, nominal(arm()), 0.002, how, lambda phase: None)

@@ -225,6 +225,8 @@ def test_a_delay_stays_within_what_servos_remember() -> None:
 
 def test_members_differ_by_what_the_log_leaves_open() -> None:
     found = learn_servo(prepared(SLOW), nominal(ROBOT), STEP, labelled=False, seed=1, threads=1, members=3)
+    for name, values in learned(prepared(SLOW)).model.arrays().items():  # the first is what it is by itself
+        np.testing.assert_array_equal(found.model.arrays()[name], values)
     gains = [float(one.numbers["kp"][0]) for one in (found.model, *(member.model for member in found.further))]
     assert len(set(gains)) == 3
     assert gains == pytest.approx([np.log(0.7)] * 3, abs=0.1)

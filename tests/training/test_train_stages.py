@@ -289,6 +289,7 @@ def test_a_residual_is_trained_whatever_the_recipe_says_of_models(tmp_path: Path
         "iterate",
         "recipe=paper",
         "preset=toy",
+        "task.duration=1.6",
         "grounding=gat_residual",
         *few,
         "workers=1",

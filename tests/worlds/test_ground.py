@@ -8,6 +8,7 @@ from bodies import STANCE, held, walked, world
 from scipy.spatial.transform import Rotation
 from test_rotor import momentum
 
+from gsl.core.body import lump
 from gsl.core.plant import Contact, Push, nominal
 from gsl.errors import GslError
 from gsl.robots.nao import nao
@@ -31,7 +32,7 @@ def rough():
 
 def heights_in_bullet(env: BulletEnv, points: np.ndarray) -> np.ndarray:
     """Height of the ground at points [m], shape (n, 2), by rays from above."""
-    engine = env._engine
+    engine = env.engine
     assert engine is not None
     engine.bullet.removeBody(engine.body, engine.client)
     engine.body = -1
@@ -71,7 +72,7 @@ def test_a_seed_has_its_surface_whatever_came_before_and_nothing_piles_up(rough:
     fresh = world(ROUGH).make()
     np.testing.assert_array_equal(walked(fresh, 2, 0.6), other)
     fresh.close()
-    engine = rough._engine
+    engine = rough.engine
     assert engine is not None and engine.bullet.getNumBodies(engine.client) == 3
 
 
@@ -188,13 +189,15 @@ def test_a_held_base_does_not_feel_a_push() -> None:
     np.testing.assert_allclose(rows[1], rows[0], atol=1e-9)
 
 
-def test_who_comes_to_the_edge_of_random_ground_is_told_so(rough: BulletEnv, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gsl.worlds.bullet.REACH", 1e-5)
-    rough.reset(seed=1)
+def test_who_comes_to_the_edge_of_random_ground_is_told_so(rough: BulletEnv) -> None:
+    targets = STANCE[DRIVE]
+    start = resting(lump(nao()), targets, targets, floating=True)
+    thrown = start._replace(reading=start.reading._replace(velocity=np.array([60.0 * REACH, 0.0, 0.0])))
+    rough.reset(seed=1, options={"start": thrown})
     with pytest.raises(GslError, match=r"the edge of the uneven ground .* shorten task\.duration"):
         for _ in range(5):
             rough.step(np.full(len(rough.layout.joints), 0.2))
     plane = world({}).make()
-    plane.reset(seed=1)
+    plane.reset(seed=1, options={"start": thrown})
     plane.step(np.full(len(rough.layout.joints), 0.2))
     plane.close()

@@ -26,8 +26,8 @@ def at_rest(effects: dict[str, Any], seeds: range, periods: int = 60) -> np.ndar
         env.reset(seed=seed, options={"posture": STANCE})
         for _ in range(periods):
             env.step(STANCE)
-            assert env._engine is not None
-            rows.append(env._engine.read().motion[0].copy())
+            assert env.engine is not None
+            rows.append(env.engine.read().motion[0].copy())
     env.close()
     return np.array(rows).reshape(len(seeds), periods, -1)
 

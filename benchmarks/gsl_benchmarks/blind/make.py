@@ -129,12 +129,13 @@ def _dialled(
         for _ in range(TRIES):
             extra = effect in EXTRAS
             dial = drawn_extra(effect, robot, rng) if extra else drawn(effect, robot, rng, alone=label.kind == JOINT)
-            if (found := turned_up(_gap_of(dial, yardstick, label.noise), label.strength, rng)) is not None:
+            if (found := turned_up(measure_gap(dial, yardstick, label.noise), label.strength, rng)) is not None:
                 return dial, *found
     raise GslError(f"no effect reaches the strength {label.strength}; choose a larger excitation.amplitude=")
 
 
-def _gap_of(dial: Dial, yardstick: Yardstick, noise: float) -> Callable[[float], float]:
+def measure_gap(dial: Dial, yardstick: Yardstick, noise: float) -> Callable[[float], float]:
+    """Return the gap of a dial's effect as a function of how far it is turned up."""
     joints = dial.mask(yardstick.plant)
 
     def gap(share: float) -> float:

@@ -180,13 +180,13 @@ def _leads(
         totals = costs[:, mask].sum(axis=1) + ground.costs[~mask].sum()
         best = int(np.argmin(totals))
         seen = grid[best, 0] == candidate.seen
-        at = grid[best] if seen else _between(grid, totals, best, wide=bool(candidate.wide.all()))
+        at = grid[best] if seen else interpolate(grid, totals, best, wide=bool(candidate.wide.all()))
         start = np.where(mask, shifts[best], ground.best)
         leads.append(Lead(candidate.on(scope) if wide else candidate, at, start, float(totals[best])))
     return leads
 
 
-def _between(grid: np.ndarray, totals: np.ndarray, best: int, *, wide: bool) -> np.ndarray:
+def interpolate(grid: np.ndarray, totals: np.ndarray, best: int, *, wide: bool) -> np.ndarray:
     """Return the lowest point of a parabola through the best grid value of one parameter and its neighbours.
 
     Of a wide range it is one over the logarithms.

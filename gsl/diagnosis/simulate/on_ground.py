@@ -62,8 +62,8 @@ class Walking:
 
     def _replay(self, plant: Plant, windows: Any) -> np.ndarray:
         physics = Physics(self.step, self.iterations, self.period, floating=True)
-        windows = windows._replace(motion=_moving(plant, windows.motion))
-        heights = _heights(plant, windows)
+        windows = windows._replace(motion=read_motion(plant, windows.motion))
+        heights = find_heights(plant, windows)
         shares = np.array_split(np.arange(len(heights)), min(self.workers, len(heights)))
         parts = [(OnGround(*(part[share] for part in windows)), heights[share]) for share in shares]
         if len(parts) == 1:
@@ -111,7 +111,7 @@ def _replay_window(engine: Engine, window: OnGround, height: float, joints: int)
     return np.array(rows)
 
 
-def _moving(plant: Plant, measured: np.ndarray) -> np.ndarray:
+def read_motion(plant: Plant, measured: np.ndarray) -> np.ndarray:
     """Return how joints move at the beginning of windows where encoders tell `measured`, shape (W, 2, n_motors).
 
     In the air a warm-up forgets a wrong start; on the ground the robot stands on it.
@@ -120,7 +120,7 @@ def _moving(plant: Plant, measured: np.ndarray) -> np.ndarray:
     return np.stack([place, measured[:, 1]], axis=1)
 
 
-def _heights(plant: Plant, windows: OnGround) -> np.ndarray:
+def find_heights(plant: Plant, windows: OnGround) -> np.ndarray:
     """Return the height of the base over the ground at the beginning of windows [m], shape (W,).
 
     A log tells it with an error that would lift a sole off hard ground, or press it in; so the lowest sole is where a
