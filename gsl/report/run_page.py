@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
+from gsl.core.unit import Unit
 from gsl.report.footfalls import Walk, footfall_figure
 from gsl.report.joint_trace import Traces, joint_trace_figure
 from gsl.report.learning_curve import Search, learning_curve_figure
@@ -35,6 +36,38 @@ class Answer(NamedTuple):
     sentence: str
     sure: bool
     more: Sequence[str] = ()
+
+
+def describe_gain(
+    name: str,
+    after: Mapping[str, Any],
+    before: Mapping[str, Any],
+    gain: Mapping[str, Any],
+    unit: Unit,
+    over: str = "π0",
+) -> tuple[str, bool]:
+    """Return what a policy gains in a sentence, and whether that is significant.
+
+    Args:
+        name: Of the policy.
+        after: Its value and interval on the real side.
+        before: Those of π0.
+        gain: Its value and interval.
+        unit: Of the task.
+        over: What the gain is over.
+    """
+    low = gain["interval"][0]
+    sure = low is not None and low > 0.0
+    reached = f"{unit.shown(after['value'])}{_bound(unit, after['interval'])}"
+    more = f"{unit.shown(gain['value'], sign=True)}{_bound(unit, gain['interval'], sign=True)}"
+    significant = f"the gain over {over}, {more}, is {'' if sure else 'not '}significant"
+    start = unit.bare(before["value"])
+    return f"{name} reaches {reached} on the real side, π0 {start}: {significant}.", sure
+
+
+def _bound(unit: Unit, interval: list[float | None], *, sign: bool = False) -> str:
+    shown = unit.interval(interval, sign=sign)
+    return "" if shown == "-" else f" (95 % {shown})"
 
 
 class Change(NamedTuple):
