@@ -15,10 +15,11 @@ from gsl.report.learning_curve import Search, learning_curve_figure
 from gsl.report.page import page
 from gsl.report.parts import Part, choice, command, element, facts, folded, prose, section, table
 from gsl.report.svg import WIDTH, svg
-from gsl.storage.artifact import Origin, origin
 from gsl.storage.hashing import PAGE, SHORT
+from gsl.storage.origin import Origin, origin
 
 MARKS = {"good": "✓", "doubt": "?"}
+LONG = 12  # rows of a lineage that are shown at once
 PARAMETERS = 40  # of a policy that are listed, the most changed first
 
 
@@ -107,11 +108,15 @@ def describe_origin(how: Origin | None) -> list[Part]:
     return [
         section(
             "Lineage",
-            table(("role", "where", "contents"), rows) if rows else None,
+            _fold_long(table(("role", "where", "contents"), rows), len(rows)) if rows else None,
             note="Where it lies, as seen from this page. gsl lineage and gsl verify follow it to the first log.",
         ),
         section("How to repeat it", again, settings),
     ]
+
+
+def _fold_long(shown: Markup, rows: int) -> Markup:
+    return shown if rows <= LONG else folded(f"all {rows}", shown)
 
 
 def curves(searches: Sequence[Search], unit: str) -> Markup | None:

@@ -11,7 +11,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, Protocol
 
 import yaml
 
@@ -28,6 +28,7 @@ from gsl.storage import documents, manifest
 from gsl.storage.identity import Identity, changes, content_hash, identify
 from gsl.storage.lineage import broken_link, out_of_date
 from gsl.storage.manifest import Manifest, Parent
+from gsl.storage.origin import Origin, at_work, relative
 from gsl.storage.read_files import own_effects, read_files
 from gsl.storage.versions import commit, versions
 from gsl.storage.whole import explain_failures, flush_tree, remove_temporary
@@ -141,49 +142,8 @@ def build(
     return note(Artifact(out, made))
 
 
-class Origin(NamedTuple):
-    """How what a stage is at work on comes about, for its page.
-
-    Attributes:
-        command: As it was typed.
-        settings: All of them, as config.yaml has them.
-        parents: What it is made from.
-        links: What it has built beside itself so far.
-    """
-
-    command: str
-    settings: str
-    parents: tuple[Parent, ...]
-    links: tuple[Parent, ...]
-
-
-class _Work(NamedTuple):
-    """A stage at work in `folder`; `built` is what it has built beside itself, by absolute path."""
-
-    command: str
-    settings: str
-    parents: tuple[Parent, ...]
-    built: Mapping[Path, Artifact]
-    folder: Path
-
-    @property
-    def links(self) -> tuple[Parent, ...]:
-        """What it has built, as its manifest has it."""
-        return tuple(
-            Parent(one.manifest.kind, _relative(path, self.folder), one.manifest.contents)
-            for path, one in self.built.items()
-        )
-
-
-_at_work: ContextVar[_Work | None] = ContextVar("at_work", default=None)
 _built: ContextVar[dict[Path, Artifact] | None] = ContextVar("built", default=None)
 """What the stage that is at work has built beside itself, by absolute path."""
-
-
-def origin() -> Origin | None:
-    """Return how the artifact of the stage that is at work comes about, None where no stage is."""
-    work = _at_work.get()
-    return Origin(work.command, work.settings, work.parents, work.links) if work else None
 
 
 def note(artifact: Artifact) -> Artifact:
@@ -245,16 +205,10 @@ def _work(
     (folder / CONFIG).write_text(settings, encoding="utf-8")
     with log_to(folder) as logger:
         logger.info("%s begins: %s", identity.kind, command)
-        parents = tuple(
-            Parent(role, _relative(path, folder), identity.parents[role]) for role, path in _sources(stage).items()
-        )
-        with collect_links() as links:
-            work = _Work(command, settings, parents, links, folder)
-            token = _at_work.set(work)
-            try:
-                metrics = stage.run(folder, console)
-            finally:
-                _at_work.reset(token)
+        found = _sources(stage).items()
+        parents = tuple(Parent(role, relative(path, folder), identity.parents[role]) for role, path in found)
+        with collect_links() as links, at_work(Origin(command, settings, parents, folder, links)) as origin:
+            metrics = stage.run(folder, console)
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
     documents.write_json(folder / METRICS, metrics)
@@ -266,7 +220,7 @@ def _work(
         command=command,
         files={name: file for name, file in manifest.inventory(folder).items() if name != KEY},
         parents=parents,
-        links=work.links,
+        links=origin.links,
         seeds=identity.seeds,
         sources=identity.sources,
         versions=versions(),
@@ -305,10 +259,6 @@ def _check_parents(stage: Stage, identity: Identity) -> None:
         if not same:
             what = f"{role} ({path or 'gone'})"
             raise GslError(f"{what}: was changed while {identity.kind} was at work; run the command again")
-
-
-def _relative(path: Path, folder: Path) -> str:
-    return Path(os.path.relpath(path, folder)).as_posix()
 
 
 def _sources(stage: Stage) -> dict[str, Path]:
