@@ -21,7 +21,7 @@ install: $(INSTALLED) ## Install gsl, its experiments and its benchmarks from th
 demo: $(INSTALLED) ## Improve a walk for a "real" robot that the optimiser never touches; some minutes.
 	$(GSL) iterate $(DEMO)
 	@echo "what there is to look at:"
-	@find runs/demo -type f \( -name '*.png' -o -name '*.md' -o -name '*.parquet' -o -name 'policies.json' \) | sort
+	@find runs/demo -type f \( -name '*.png' -o -name '*.md' -o -name '*.parquet' -o -name 'policies.json' -o -name 'report.html' \) | sort
 
 # Two workers have two cores: threads of matrix products would only be in their way.
 test: $(INSTALLED) ## Check the style, run the tests.

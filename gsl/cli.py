@@ -93,6 +93,14 @@ def show(reference: Reference, json: Json = False) -> None:
     raise typer.Exit(show_artifact(reference, Console(json=json)))
 
 
+@app.command("open")
+def open_page(reference: Reference, json: Json = False) -> None:
+    """Open the page of an artifact in a browser; without a display, say where it is."""
+    from gsl.commandline.listing import open_artifact
+
+    open_artifact(reference, Console(json=json))
+
+
 @app.command()
 def verify(
     reference: Annotated[str | None, typer.Argument(metavar="[REF]", help="Path, or name of a run; or all.")] = None,

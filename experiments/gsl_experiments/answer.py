@@ -32,7 +32,7 @@ def name_difference(what: str, difference: Interval, unit: Unit) -> str:
     """
     mean = f"{what}: {unit.shown(difference.mean, sign=True)}"
     if math.isinf(difference.upper):
-        return f"{mean}, of a single trial, which has no interval."
+        return f"{mean}, in a single trial, which gives no interval."
     bounds = unit.interval([difference.lower, difference.upper], sign=True)
     return f"{mean} (95 % {bounds}), which is {'' if is_significant(difference) else 'not '}significant."
 

@@ -14,8 +14,7 @@ from gsl.errors import GslError
 from gsl.rollout.cluster import chosen_cluster
 from gsl.rollout.parallel import Workers, arriving
 from gsl.stages.iterate import Iterate
-from gsl.storage.artifact import Artifact
-from gsl.storage.at_work import collect_links, note
+from gsl.storage.artifact import Artifact, collect_links, note
 
 
 class Study(Protocol):

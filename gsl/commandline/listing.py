@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import sys
+import webbrowser
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from datetime import datetime
@@ -15,7 +17,7 @@ from gsl.report.account import account, flat, plain
 from gsl.report.console import Console
 from gsl.report.headline import headline
 from gsl.storage.artifact import Artifact
-from gsl.storage.hashing import SHORT
+from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.identity import content_hash
 from gsl.storage.lineage import out_of_date
 from gsl.storage.manifest import Manifest, Parent, find_damage, read
@@ -77,6 +79,26 @@ def show_artifact(reference: str, console: Console) -> int:
     if damaged is None:
         return 0
     return console.error(f"{folder / damaged}: is not as the manifest says", 1, command="gsl show")
+
+
+def open_artifact(reference: str, console: Console) -> None:
+    """Open the page of an artifact in a browser, and say where it is; a run of several stages may have one page above.
+
+    Raises:
+        ArtifactError: There is no such artifact, or it has no page.
+    """
+    above = list((RUNS / reference).glob(f"*/{PAGE}"))
+    folder = above[0].parent if len(above) == 1 else resolve(reference)
+    page = folder / PAGE
+    if not page.is_file():
+        raise ArtifactError(folder, f"has no page: {read(folder).kind} writes none; gsl show says what is in it")
+    shown = has_display() and webbrowser.open(page.absolute().as_uri())
+    console.result({"page": page, "opened": shown}, text=page.as_posix())
+
+
+def has_display() -> bool:
+    """Whether a browser can show something here: a text browser in the terminal would take the terminal."""
+    return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def _origin(manifest: Manifest) -> Iterator[tuple[str, str]]:

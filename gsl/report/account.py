@@ -18,7 +18,7 @@ from gsl.report.headline import unit_of
 from gsl.report.markdown import read_table
 from gsl.storage.artifact import METRICS, Artifact
 from gsl.storage.diagnosis_report import report_of
-from gsl.storage.hashing import CIRCUMSTANCES
+from gsl.storage.hashing import CIRCUMSTANCES, PAGE
 
 
 class Told(NamedTuple):
@@ -181,6 +181,7 @@ def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
         *(f"warning: {line}" for line in metrics.get("broken_promises", [])),
         f"real data: {air}{learned} episodes to learn from, {measured} to measure, {spent} in all{more}",
         f"plots: {folder.as_posix()}/ ({plots})",
+        f"page: {(folder / PAGE).as_posix()}",
     ]
     return Told(in_unit("grounded simulation learning", unit.name), titles, rows, "\n".join(below))
 

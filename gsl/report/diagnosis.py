@@ -18,7 +18,7 @@ from gsl.report.diagnosis_words import Document, part
 from gsl.report.page import page
 from gsl.report.parts import clean, prose
 from gsl.report.run_page import describe_origin
-from gsl.storage.at_work import origin
+from gsl.storage.origin import origin
 
 _SECTIONS = (
     caveats,

@@ -10,7 +10,7 @@ from gsl.core.unit import Unit
 from gsl.report.account import describe_choice, evaluation_table
 from gsl.report.learning_curve import search
 from gsl.report.parts import section, table
-from gsl.report.run_page import Answer, Change, budget, curves, parameters, write_page
+from gsl.report.run_page import Answer, Change, budget, curves, describe_gain, parameters, write_page
 
 _PHASES = {"policies": "episodes to choose", "check": "episodes to check", "confirmation": "fresh episodes to report"}
 
@@ -27,13 +27,12 @@ def write_evaluation_page(
         change: Of the policy, from the first to the best.
         unit: Of the task.
     """
-    told = describe_choice(metrics, unit)
-    gain = metrics["gain"]["interval"]
-    answer = Answer(
-        "Which of these policies is the best on the real side?",
-        f"{told[0].upper()}{told[1:]}.",
-        sure=bool(metrics["best_generation"] and gain[0] is not None and gain[0] > 0.0),
-    )
+    question, told = "Which of these policies is the best on the real side?", describe_choice(metrics, unit)
+    sentence, sure = f"{told[0].upper()}{told[1:]}.", False
+    if metrics["best_generation"]:
+        after, before, gain = (metrics[key] for key in ("returned", "baseline", "gain"))
+        sentence, sure = describe_gain(metrics["best"], after, before, gain, unit)
+    answer = Answer(question, sentence, sure)
     columns, rows = evaluation_table(document, unit)
     searched = search("all policies", document, shown=unit.factor, returned=metrics["best"], start="π0")
     spent = [(words, str(sum(one["episodes"] for one in document[phase]))) for phase, words in _PHASES.items()]

@@ -13,7 +13,7 @@ from gsl.report.evaluation_cells import ends, format_ends
 from gsl.report.flight import Flight
 from gsl.report.learning_curve import Search, learning_curve, search
 from gsl.report.markdown import table
-from gsl.report.run_page import Answer
+from gsl.report.run_page import Answer, describe_gain
 from gsl.storage.artifact import Artifact
 from gsl.storage.policy_choice import EVALUATION
 
@@ -179,17 +179,13 @@ class Rounds:
         figures, unit = self.metrics(), self._unit
         question = "Does grounded simulation learning find a better policy for the real side?"
         after, before, gain = figures["returned"], figures["baseline"], figures["gain"]
-        reached = f"{unit.shown(after['value'])} (95 % {unit.interval(after['interval'])})"
         if self.best is None:
+            reached = f"{unit.shown(after['value'])} (95 % {unit.interval(after['interval'])})"
             sentence = f"No policy better than π0 was found. π0 is returned; it reaches {reached} on the real side."
             return Answer(question, sentence, sure=False, more=[self.verdict])
-        sure = bool(gain["interval"][0] > 0.0)
-        bounds = f"{unit.shown(gain['value'], sign=True)} (95 % {unit.interval(gain['interval'], sign=True)})"
-        last = "the gain" if figures["returned_iteration"] == 1 else "the last iteration's gain"
-        significant = f"{last} of {bounds} is {'' if sure else 'not '}significant"
-        start = unit.bare(before["value"])
-        sentence = f"The returned policy reaches {reached} on the real side, π0 {start}: {significant}."
-        return Answer(question, sentence, sure=sure, more=[self.verdict])
+        over = "π0" if figures["returned_iteration"] == 1 else "the iteration before"
+        sentence, sure = describe_gain("The returned policy", after, before, gain, unit, over)
+        return Answer(question, sentence, sure, more=[self.verdict])
 
     @property
     def budget(self) -> list[tuple[str, str]]:

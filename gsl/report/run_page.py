@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
+from gsl.core.unit import Unit
 from gsl.report.footfalls import Walk, footfall_figure
 from gsl.report.joint_trace import Traces, joint_trace_figure
 from gsl.report.learning_curve import Search, learning_curve_figure
 from gsl.report.page import page
 from gsl.report.parts import Part, choice, command, element, facts, folded, prose, section, table
 from gsl.report.svg import WIDTH, svg
-from gsl.storage.at_work import Origin, origin
 from gsl.storage.hashing import PAGE, SHORT
+from gsl.storage.origin import Origin, origin
 
 MARKS = {"good": "✓", "doubt": "?"}
+LONG = 12  # rows of a lineage that are shown at once
 PARAMETERS = 40  # of a policy that are listed, the most changed first
 
 
@@ -35,6 +37,38 @@ class Answer(NamedTuple):
     sentence: str
     sure: bool
     more: Sequence[str] = ()
+
+
+def describe_gain(
+    name: str,
+    after: Mapping[str, Any],
+    before: Mapping[str, Any],
+    gain: Mapping[str, Any],
+    unit: Unit,
+    over: str = "π0",
+) -> tuple[str, bool]:
+    """Return what a policy gains in a sentence, and whether that is significant.
+
+    Args:
+        name: Of the policy.
+        after: Its value and interval on the real side.
+        before: Those of π0.
+        gain: Its value and interval.
+        unit: Of the task.
+        over: What the gain is over.
+    """
+    low = gain["interval"][0]
+    sure = low is not None and low > 0.0
+    reached = f"{unit.shown(after['value'])}{_bound(unit, after['interval'])}"
+    more = f"{unit.shown(gain['value'], sign=True)}{_bound(unit, gain['interval'], sign=True)}"
+    significant = f"the gain over {over}, {more}, is {'' if sure else 'not '}significant"
+    start = unit.bare(before["value"])
+    return f"{name} reaches {reached} on the real side, π0 {start}: {significant}.", sure
+
+
+def _bound(unit: Unit, interval: list[float | None], *, sign: bool = False) -> str:
+    shown = unit.interval(interval, sign=sign)
+    return "" if shown == "-" else f" (95 % {shown})"
 
 
 class Change(NamedTuple):
@@ -74,11 +108,15 @@ def describe_origin(how: Origin | None) -> list[Part]:
     return [
         section(
             "Lineage",
-            table(("role", "where", "contents"), rows) if rows else None,
+            _fold_long(table(("role", "where", "contents"), rows), len(rows)) if rows else None,
             note="Where it lies, as seen from this page. gsl lineage and gsl verify follow it to the first log.",
         ),
         section("How to repeat it", again, settings),
     ]
+
+
+def _fold_long(shown: Markup, rows: int) -> Markup:
+    return shown if rows <= LONG else folded(f"all {rows}", shown)
 
 
 def curves(searches: Sequence[Search], unit: str) -> Markup | None:

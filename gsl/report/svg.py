@@ -29,16 +29,19 @@ def svg(figure: Figure, title: str) -> Markup:
         title: What it shows, for those who cannot see it.
     """
     import matplotlib
+    from matplotlib.text import Text
 
+    for text in figure.findobj(Text):
+        text.set_path_effects([])  # else its letters are drawn as shapes
     file = io.StringIO()
     settings: Any = {"svg.fonttype": "none", "svg.hashsalt": "gsl", "path.simplify_threshold": 0.2}
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     with look(), matplotlib.rc_context(settings), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")  # the reader's own font has it
         figure.savefig(file, format="svg", metadata=nothing)
-    text = file.getvalue()
-    (size,) = _HEAD.findall(text)[:1]
-    inside = text[text.index(">", text.index("<svg ")) + 1 : text.rindex("</svg>")]
+    whole = file.getvalue()
+    (size,) = _HEAD.findall(whole)[:1]
+    inside = whole[whole.index(">", whole.index("<svg ")) + 1 : whole.rindex("</svg>")]
     inside = _OWN_ID.sub("<g>", inside.replace("xlink:href", "href").replace("'DejaVu Sans'", "var(--font)"))
     inside = _COLOUR.sub(lambda match: f"var(--{ROLES[match[0]]})", re.sub(r"\n\s*", "\n", inside))
     drawn = Markup('<svg viewBox="{}" role="img" aria-label="{}">').format(size, title) + Markup(inside + "</svg>")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,10 +25,10 @@ from gsl.core.yaml_tree import yaml_tree
 from gsl.effects.effect import own
 from gsl.errors import ArtifactError, GslError, InputError
 from gsl.storage import documents, manifest
-from gsl.storage.at_work import Work, links_of, note, relative, work_at
 from gsl.storage.identity import Identity, changes, content_hash, identify
 from gsl.storage.lineage import broken_link, out_of_date
 from gsl.storage.manifest import Manifest, Parent
+from gsl.storage.origin import Origin, at_work, relative
 from gsl.storage.read_files import own_effects, read_files
 from gsl.storage.versions import commit, versions
 from gsl.storage.whole import explain_failures, flush_tree, remove_temporary
@@ -140,6 +142,28 @@ def build(
     return note(Artifact(out, made))
 
 
+_built: ContextVar[dict[Path, Artifact] | None] = ContextVar("built", default=None)
+"""What the stage that is at work has built beside itself, by absolute path."""
+
+
+def note(artifact: Artifact) -> Artifact:
+    """Note an artifact as a link of the stage that is at work."""
+    if (built := _built.get()) is not None:
+        built[artifact.folder.absolute()] = artifact
+    return artifact
+
+
+@contextmanager
+def collect_links() -> Iterator[Mapping[Path, Artifact]]:
+    """Within, the artifacts that are built or are there already are collected, by absolute path."""
+    links: dict[Path, Artifact] = {}
+    token = _built.set(links)
+    try:
+        yield links
+    finally:
+        _built.reset(token)
+
+
 def _intact(folder: Path, key: str) -> Manifest | None:
     """Return the manifest of a folder that is the artifact of this key and as it was written."""
     try:
@@ -181,10 +205,9 @@ def _work(
     (folder / CONFIG).write_text(settings, encoding="utf-8")
     with log_to(folder) as logger:
         logger.info("%s begins: %s", identity.kind, command)
-        parents = tuple(
-            Parent(role, relative(path, folder), identity.parents[role]) for role, path in _sources(stage).items()
-        )
-        with work_at(Work(command, settings, parents, folder)) as links:
+        found = _sources(stage).items()
+        parents = tuple(Parent(role, relative(path, folder), identity.parents[role]) for role, path in found)
+        with collect_links() as links, at_work(Origin(command, settings, parents, folder, links)) as origin:
             metrics = stage.run(folder, console)
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
@@ -197,7 +220,7 @@ def _work(
         command=command,
         files={name: file for name, file in manifest.inventory(folder).items() if name != KEY},
         parents=parents,
-        links=links_of(links, folder),
+        links=origin.links,
         seeds=identity.seeds,
         sources=identity.sources,
         versions=versions(),

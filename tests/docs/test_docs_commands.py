@@ -39,6 +39,7 @@ LOOKING = {
     "show": 2,
     "verify": 2,
     "lineage": 2,
+    "open": 2,
     "rerun": 2,
     "render": 4,
 }  # without settings; words at most

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from commands import SMALL, Said, done, gsl, started
+from page_reader import Page, check_alone, words
 
 pytestmark = pytest.mark.slow
 
@@ -136,6 +137,25 @@ def test_iterate_runs_the_whole_chain_and_says_what_it_cost(whole: tuple[Path, S
     assert {"policies.json", "learning_curve.png", "joint_trace.png", "walk.png", "table.md"} < made
 
 
+def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[Path, Said]) -> None:
+    run = whole[0] / "runs/whole"
+    metrics = json.loads((run / "iterate/metrics.json").read_text())
+    pages = {name: (run / name / "report.html").read_text("utf-8") for name in ("iterate", "iteration_01/evaluate")}
+    for text in pages.values():
+        check_alone(text)
+        assert len(text) < 1_500_000 and f"{100.0 * metrics['returned']['value']:.1f}" in words(text)
+    said = words(pages["iterate"])
+    titles, _, *rows = (run / "iterate/table.md").read_text().split("\n\n")[0].splitlines()
+    for row in (titles, *rows):
+        assert " ".join(cell for line in row.split("|") if (cell := line.strip())) in said
+    assert metrics["verdict"] in said.replace("\xa0", " ")
+    seen = Page(pages["iterate"])
+    assert len([one for one in seen.attributes if one[1] == "data-of"]) == seen.tags["option"] > 1
+    for section in ("Learning curves", "What grounding changes", "Joint by joint", "Footfalls", "Real data", "Lineage"):
+        assert section in said
+    assert "../iteration_01/evaluate" in said and "gsl iterate" in said
+
+
 def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr(whole: tuple[Path, Said]) -> None:
     folder, said = whole
     table = said.out[said.out.index("grounded simulation learning [cm/s]") :]
@@ -151,7 +171,10 @@ def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr
         in table
     )
     assert metrics["verdict"] in table
-    assert "plots: runs/whole/iterate/ (joint_trace.png, learning_curve.png, walk.png)\n" in table
+    assert (
+        "plots: runs/whole/iterate/ (joint_trace.png, learning_curve.png, walk.png)\npage: runs/whole/iterate/report.html\n"
+        in table
+    )
     assert table.splitlines()[-1] == "runs/whole/iterate"
     grown = [line for line in said.lines if line.startswith("  ")]
     assert grown[0].split()[:2] == ["iteration", "policy"]

@@ -1,0 +1,66 @@
+"""How the artifact that a stage is at work on comes about: command, settings, what it is made from and has built."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gsl.storage.manifest import Parent
+
+if TYPE_CHECKING:
+    from gsl.storage.artifact import Artifact
+
+
+@dataclass(frozen=True)
+class Origin:
+    """How an artifact comes about.
+
+    Attributes:
+        command: As it was typed.
+        settings: All of them, as config.yaml has them.
+        parents: What it is made from.
+        folder: Where it is made.
+        built: What has been built beside it so far, by absolute path; it grows.
+    """
+
+    command: str
+    settings: str
+    parents: tuple[Parent, ...]
+    folder: Path
+    built: Mapping[Path, Artifact]
+
+    @property
+    def links(self) -> tuple[Parent, ...]:
+        """What has been built beside it, as its manifest names it."""
+        return tuple(
+            Parent(one.manifest.kind, relative(path, self.folder), one.manifest.contents)
+            for path, one in self.built.items()
+        )
+
+
+_at_work: ContextVar[Origin | None] = ContextVar("at_work", default=None)
+
+
+@contextmanager
+def at_work(origin: Origin) -> Iterator[Origin]:
+    """Let a stage see, within, how its artifact comes about."""
+    token = _at_work.set(origin)
+    try:
+        yield origin
+    finally:
+        _at_work.reset(token)
+
+
+def origin() -> Origin | None:
+    """Return how the artifact of the stage that is at work comes about, None where no stage is."""
+    return _at_work.get()
+
+
+def relative(path: Path, folder: Path) -> str:
+    """Return a path as seen from a folder."""
+    return Path(os.path.relpath(path, folder)).as_posix()

@@ -1,0 +1,213 @@
+"""The page of a run: the figures of its result, nothing from outside, and no name is markup."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from page_reader import Page, check_alone, words
+
+from gsl.core.unit import Unit
+from gsl.report.charts import Bar, Curve, Dot, Pair, Span, bar_chart, dot_chart, line_chart, scatter
+from gsl.report.evaluation_page import write_evaluation_page
+from gsl.report.footfalls import Walk, footfall_figure
+from gsl.report.iteration_page import grounding
+from gsl.report.joint_trace import Traces
+from gsl.report.learning_curve import search
+from gsl.report.markdown import table as markdown
+from gsl.report.parts import element, join, prose, table
+from gsl.report.run_page import Answer, Change, curves, footfalls, joints, parameters, write_page
+from gsl.report.study_page import write_study_page
+from gsl.report.style import COLOURS, curve_figure, look
+
+HOSTILE = "<script>alert(1)</script>\"' onload='x' $\\frac{"
+TIME = np.arange(0.0, 0.8, 0.02)
+UNIT = Unit(100.0, "cm/s")
+
+
+def trace(late: float) -> Traces:
+    return Traces(TIME, np.sin(TIME), np.sin(TIME - late), np.sin(TIME), np.sin(TIME - late) + math.radians(2.0))
+
+
+def measured(name: str, generation: int | None, value: float, falls: int = 0) -> dict[str, Any]:
+    bounds = [None, None] if falls else [value - 0.01, value + 0.01]
+    return {"name": name, "generation": generation, "value_sim": None, "value": value, "interval": bounds,
+            "falls": falls, "episodes": 3, "outcome": {}}  # fmt: skip
+
+
+PI0, BEST = measured("pi0", None, 0.19), measured("generation_01", 1, 0.21)
+DOCUMENT = {"policies": [PI0, BEST, measured("generation_02", 2, 0.05, falls=1)], "check": [BEST],
+            "confirmation": [PI0, BEST]}  # fmt: skip
+METRICS = {
+    "best": "generation_01", "best_generation": 1, "returned": BEST, "baseline": PI0, "real_episodes": 18,
+    "gain": {"value": 0.02, "interval": [0.004, 0.036], "share": 0.1}, "failed_check": [],
+}  # fmt: skip
+CHANGE = Change(("step", "swing"), (0.2, 1.0), (0.25, 0.9), (0.1, 0.5))
+
+
+def written(folder: Path, metrics: dict[str, Any] = METRICS) -> str:
+    write_evaluation_page(folder, metrics, DOCUMENT, CHANGE, UNIT)
+    return (folder / "report.html").read_text("utf-8")
+
+
+def test_an_evaluation_says_its_gain_with_its_interval_and_shows_what_the_table_shows(tmp_path: Path) -> None:
+    said = words(written(tmp_path))
+    assert "generation_01 reaches 21.0 cm/s (95 % 20.0 to 22.0) on the real side, π0 19.0: " in said
+    assert "the gain over π0, +2.0 cm/s (95 % +0.4 to +3.6), is significant." in said
+    assert "generation_02 5.0 1 of 3" in said and "generation_01, fresh 21.0 20.0 to 22.0 0 of 3" in said
+    assert "step 0.2 0.25 +0.50" in said and "swing 1 0.9 −0.20" in said
+    assert "episodes to choose 9 episodes to check 3 fresh episodes to report 6 in all 18" in said
+    assert "fell in real" in said  # marked in the learning curve
+
+
+def test_a_gain_that_may_be_none_is_called_so(tmp_path: Path) -> None:
+    unsure = {**METRICS, "gain": {"value": 0.02, "interval": [-0.01, 0.05], "share": 0.1}}
+    text = written(tmp_path, unsure)
+    assert "is not significant" in words(text) and Page(text).classes()["doubt"] == 1
+    assert Page(written(tmp_path)).classes()["good"] == 1
+
+
+def test_equal_runs_write_equal_pages_that_need_nothing_else(tmp_path: Path) -> None:
+    text = written(tmp_path)
+    assert written(tmp_path) == text
+    check_alone(text)
+    assert Page(text).tags["script"] == 0  # there is nothing to choose
+
+
+def joint_page(folder: Path, *names: str) -> str:
+    answer = Answer(f"Is {names[0]} right?", f"{names[0]} is.", sure=True)
+    walk = Walk(names[0], TIME, {"left": TIME < 0.4, "right": TIME >= 0.3}, fell=0.7)
+    seen = {name: trace(0.1 * (index + 1)) for index, name in enumerate(names)}
+    write_page(folder, answer, [joints(seen, names[0]), footfalls([walk])])
+    return (folder / "report.html").read_text("utf-8")
+
+
+def test_each_joint_can_be_chosen_and_only_our_script_runs(tmp_path: Path) -> None:
+    text = joint_page(tmp_path, "LKneePitch", "RKneePitch")
+    page = Page(text)
+    assert page.tags["option"] == 2 and page.tags["select"] == 1
+    assert [one[2] for one in page.attributes if one[1] == "data-of"] == ["LKneePitch", "RKneePitch"]
+    allowed = base64.b64encode(hashlib.sha256(page.script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{allowed}'" in text
+    check_alone(text)
+
+
+def test_a_hostile_name_is_shown_and_never_markup(tmp_path: Path) -> None:
+    plain, hostile = Page(joint_page(tmp_path, "knee")), Page(joint_page(tmp_path, HOSTILE))
+    assert hostile.tags == plain.tags
+    assert [one[:2] for one in hostile.attributes] == [one[:2] for one in plain.attributes]
+    assert hostile.script == plain.script and HOSTILE in hostile.text
+
+
+def test_a_browser_shows_the_joint_that_is_chosen_without_an_error(tmp_path: Path) -> None:
+    playwright = pytest.importorskip("playwright.sync_api")
+    joint_page(tmp_path, "LKneePitch", "RKneePitch")
+    wrong: list[str] = []
+    with playwright.sync_playwright() as started:
+        try:
+            browser = started.chromium.launch()
+        except playwright.Error:
+            pytest.skip("no browser is installed")
+        page = browser.new_page()
+        page.on("console", lambda message: wrong.append(message.text))
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("request", lambda sent: wrong.extend([] if sent.url.startswith("file:") else [sent.url]))
+        page.goto((tmp_path / "report.html").as_uri())
+        shown = page.locator("[data-of]:visible")
+        assert [one.get_attribute("data-of") for one in shown.all()] == ["LKneePitch"]
+        page.select_option("select", "RKneePitch")
+        assert [one.get_attribute("data-of") for one in shown.all()] == ["RKneePitch"]
+        browser.close()
+    assert wrong == []
+
+
+def test_a_study_shows_the_tables_and_sentences_of_its_file(tmp_path: Path) -> None:
+    text = (
+        f"{markdown(('grounding', 'value'), [('gat', '3.1')])}\nOne line\nand its end.\n\n{markdown(('a',), [('b',)])}"
+    )
+    (tmp_path / "table.md").write_text(text)
+    with look():
+        picture = curve_figure()
+        picture.subplots().set_title("what is seen")
+    write_study_page(tmp_path, Answer("Why?", "Therefore.", sure=False, more=["And so."]), ["table.md"], [picture])
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "grounding value gat 3.1 One line and its end. a b" in words(page)
+    assert "Why? ? Therefore. And so. Pictures" in words(page) and "what is seen" in words(page)
+    assert Page(page).tags["table"] == 2
+    check_alone(page)
+
+
+def test_what_the_check_measured_is_what_grounding_changes() -> None:
+    spans = {name: {"one_tick": {"by_joint_deg": {"knee": 9.0}}, "10_ticks": {"by_joint_deg": {"knee": error}}}
+             for name, error in (("ungrounded", 4.0), ("grounded", 1.0), ("no_change", 8.0))}  # fmt: skip
+    said = words(str(grounding({"errors": {"pi0": spans}, "problems": ["π0 falls"]}, ["Diagnosis: causes."])))
+    assert "Diagnosis: causes." in said and "The check says: π0 falls." in said
+    assert "Grounding takes the joint error from 4.00° to 1.00° of π0." in said
+    assert grounding(None, []) is None
+
+
+def test_of_many_parameters_the_most_changed_are_listed() -> None:
+    names = tuple(f"p{k}" for k in range(100))
+    after = tuple(float(k == 70) for k in range(100))
+    said = words(str(parameters(Change(names, (0.0,) * 100, after, (1.0,) * 100))))
+    assert "The 40 most changed of 100." in said and "p70 0 1 +1.00" in said
+
+
+def test_a_foot_bears_load_in_as_many_bars_as_it_stands() -> None:
+    loaded = np.sin(20.0 * TIME) > 0.0
+    (axes,) = footfall_figure([Walk("walk", TIME, {"left": loaded, "right": ~loaded})]).axes
+    left, right = (part.get_paths() for part in axes.collections)
+    starts = np.count_nonzero(np.diff(loaded.astype(int)) == 1) + loaded[0]
+    assert len(left) == starts and len(left) + len(right) == 1 + np.count_nonzero(np.diff(loaded.astype(int)))
+    lengths = [np.ptp(path.vertices[:, 0]) for path in (*left, *right)]
+    assert sum(lengths) == pytest.approx(TIME[-1])  # one foot or the other
+
+
+def test_a_picture_has_the_colours_of_the_page_and_its_words_as_text() -> None:
+    drawn = str(curves([search("iteration 1", DOCUMENT, shown=100.0, returned="generation_01")], "cm/s"))
+    assert "generation" in Page(drawn).text and "var(--real)" in drawn
+    assert not [colour for colour in COLOURS.values() if colour in drawn]
+    assert not re.search(r"#[0-9a-f]{6}\b", drawn)
+
+
+def axis_ends(chart: str | None) -> list[float]:
+    """Horizontal ends of the lines that are drawn as one stroke from left to right."""
+    assert chart is not None
+    return [float(x) for x in re.findall(r"L ([\d.]+) ", chart)]
+
+
+def test_charts_draw_nothing_where_there_is_no_number() -> None:
+    assert line_chart([Curve("a", "real", [], [])], x="x", y="y") is None
+    assert line_chart([Curve("a", "real", [0.0, 1.0], [None, None])], x="x", y="y") is None
+    assert bar_chart([]) is None and bar_chart([Bar("a", [("before", None)], "")]) is None
+    assert dot_chart([], str) is None and dot_chart([Dot("a", None, None, None, "other")], str) is None
+    assert scatter([], {}, x="real", y="sim") is None
+
+
+def test_a_line_is_broken_where_there_is_no_number() -> None:
+    whole = line_chart([Curve("a", "real", [0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 0.0, 1.0])], x="x", y="y")
+    broken = line_chart([Curve("a", "real", [0.0, 1.0, 2.0, 3.0], [0.0, 1.0, None, 1.0])], x="x", y="y")
+    assert len(axis_ends(broken)) < len(axis_ends(whole))
+
+
+def test_charts_tell_their_labels_and_values() -> None:
+    bars = bar_chart([Bar("simulator", [("before", 4.0), ("after", 1.0)], "4.00 × → 1.00 ×")], mark=1.0)
+    dots = dot_chart([Dot("gain of knee", 0.8, 0.7, 0.9, "after")], lambda share: f"{100 * share:.0f} %")
+    pairs = scatter([Pair("after", Span(1.0, 0.9, 1.1), Span(1.2))], {"after": "diagnosed"}, x="real", y="sim")
+    assert "simulator" in words(str(bars)) and "4.00 × → 1.00 ×" in words(str(bars))
+    assert "gain of knee" in words(str(dots)) and "80 %" in words(str(dots))
+    assert {"diagnosed", "real", "sim"} <= {*words(str(pairs)).split()}
+
+
+def test_text_is_escaped_once_and_markup_never() -> None:
+    assert element("td", "a < b", element("b", "&")) == "<td>a &lt; b<b>&amp;</b></td>"
+    assert element("p", kind="a", style='"') == '<p class="a" style="&#34;"></p>'
+    assert join("<", None, element("b", ">")) == "&lt;<b>&gt;</b>"
+    assert '<th scope="row">&lt;a&gt;</th><td>\ufffd</td>' in table(("x",), [("<a>", "\u202e")])
+    assert prose("97 % of 3 ms at 2 cm/s") == "97\u00a0% of 3\u00a0ms at 2\u00a0cm/s"
