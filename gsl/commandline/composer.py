@@ -153,7 +153,20 @@ def _check_grammar(overrides: Sequence[str]) -> None:
         try:
             parser.parse_override(override)
         except HydraException as error:
-            raise ConfigError(key_of(override), "cannot be read", given=override.partition("=")[2]) from error
+            key, _, value = override.partition("=")
+            raise ConfigError(key_of(override), _unreadable(key, value, parser), given=value) from error
+
+
+def _unreadable(key: str, value: str, parser: OverridesParser) -> str:
+    """Return what is wrong with a value: that it takes quotes within those of the shell, if these mend it."""
+    quoted = f'{key}="{value}"'
+    if not value or "'" in value or value[0] in "[{\"":  # more than a word that has odd characters
+        return "cannot be read"
+    try:
+        parser.parse_override(quoted)
+    except HydraException:
+        return "cannot be read"
+    return f"cannot be read; such characters take quotes inside those of the shell: '{quoted}'"
 
 
 def _check_effects(composition: Composition) -> None:

@@ -26,6 +26,17 @@ def _time(value: Any) -> Time:
     return _make(Time, {"column": value} if isinstance(value, str) else value, "time")
 
 
+def _joints(value: Any) -> Any:
+    """Return names of joints as texts, where some are whole numbers."""
+
+    def text(one: Any) -> Any:
+        return str(one) if isinstance(one, int) and not isinstance(one, bool) else one
+
+    if isinstance(value, dict):
+        return {text(name): text(one) for name, one in value.items()}
+    return [text(one) for one in value] if isinstance(value, list) else value
+
+
 def _signals(value: Any) -> dict[str, Signal]:
     return {str(name): _signal(one, f"signals.{name}") for name, one in _dictionary(value, "signals").items()}
 
@@ -58,7 +69,9 @@ class Mapping:
         dict[str, Signal], setting("where each signal is: a column, or {column, unit, ...}"), BeforeValidator(_signals)
     ]
     joints: Annotated[
-        list[str] | dict[str, str] | None, setting("names in order, or {name: name in the log}; found if null")
+        list[str] | dict[str, str] | None,
+        setting("names in order, or {name: name or number in the log}; found if null"),
+        BeforeValidator(_joints),
     ] = None
     robot: Annotated[str, setting("whose log it is")] = "unknown"
     source: Annotated[str | None, setting("where the logs lie, if source= does not say")] = None
@@ -66,7 +79,7 @@ class Mapping:
         str | dict[str, str] | None, setting("pattern of the files; {role: name} if an episode is a folder of several")
     ] = None
     episode: Annotated[str, setting("file, or the column whose value tells episodes apart", min_length=1)] = "file"
-    records: Annotated[str, setting("JSON: path of the list of rows")] = ""
+    records: Annotated[str, setting("JSON: path of the list of rows; HDF5: a group, or data/demo_* for many")] = ""
     time: Annotated[Time, setting("the stamps: {column, unit}, or {period}"), BeforeValidator(_time)] = Time()  # noqa: RUF009  it is frozen
     period: Annotated[float | None, setting("resample to it; null keeps the rows as they are", unit="s", gt=0)] = None
     command_offset: Annotated[float, setting("what the commands' clock is ahead of the sensors'", unit="s")] = 0.0
