@@ -21,7 +21,7 @@ from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
 from gsl.commandline.config_errors import Vocabulary, misshapen, translate, unfit, unknown_key
-from gsl.commandline.known_settings import list_keys, plain, read_declared
+from gsl.commandline.known_settings import list_keys, plain, read_declared, read_parts
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
 from gsl.commandline.own_word import find_own_modules, find_trust
 from gsl.commandline.plugins import folders, packages
@@ -160,7 +160,7 @@ def _check_grammar(overrides: Sequence[str]) -> None:
 def _unreadable(key: str, value: str, parser: OverridesParser) -> str:
     """Return what is wrong with a value: that it takes quotes within those of the shell, if these mend it."""
     quoted = f'{key}="{value}"'
-    if not value or "'" in value or value[0] in "[{\"":  # more than a word that has odd characters
+    if not value or "'" in value or value[0] in '[{"':  # more than a word that has odd characters
         return "cannot be read"
     try:
         parser.parse_override(quoted)
@@ -224,11 +224,17 @@ def _declares(command: str, overrides: list[str], key: str, trust: Sequence[str]
         return True
     above, _, mapping = parent.rpartition(".")
     around = _find_declared(config, above)
+    if name in read_parts(_node(config, above)).get(mapping, {}):
+        return True
     return mapping in around and around[mapping].named
 
 
 def _find_declared(config: DictConfig, path: str) -> Mapping[str, Setting]:
-    return read_declared(plain(OmegaConf.select(config, path) if path else config))
+    return read_declared(_node(config, path))
+
+
+def _node(config: DictConfig, path: str) -> dict[str, Any]:
+    return plain(OmegaConf.select(config, path) if path else config)
 
 
 def _of_choices(overrides: Sequence[str]) -> list[str]:

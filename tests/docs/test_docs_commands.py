@@ -33,7 +33,15 @@ ONCE = list({command.words: command for command in TYPED}.values())  # several p
 FLAGS = ("--json", "--multirun", "--check", "--help", "--cfg", "job")
 GROUPS = ("reproduce", "blind")  # whose commands have two words
 AT_ONCE = ("robot", "init")  # quick enough to be run as they are printed
-LOOKING = {"runs": 1, "bench": 1, "show": 2, "verify": 2, "lineage": 2, "rerun": 2, "render": 4}  # without settings; words at most
+LOOKING = {
+    "runs": 1,
+    "bench": 1,
+    "show": 2,
+    "verify": 2,
+    "lineage": 2,
+    "rerun": 2,
+    "render": 4,
+}  # without settings; words at most
 LACKING = "there is no learned servo in this path or run"  # what a command finds whose artifact a page makes before it
 # What the README's chain is made smaller by; this table says all that is run otherwise than it is printed.
 FEW = {"command_latency", "servo_gain", "coulomb_friction"}  # effects that a toy diagnosis tries

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,8 @@ class TensorArrays:
         self.path = path
         check_need(path, 2.0 * path.stat().st_size, memory)
         try:
-            with within(f"{path}: reading it", growth=memory):
+            with within(f"{path}: reading it", growth=memory), warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # of pickles of another protocol, which are refused
                 saved = torch.load(path, map_location="cpu", weights_only=True)
         except pickle.UnpicklingError as error:
             problem = "holds more than tensors (a pickle, which can run code): none is read; save a dict of tensors"
