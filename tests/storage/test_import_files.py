@@ -242,3 +242,26 @@ def test_a_lag_is_the_same_whenever_the_clock_began(tmp_path: Path) -> None:
         document = json.loads(gsl("import", "source=log.csv", "--check", "--json", folder=tmp_path).out)
         lags.append(document["episodes"][0]["lag"])
     assert lags == pytest.approx([lags[0]] * 3, abs=1e-4)
+
+
+def test_a_joint_that_turns_on_and_on_is_taken_when_its_unit_is_said(tmp_path: Path) -> None:
+    rolled = {
+        "t": TIME,
+        "q": np.column_stack([30.0 * TIME, POSITION[:, 1]]),
+        "g": np.column_stack([30.0 * TIME, ACTION[:, 1]]),
+    }
+    np.savez(tmp_path / "log.npz", **rolled)
+    line = refused("import", "source=log.npz", mapping(tmp_path, "g", "q", time="t"), folder=tmp_path)
+    assert "One that turns so far: unit: {shoulder: rad}" in line
+    position = {"column": "q", "unit": {"shoulder": "rad"}}
+    batch = imported(tmp_path, "log.npz", mapping(tmp_path, "g", position, time="t"))
+    assert batch.episodes[0].position[-1, 0] == pytest.approx(90.0)
+
+
+@pytest.mark.parametrize(("unit", "kind"), [("rad/s", "speed"), ("rpm", "speed"), ("Nm", "torque")])
+def test_commands_of_other_kinds_are_refused_as_what_they_are(tmp_path: Path, unit: str, kind: str) -> None:
+    np.savez(tmp_path / "log.npz", **ARRAYS)
+    chosen = mapping(tmp_path, {"column": "des_dof_pos", "unit": unit})
+    line = refused("import", "source=log.npz", chosen, folder=tmp_path)
+    assert f"is a command of {kind}; servos here follow positions, others are not taken yet" in line
+    assert f"goal_{kind}" in line

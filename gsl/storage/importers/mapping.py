@@ -12,7 +12,7 @@ from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
 from gsl.effects.effect import build
 from gsl.errors import ConfigError
-from gsl.storage.importers.signal import AXES, BY_NAME, KNOWN, Signal, Time
+from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, KNOWN, Signal, Time
 from gsl.storage.importers.units import factor
 from gsl.storage.trajectory_contract import INTEGERS, UNITS, suggestion
 
@@ -123,6 +123,12 @@ class Mapping:
             _check_unit(name, signal)
             _check_keys(f"signals.{name}", name, signal, names)
 
+    @property
+    def turning(self) -> list[str]:
+        """Joints of which it says one by one that their positions are in radians, however far they turn."""
+        unit = self.signals["position"].unit
+        return [joint for joint, one in unit.items() if one == "rad"] if isinstance(unit, dict) else []
+
     def check_joints(self, joints: Sequence[str]) -> None:
         """Refuse what is said of joints that a log does not have.
 
@@ -159,7 +165,20 @@ def _check_unit(name: str, signal: Signal) -> None:
         try:
             factor(unit, UNITS[name]) if unit and name in UNITS else None
         except ValueError as error:
-            raise ConfigError(f"{where}.unit{'.' * bool(joint)}{joint}", str(error), given=unit) from error
+            problem = _of_other_kind(unit) if name in COMMANDS else ""
+            raise ConfigError(f"{where}.unit{'.' * bool(joint)}{joint}", problem or str(error), given=unit) from error
+
+
+def _of_other_kind(unit: str) -> str:
+    """Return what to say of a command that is no position, nothing if it is of no kind that a servo takes."""
+    for wanted, kind in (("rad/s", "speed"), ("N·m", "torque")):
+        try:
+            factor(unit, wanted)
+        except ValueError:
+            continue
+        own = f"keep it as a column of your own, signals: {{goal_{kind}: ...}}"
+        return f"is a command of {kind}; servos here follow positions, others are not taken yet: {own}"
+    return ""
 
 
 def _check_keys(where: str, name: str, signal: Signal, joints: Sequence[str] | None) -> None:
