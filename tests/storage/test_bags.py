@@ -22,8 +22,8 @@ START = 1_700_000_000_000_000_000
 MOTORS = {
     "unitree_go/msg/MotorCmd": "uint8 mode\nfloat32 q\nfloat32 dq\nfloat32 tau\nfloat32 kp\nfloat32 kd\n",
     "unitree_go/msg/MotorState": "uint8 mode\nfloat32 q\nfloat32 dq\nfloat32 tau_est\nint8 temperature\n",
-    "unitree_go/msg/LowCmd": "uint8[2] head\nunitree_go/MotorCmd[3] motor_cmd\nuint32 crc\n",
-    "unitree_go/msg/LowState": "uint8[2] head\nunitree_go/MotorState[3] motor_state\nuint32 tick\n",
+    "unitree_go/msg/LowCmd": "uint8[2] head\nunitree_go/MotorCmd[13] motor_cmd\nuint32 crc\n",
+    "unitree_go/msg/LowState": "uint8[2] head\nunitree_go/MotorState[13] motor_state\nuint32 tick\n",
 }
 
 
@@ -62,8 +62,8 @@ def test_motors_in_an_array_of_messages_are_named_by_number(tmp_path: Path, plug
     head, rest = np.array([254, 239], np.uint8), 0.0
     topics: dict[str, list[Any]] = {"/lowcmd": [], "/lowstate": []}
     for goal, q in zip(GOAL, MEASURED, strict=True):
-        commands = [command(1, one, 0.0, 0.0, 20.0, 1.5) for one in (rest, *goal)]
-        states = [state(1, one, 0.1, 0.2, 30) for one in (rest, *q)]
+        commands = [command(1, one, 0.0, 0.0, 20.0, 1.5) for one in (rest, *goal, *[0.0] * 10)]
+        states = [state(1, one, 0.1, 0.2, 30) for one in (rest, *q, *0.01 * np.arange(3, 13))]
         topics["/lowcmd"].append(low_cmd(head, commands, 0))
         topics["/lowstate"].append(low_state(head, states, 0))
     write_ros2(tmp_path / "bag", store, topics, plugin)
@@ -79,6 +79,11 @@ def test_motors_in_an_array_of_messages_are_named_by_number(tmp_path: Path, plug
     np.testing.assert_allclose(batch.episodes[0].position, MEASURED, atol=1e-6)
     np.testing.assert_allclose(batch.episodes[0].action, GOAL[:-1], atol=1e-6)
     np.testing.assert_allclose(batch.episodes[0].sensors["torque.knee"], 0.2, atol=1e-6)
+    done("import", "source=bag", "mapping=unitree_go2", "name=go2", folder=tmp_path)
+    go2 = read(tmp_path / "runs/go2/import/trajectories.parquet")
+    order = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]  # the motor of each joint, legs FL, FR, RL, RR
+    first = np.array([0.0, *MEASURED[0], *0.01 * np.arange(3, 13)])
+    np.testing.assert_allclose(go2.episodes[0].position[0], first[order], atol=1e-6)
     signals["action"]["column"] = "motor_cmd[{joint}].Q"
     chosen = mapping(tmp_path, joints={"hip": 1, "knee": 2}, time="time", signals=signals)
     line = refused("import", "source=bag", chosen, folder=tmp_path)

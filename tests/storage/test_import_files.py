@@ -54,6 +54,7 @@ def test_saved_tensors_are_read_flat_or_nested(tmp_path: Path) -> None:
     tensors = {name: torch.tensor(values) for name, values in ARRAYS.items()}
     torch.save({**tensors, "kp": 20.0, "name": "chirp"}, tmp_path / "chirp.pt")
     check_same(imported(tmp_path, "chirp.pt", mapping(tmp_path, name="{name} {kp}")))
+    check_same(imported(tmp_path, "chirp.pt", "mapping=pace", "mapping.joints=[shoulder,elbow]"))
     torch.save({"run": tensors}, tmp_path / "nested.pt")
     chosen = mapping(tmp_path, "run.des_dof_pos", "run.dof_pos", time="run.time")
     check_same(imported(tmp_path, "nested.pt", chosen))
@@ -129,6 +130,11 @@ def test_hdf5_is_read_a_file_an_episode_or_a_group_an_episode(tmp_path: Path) ->
         file.attrs["sim"] = False
     chosen = mapping(tmp_path, "action", "observations/qpos", time={"period": 0.01}, about={"sim": "{sim}"})
     check_same(imported(tmp_path, "episode_0.hdf5", chosen))
+    with h5py.File(tmp_path / "aloha.hdf5", "w") as file:
+        ramps = np.sin(TIME)[:, None] * np.linspace(0.1, 0.5, 14)
+        file["observations/qpos"], file["action"] = ramps, ramps
+    aloha = imported(tmp_path, "aloha.hdf5", "mapping=aloha")
+    np.testing.assert_allclose(aloha.episodes[0].position, np.delete(ramps, [6, 13], axis=1))
     with h5py.File(tmp_path / "demos.h5", "w") as file:  # as robomimic's are
         for index in (0, 10, 2):
             demo = file.create_group(f"data/demo_{index}")
