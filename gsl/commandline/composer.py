@@ -21,7 +21,7 @@ from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
 from gsl.commandline.config_errors import Vocabulary, misshapen, translate, unfit, unknown_key
-from gsl.commandline.known_settings import list_keys, plain, read_declared
+from gsl.commandline.known_settings import list_keys, plain, read_declared, read_parts
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
 from gsl.commandline.own_word import find_own_modules, find_trust
 from gsl.commandline.plugins import folders, packages
@@ -153,7 +153,20 @@ def _check_grammar(overrides: Sequence[str]) -> None:
         try:
             parser.parse_override(override)
         except HydraException as error:
-            raise ConfigError(key_of(override), "cannot be read", given=override.partition("=")[2]) from error
+            key, _, value = override.partition("=")
+            raise ConfigError(key_of(override), _unreadable(key, value, parser), given=value) from error
+
+
+def _unreadable(key: str, value: str, parser: OverridesParser) -> str:
+    """Return what is wrong with a value: that it takes quotes within those of the shell, if these mend it."""
+    quoted = f'{key}="{value}"'
+    if not value or "'" in value or value[0] in '[{"':  # more than a word that has odd characters
+        return "cannot be read"
+    try:
+        parser.parse_override(quoted)
+    except HydraException:
+        return "cannot be read"
+    return f"cannot be read; such characters take quotes inside those of the shell: '{quoted}'"
 
 
 def _check_effects(composition: Composition) -> None:
@@ -211,11 +224,17 @@ def _declares(command: str, overrides: list[str], key: str, trust: Sequence[str]
         return True
     above, _, mapping = parent.rpartition(".")
     around = _find_declared(config, above)
+    if name in read_parts(_node(config, above)).get(mapping, {}):
+        return True
     return mapping in around and around[mapping].named
 
 
 def _find_declared(config: DictConfig, path: str) -> Mapping[str, Setting]:
-    return read_declared(plain(OmegaConf.select(config, path) if path else config))
+    return read_declared(_node(config, path))
+
+
+def _node(config: DictConfig, path: str) -> dict[str, Any]:
+    return plain(OmegaConf.select(config, path) if path else config)
 
 
 def _of_choices(overrides: Sequence[str]) -> list[str]:

@@ -6,7 +6,7 @@ import os
 import re
 import shlex
 import shutil
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,7 +20,7 @@ from gsl.errors import ConfigError, InputError
 from gsl.report.console import Console
 from gsl.robots.catalogue import names
 from gsl.robots.hinges import JointSettings, drivable, from_description
-from gsl.robots.urdf_xml import read_description
+from gsl.robots.urdf_xml import Description, read_description
 from gsl.storage.whole import explain_refusal
 
 ROBOT, WORLD = "robot.yaml", "world/{}.yaml"
@@ -36,8 +36,10 @@ _WORLD_TEXT = """\
 defaults: [urdf, _self_]
 robot: {robot}   # as seen from where you type gsl
 period: {period:g}   # [s]: the control period of your logs
-effects: {{}}
+effects:{effects}
 """
+_DYNAMICS = {"damping": ("viscous_friction", "coefficient"), "friction": ("coulomb_friction", "torque")}
+"""What <dynamics> says -> effect and its parameter."""
 
 
 @component
@@ -84,7 +86,7 @@ def write_configuration(arguments: Sequence[str], worlds: Collection[str], conso
         robot = from_description(description, dict.fromkeys(told.joints or drivable(description.hinges), known), {}, {})
     except ConfigError as error:
         raise InputError(f"{urdf}: {error}") from error
-    _write(folder, told, urdf, robot)
+    _write(folder, told, urdf, robot, _effects(description, robot))
     _tell(folder, told, robot, console)
 
 
@@ -98,7 +100,22 @@ def _settings(arguments: Sequence[str]) -> dict[str, Any]:
     return found
 
 
-def _write(folder: Path, told: Init, urdf: Path, robot: Robot) -> None:
+def _effects(description: Description, robot: Robot) -> str:
+    """Return the friction that <dynamics> says of controlled joints, as effects of a world."""
+    found: dict[str, dict[float, list[str]]] = {}
+    for hinge in description.hinges:
+        for key, value in hinge.dynamics.items():
+            if value > 0.0 and hinge.name in robot.controlled:
+                found.setdefault(key, {}).setdefault(value, []).append(hinge.name)
+    told = {
+        _DYNAMICS[key][0]: [{_DYNAMICS[key][1]: value, "joints": joints} for value, joints in values.items()]
+        for key, values in found.items()
+    }
+    lines = [f"  {effect}: {_flow(entries)}" for effect, entries in told.items()]
+    return "\n".join(["   # of <dynamics>", *lines]) if lines else " {}"
+
+
+def _write(folder: Path, told: Init, urdf: Path, robot: Robot, effects: str) -> None:
     """Write the folder whole or not at all."""
     place = folder.with_name(f".{folder.name}.tmp-{os.getpid()}")
     world = place / WORLD.format(told.name)
@@ -107,6 +124,7 @@ def _write(folder: Path, told: Init, urdf: Path, robot: Robot) -> None:
             world.parent.mkdir(parents=True)
             (place / ROBOT).write_text(_robot_text(robot, Path(os.path.relpath(urdf, folder)), told), encoding="utf-8")
             known = {"name": told.name, "robot": (folder / ROBOT).as_posix(), "period": told.period}
+            known["effects"] = effects
             world.write_text(_WORLD_TEXT.format(**known), encoding="utf-8")
             os.rename(place, folder)
         finally:
@@ -134,8 +152,8 @@ def _servo(robot: Robot, name: str) -> dict[str, float]:
     return {key: float(f"{value:.4g}") for key, value in told.items()}
 
 
-def _flow(values: Mapping[str, float]) -> str:
-    return yaml.safe_dump(dict(values), default_flow_style=True, sort_keys=False, width=1000).strip()
+def _flow(values: Any) -> str:
+    return yaml.safe_dump(values, default_flow_style=True, sort_keys=False, width=1000).strip()
 
 
 def _plain(text: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from gsl.commandline.overrides import COMMAND_KEYS
-from gsl.core.setting import Setting, settings_of
+from gsl.core.setting import Setting, parts_of, settings_of
 from gsl.core.trust import TARGET, class_of
 from gsl.errors import ConfigError
 
@@ -27,6 +27,16 @@ def read_declared(node: Mapping[str, Any]) -> Mapping[str, Setting]:
         return {}
 
 
+def read_parts(node: Mapping[str, Any]) -> Mapping[str, Mapping[str, Setting]]:
+    """Return the settings of those fields that are components and need no `_target_`, such as a mapping's `time`."""
+    name = node.get(TARGET)
+    try:
+        kinds = parts_of(class_of(name)) if isinstance(name, str) else {}
+    except (ConfigError, ValueError, TypeError, AttributeError):
+        return {}
+    return {field: settings_of(kind) for field, kind in kinds.items()}
+
+
 def plain(config: Any) -> dict[str, Any]:
     """Return a configuration as it is written, references and missing values as text; of a single value, nothing."""
     container = OmegaConf.to_container(config, resolve=False) if isinstance(config, DictConfig) else None
@@ -34,8 +44,10 @@ def plain(config: Any) -> dict[str, Any]:
 
 
 def _keys_below(node: DictConfig, path: str) -> Iterator[str]:
+    parts = read_parts(plain(node))
     for key in {*read_declared(plain(node)), *map(str, node)}:
         yield f"{path}{key}"
+        yield from (f"{path}{key}.{name}" for name in parts.get(key, ()))
         below = None if OmegaConf.is_missing(node, key) or OmegaConf.is_interpolation(node, key) else node.get(key)
         if isinstance(below, DictConfig):
             yield from _keys_below(below, f"{path}{key}.")

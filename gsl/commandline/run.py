@@ -14,7 +14,7 @@ from gsl.commandline.config import execute, prepare, resolve
 from gsl.commandline.multirun import run_jobs
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import find_trust
-from gsl.report.console import Console
+from gsl.report.console import Console, divert_prints
 
 
 def run(
@@ -52,7 +52,8 @@ def run(
         if multirun:
             prepare(resolve(composition), composition.trust)
             return run_jobs(command, line, composition, console)
-        document = execute(command, line, resolve(composition), console, trust=composition.trust)
+        with divert_prints(json):
+            document = execute(command, line, resolve(composition), console, trust=composition.trust)
         console.result(document, text=summarise(document))
         return int(document.get("exit_code", 0))
 

@@ -9,6 +9,7 @@ import numpy as np
 SAME = 1e-6  # stamps that differ by less are one: as numbers, seconds since 1970 are told to 2e-7 [s]
 FINEST = 400  # points of a signal's grid a second, when lags are measured
 COARSE = 50  # where it only counts whether there is one
+EVEN = 1e-3  # of a step, by which the mean and the median of an even clock differ at most
 POINTS = 60_000  # of a grid at most
 
 
@@ -78,13 +79,19 @@ def _scores(
     command: np.ndarray, measured: np.ndarray, time: np.ndarray, longest: float, finest: float, points: int
 ) -> tuple[float, np.ndarray]:
     """Return the grid's step [s] and the correlation at each lag from -longest to longest; none of a short series."""
-    step = max(float(np.median(np.diff(time))), 1.0 / finest)
+    step = max(_step(time), 1.0 / finest)
     grid = np.arange(time[0], time[-1], step)[:points]
     reach = min(int(round(longest / step)), (len(grid) - 8) // 2)
     if reach < 1:
         return step, np.zeros(0)
     a, b = hold(time, command, grid), np.interp(grid, time, measured)
     return step, np.array([_correlation(a, b, shift) for shift in range(-reach, reach + 1)])
+
+
+def _step(time: np.ndarray) -> float:
+    """Return the time from one row to the next [s]: the mean of an even clock, which rounded stamps leave as it is."""
+    middle, mean = float(np.median(np.diff(time))), float(time[-1] - time[0]) / (len(time) - 1)
+    return mean if abs(mean - middle) < EVEN * middle else middle
 
 
 def _correlation(a: np.ndarray, b: np.ndarray, shift: int) -> float:

@@ -22,6 +22,8 @@ from pydantic_core import PydanticCustomError
 REQUIRED: Any = "???"
 """Default of a setting that has none; yaml files write it the same way."""
 
+FIELDS = "__pydantic_fields__"
+
 
 def setting(
     meaning: str,
@@ -102,12 +104,19 @@ class Setting:
 
 def settings_of(target: Callable[..., Any]) -> Mapping[str, Setting]:
     """Return the settings of a component in order; of any other class or function, the names and defaults."""
-    fields: Mapping[str, FieldInfo] = getattr(target, "__pydantic_fields__", {})
+    fields: Mapping[str, FieldInfo] = getattr(target, FIELDS, {})
     parameters = inspect.signature(target).parameters.values()
     named = [
         parameter for parameter in parameters if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
     ]
     return {parameter.name: _describe(parameter, _field(target, parameter.name, fields)) for parameter in named}
+
+
+def parts_of(target: Callable[..., Any]) -> Mapping[str, type]:
+    """Return the fields of a component that are components themselves, by name."""
+    fields: Mapping[str, FieldInfo] = getattr(target, FIELDS, {})
+    kinds = {name: field.annotation for name, field in fields.items()}
+    return {name: kind for name, kind in kinds.items() if isinstance(kind, type) and hasattr(kind, FIELDS)}
 
 
 def _field(target: Callable[..., Any], name: str, fields: Mapping[str, FieldInfo]) -> FieldInfo | None:

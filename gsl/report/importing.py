@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,16 +28,17 @@ SHOWN = 40  # rows of a table
 Document = dict[str, Any]
 
 
-def report(found: Sequence[Episode], files: int, period: float | None) -> Document:
+def report(found: Sequence[Episode], files: int, period: float | None, turning: Collection[str] = ()) -> Document:
     """Return what there is to say of the trajectories.
 
     Args:
         found: In order, of the same joints.
         files: How many files they come from.
         period: What they were resampled to [s], None if their rows are as they were.
+        turning: Joints of which the mapping says that they are in radians however far they turn.
     """
     lags = [lags_of(one) for one in found]
-    told = suspicions(found, lags)
+    told = suspicions(found, lags, turning)
     return {
         "files": files,
         "episodes": [_episode(one, row) for one, row in zip(found, lags, strict=True)],

@@ -38,7 +38,7 @@ class Limited(Protocol):
 
 def remarks(root: xml.Element, links: Iterable[Link], hinges: Iterable[Limited]) -> list[str]:
     """Return what there is to say of a file and what it holds."""
-    return [*_meshes(root), *_dynamics(root), *_limits(hinges), *_soft(hinges), *_inertias(links)]
+    return [*_meshes(root), *_dynamics(root), *_floating(root), *_limits(hinges), *_soft(hinges), *_inertias(links)]
 
 
 def _limits(hinges: Iterable[Limited]) -> Iterator[str]:
@@ -81,4 +81,11 @@ def _dynamics(root: xml.Element) -> list[str]:
     found = [joint.get("name", "") for joint in root.findall("joint") if joint.find("dynamics") is not None]
     if not found:
         return []
-    return [f"<dynamics> is not read ({', '.join(found)}): write friction as effects of the world"]
+    told = ", ".join(found)
+    return [f"<dynamics> is friction, and the world's ({told}): gsl init writes it there, as effects; else add them"]
+
+
+def _floating(root: xml.Element) -> Iterator[str]:
+    for joint in root.findall("joint"):
+        if joint.get("type") == "floating":
+            yield f"joint {joint.get('name', '')} is rigid here (floating): world.floating=true is what frees a base"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 from xml.etree import ElementTree as xml
@@ -25,6 +25,7 @@ _LIMITS = ("lower", "upper", "effort", "velocity")
 _SOFT = {"lower": "soft_lower_limit", "upper": "soft_upper_limit"}
 _LEFT = ("${", "$(")  # how an expression begins that xacro would have replaced
 _GREY = (0.75, 0.77, 0.8, 1.0)
+FLOATING = "floating"
 KINDS = (*TURNING, "fixed", "prismatic")
 
 
@@ -40,6 +41,7 @@ class Hinge:
         limit: What <limit> says: lower, upper, effort, velocity.
         soft: What <safety_controller> says of the range that commands keep: lower, upper [rad].
         follows: Joint, multiplier and offset [rad] of <mimic>, if there is one.
+        dynamics: What <dynamics> says: damping [N·m·s/rad], friction [N·m].
     """
 
     name: str
@@ -52,6 +54,7 @@ class Hinge:
     limit: dict[str, float]
     soft: dict[str, float]
     follows: tuple[str, float, float] | None
+    dynamics: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -179,6 +182,8 @@ def _shape(node: xml.Element, role: str) -> list[Shape]:
 
 def _hinge(name: str, node: xml.Element) -> Hinge:
     kind = node.get("type", "")
+    if kind == FLOATING:  # the world says whether a base is free
+        kind = "fixed"
     if kind not in KINDS:
         raise ValueError(f"type '{kind}' is not supported; there are {', '.join(KINDS)}")
     parent, child = (
@@ -204,7 +209,13 @@ def _hinge(name: str, node: xml.Element) -> Hinge:
         )
         follows = (mimic.get("joint", ""), ratio, offset)
     unit = way / np.linalg.norm(way) if way.any() else np.array([1.0, 0.0, 0.0])
-    return Hinge(name, kind, parent, child, *_origin(node), unit, told, soft, follows)
+    drag = node.find("dynamics")
+    dynamics = {
+        key: _number(drag, key, "<dynamics>")
+        for key in ("damping", "friction")
+        if drag is not None and drag.get(key) is not None
+    }
+    return Hinge(name, kind, parent, child, *_origin(node), unit, told, soft, follows, dynamics)
 
 
 def _tree(links: dict[str, Link], hinges: Sequence[Hinge]) -> tuple[str, tuple[Hinge, ...]]:

@@ -134,7 +134,7 @@ class Import:
         derived = sum(one.derived for one in found)
         which = "" if derived in (0, len(found)) else f" in {derived} of {len(found)} episodes"
         velocity = f"derived from positions{which}" if derived else "as logged"
-        told = report(found, files, period)
+        told = report(found, files, period, chosen.mapping.turning)
         warnings = [*told["warnings"], *list_unmatched(found, self.mapping)]
         return {**told, "warnings": warnings, "notes": chosen.notes, "time": kept, "velocity": velocity}
 

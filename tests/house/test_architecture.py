@@ -37,6 +37,7 @@ ONLY = {
         "optimizers/trpo.py",
         "optimizers/sb3.py",
         "policies/torchscript.py",
+        "storage/importers/tensor_arrays.py",
         "policies/sb3.py",
     ),
     "sb3_contrib": ("optimizers/trpo.py",),

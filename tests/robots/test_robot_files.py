@@ -88,7 +88,11 @@ def test_what_is_left_open_is_derived_and_what_is_left_out_is_told() -> None:
     assert elbow.armature == pytest.approx(0.02 * 2.0 / 6.0) and ours.gains["elbow"][0] == pytest.approx(2.0 / 0.2)
     assert ours.joint("turn").upper == pytest.approx(2.0 * np.pi)
     told = " | ".join(ours.remarks)
-    assert "column.stl" in told and "<dynamics> is not read (elbow)" in told and "slide is held at 0.01 m" in told
+    assert (
+        "column.stl" in told
+        and "<dynamics> is friction, and the world's (elbow)" in told
+        and "slide is held at 0.01 m" in told
+    )
 
 
 def test_a_joint_that_follows_goes_the_other_way_by_the_same_angle() -> None:
@@ -215,8 +219,8 @@ def with_more(name: str) -> str:
         (but("0 0 1", "0 0 0"), "joint 'j': its axis has no direction"),
         (but("0 0 1", "0 1"), "joint 'j': axis must be 3 finite numbers, not '0 1'"),
         (
-            but("revolute", "floating"),
-            "joint 'j': type 'floating' is not supported; there are revolute, continuous, fi",
+            but("revolute", "planar"),
+            "joint 'j': type 'planar' is not supported; there are revolute, continuous, fi",
         ),
         (but("revolute", "fixed"), "joints: the URDF has no joint that turns, so nothing can be controlled"),
         (but("revolute", "prismatic"), "joints: the URDF has no joint that turns, so nothing can be controlled"),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from commands import done, gsl, refused
 from robots_of_files import as_bullet_reads, holding
 
@@ -196,3 +197,23 @@ def test_a_missing_range_can_be_told_to_init(tmp_path: Path) -> None:
     said = gsl("collect", "--config-dir", "arm", "world=arm", *SHORT, "name=x", folder=tmp_path)
     assert said.code == 0, said.err
     assert robot(str(tmp_path / "arm/robot.yaml")).commanded("j1") == (-0.7, 0.9)
+
+
+def test_friction_of_a_file_becomes_effects_of_the_world_that_init_writes(tmp_path: Path) -> None:
+    drag = "<dynamics damping='0.1' friction='0.2'/>"
+    file = written(tmp_path, joint("j1", "a", LIMIT + drag), joint("j2", "b", LIMIT + drag, parent="a"))
+    done("init", f"urdf={file}", "name=arm", folder=tmp_path)
+    done("collect", "--config-dir", "arm", "world=arm", *SHORT, "name=x", folder=tmp_path)
+    config = yaml.safe_load((tmp_path / "runs/x/collect_real/config.yaml").read_text())
+    assert config["world"]["effects"] == {
+        "viscous_friction": [{"coefficient": 0.1, "joints": ["j1", "j2"]}],
+        "coulomb_friction": [{"torque": 0.2, "joints": ["j1", "j2"]}],
+    }
+
+
+def test_a_floating_joint_is_the_base_that_a_world_may_free(tmp_path: Path) -> None:
+    free = joint("free", "trunk", "", parent="base", kind="floating")
+    told = of(tmp_path, free, joint("j1", "a", LIMIT, parent="trunk"))
+    rigid = of(tmp_path, free.replace("floating", "fixed"), joint("j1", "a", LIMIT, parent="trunk"))
+    assert told.controlled == ("j1",) and lump(told).links.keys() == lump(rigid).links.keys()
+    assert any("joint free is rigid here (floating)" in remark for remark in told.remarks)

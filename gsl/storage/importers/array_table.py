@@ -1,49 +1,56 @@
-"""Numpy archives: arrays by key, whose declared sizes are checked before one is read; pickled objects are not."""
+"""Arrays by name, one row a step: what an npz, npy, HDF5, mat or tensor file comes down to."""
 
 from __future__ import annotations
 
-import io
-import struct
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.lib import format as npy
 
-from gsl.core.budget import HEADER_BYTES
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.sizes import check_need
 from gsl.storage.importers.table import missing_column
 
-_DAMAGED = (OSError, EOFError, zipfile.BadZipFile, zlib.error, struct.error)
+Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]
+
+
+class Arrays(Protocol):
+    """Named arrays in a file, whose declared sizes are known before one is read.
+
+    Attributes:
+        shapes: Shape and type, by name.
+        fields: What the file says once, beside its arrays.
+    """
+
+    shapes: Shapes
+    fields: Mapping[str, Any]
+
+    def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return arrays by name; only those that hold plain numbers are asked for."""
+        ...
 
 
 class ArrayTable:
-    """An npz file; arrays of one value are what it says once."""
+    """Arrays of one row a step; those of one value are what the file says once."""
 
     first_line: int | None = None
 
-    def __init__(self, path: Path, memory: float) -> None:
-        self.path, self.memory = path, memory
-        try:
-            with zipfile.ZipFile(path) as archive:
-                members = [info for info in archive.infolist() if info.filename.endswith(".npy")]
-                self.shapes = {info.filename.removesuffix(".npy"): _header(archive, info, path) for info in members}
-        except (*_DAMAGED, RuntimeError) as error:  # the last: encrypted, or packed in a way unknown
-            raise TrajectoryError(path, "is no npz archive, or truncated or damaged; copy it again") from error
-        self.names: Sequence[str] = [name for name, (shape, _) in self.shapes.items() if shape]
-        single = [name for name, (shape, kind) in self.shapes.items() if not shape and not kind.hasobject]
-        self.fields: Mapping[str, Any] = {name: value.item() for name, value in self._read(single).items()}
+    def __init__(self, path: Path, arrays: Arrays, memory: float) -> None:
+        self.path, self.arrays, self.memory = path, arrays, memory
+        self.names: Sequence[str] = [name for name, (shape, _) in arrays.shapes.items() if shape]
+        single = [name for name, (shape, kind) in arrays.shapes.items() if not shape and kind.kind in "buifUS"]
+        self.fields: Mapping[str, Any] = {
+            **arrays.fields,
+            **{name: value.item() for name, value in self._read(single).items()},
+        }
 
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return the wanted arrays."""
         for name in wanted:
             if name not in self.names:
                 raise missing_column(self, name)
-            shape, kind = self.shapes[name]
+            shape, kind = self.arrays.shapes[name]
             if kind.hasobject:
                 problem = "holds Python objects (a pickle, which can run code): none is read; save plain numbers"
                 raise TrajectoryError(self.path, problem, column=name)
@@ -54,30 +61,7 @@ class ArrayTable:
         return self._read(wanted)
 
     def _read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
-        sizes = [float(np.prod(shape, dtype=float)) * kind.itemsize for shape, kind in map(self.shapes.get, names)]  # type: ignore[misc]
+        declared = [self.arrays.shapes[name] for name in names]
+        sizes = [float(np.prod(shape, dtype=float)) * kind.itemsize for shape, kind in declared]
         check_need(self.path, 3.0 * sum(sizes), self.memory)
-        try:
-            with np.load(self.path, allow_pickle=False) as archive:
-                return {name: archive[name] for name in names}
-        except (*_DAMAGED, ValueError, KeyError) as error:
-            raise TrajectoryError(self.path, f"is damaged: {error}; copy it again") from error
-
-
-def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Return the shape and type that an array declares."""
-    try:
-        with archive.open(info) as file:
-            return _read_header(file)  # type: ignore[arg-type]
-    except (ValueError, SyntaxError, TypeError, EOFError, zlib.error, MemoryError, RecursionError) as error:
-        raise TrajectoryError(path, "is no numpy array; save it with numpy.savez", column=info.filename) from error
-
-
-def _read_header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    version = npy.read_magic(file)
-    size = file.read(2 if version == (1, 0) else 4)  # of the header, which is read at once, however long it says it is
-    if int.from_bytes(size, "little") > HEADER_BYTES:
-        raise ValueError(f"its header has {int.from_bytes(size, 'little'):,} bytes")
-    rest = io.BytesIO(size + file.read(int.from_bytes(size, "little")))
-    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-    shape, _, kind = read(rest)
-    return shape, kind
+        return self.arrays.read(names)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,8 +39,9 @@ class BagTable:
             if name not in self.names:
                 raise missing_column(self, name)
         found: dict[str, list[Any]] = {name: [] for name in wanted}
+        fields = {re.split(r"[.\[]", name, maxsplit=1)[0] for name in wanted}
         for row, (stamp, message) in enumerate(self._messages()):
-            values = {**_flat(message), STAMP: stamp}
+            values = {**_flat(message, fields=fields), STAMP: stamp}
             for name, column in found.items():
                 if name not in values:
                     raise TrajectoryError(self.path, f"a message on {self.topic} lacks it", column=name, row=row)
@@ -71,14 +73,20 @@ def _library(path: Path) -> tuple[Any, Any]:
     return anyreader, get_typestore(Stores.ROS2_HUMBLE)
 
 
-def _flat(message: Any, prefix: str = "") -> dict[str, Any]:
-    """Return the numbers of a message by dotted path; entries by their names if it has those."""
+def _flat(message: Any, prefix: str = "", names: Any = None, fields: Collection[str] = ()) -> dict[str, Any]:
+    """Return the numbers of a message by dotted path, or of some `fields`; entries by their names if it has those.
+
+    An array of messages, such as a robot's motors or the points of a trajectory, is numbered: motor_state[3].q.
+    """
     values: dict[str, Any] = {}
-    names = getattr(message, "name", None)
-    for field in message.__dataclass_fields__:
-        value, path = getattr(message, field), f"{prefix}{field}"
+    names = getattr(message, "name", getattr(message, "joint_names", names))
+    for field in fields or message.__dataclass_fields__:
+        value, path = getattr(message, field, None), f"{prefix}{field}"
         if hasattr(value, "__dataclass_fields__"):
-            values |= _flat(value, f"{path}.")
+            values |= _flat(value, f"{path}.", names)
+        elif isinstance(value, list) and value and hasattr(value[0], "__dataclass_fields__"):
+            for index, one in enumerate(value):
+                values |= _flat(one, f"{path}[{index}].", names)
         elif isinstance(value, np.ndarray):
             named = isinstance(names, list) and len(names) == len(value)
             values |= (

@@ -113,7 +113,9 @@ def side_by_side(
     fits = raw.shape[1] == due if due else raw.shape[1] in (1, len(joints))
     if not fits:
         what = f"{due} {'joints' if name in PER_JOINT else 'axes'}" if due else f"1 or {len(joints)} are due"
-        problem = f"{raw.shape[1]} values a row for {name}, but {what}; name a column for each in the mapping"
+        one = f"{found[0].column}[3]" if len(found) == 1 and raw.shape[1] > 1 else "a column for each"
+        how = f"name each by its number from 0, such as {one}" if "[" in one else f"name {one} in the mapping"
+        problem = f"{raw.shape[1]} values a row for {name}, but {what}; {how}"
         raise TrajectoryError(table.path, problem, column=found[0].column)
     return raw
 

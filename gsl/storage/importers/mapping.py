@@ -12,7 +12,7 @@ from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
 from gsl.effects.effect import build
 from gsl.errors import ConfigError
-from gsl.storage.importers.signal import AXES, BY_NAME, KNOWN, Signal, Time
+from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, KNOWN, Signal, Time
 from gsl.storage.importers.units import factor
 from gsl.storage.trajectory_contract import INTEGERS, UNITS, suggestion
 
@@ -24,6 +24,17 @@ def _time(value: Any) -> Time:
     if isinstance(value, Time):
         return value
     return _make(Time, {"column": value} if isinstance(value, str) else value, "time")
+
+
+def _joints(value: Any) -> Any:
+    """Return names of joints as texts, where some are whole numbers."""
+
+    def text(one: Any) -> Any:
+        return str(one) if isinstance(one, int) and not isinstance(one, bool) else one
+
+    if isinstance(value, dict):
+        return {text(name): text(one) for name, one in value.items()}
+    return [text(one) for one in value] if isinstance(value, list) else value
 
 
 def _signals(value: Any) -> dict[str, Signal]:
@@ -58,7 +69,9 @@ class Mapping:
         dict[str, Signal], setting("where each signal is: a column, or {column, unit, ...}"), BeforeValidator(_signals)
     ]
     joints: Annotated[
-        list[str] | dict[str, str] | None, setting("names in order, or {name: name in the log}; found if null")
+        list[str] | dict[str, str] | None,
+        setting("names in order, or {name: name or number in the log}; found if null"),
+        BeforeValidator(_joints),
     ] = None
     robot: Annotated[str, setting("whose log it is")] = "unknown"
     source: Annotated[str | None, setting("where the logs lie, if source= does not say")] = None
@@ -66,7 +79,7 @@ class Mapping:
         str | dict[str, str] | None, setting("pattern of the files; {role: name} if an episode is a folder of several")
     ] = None
     episode: Annotated[str, setting("file, or the column whose value tells episodes apart", min_length=1)] = "file"
-    records: Annotated[str, setting("JSON: path of the list of rows")] = ""
+    records: Annotated[str, setting("JSON: path of the list of rows; HDF5: a group, or data/demo_* for many")] = ""
     time: Annotated[Time, setting("the stamps: {column, unit}, or {period}"), BeforeValidator(_time)] = Time()  # noqa: RUF009  it is frozen
     period: Annotated[float | None, setting("resample to it; null keeps the rows as they are", unit="s", gt=0)] = None
     command_offset: Annotated[float, setting("what the commands' clock is ahead of the sensors'", unit="s")] = 0.0
@@ -110,6 +123,12 @@ class Mapping:
             _check_unit(name, signal)
             _check_keys(f"signals.{name}", name, signal, names)
 
+    @property
+    def turning(self) -> list[str]:
+        """Joints of which it says one by one that their positions are in radians, however far they turn."""
+        unit = self.signals["position"].unit
+        return [joint for joint, one in unit.items() if one == "rad"] if isinstance(unit, dict) else []
+
     def check_joints(self, joints: Sequence[str]) -> None:
         """Refuse what is said of joints that a log does not have.
 
@@ -146,7 +165,20 @@ def _check_unit(name: str, signal: Signal) -> None:
         try:
             factor(unit, UNITS[name]) if unit and name in UNITS else None
         except ValueError as error:
-            raise ConfigError(f"{where}.unit{'.' * bool(joint)}{joint}", str(error), given=unit) from error
+            problem = _of_other_kind(unit) if name in COMMANDS else ""
+            raise ConfigError(f"{where}.unit{'.' * bool(joint)}{joint}", problem or str(error), given=unit) from error
+
+
+def _of_other_kind(unit: str) -> str:
+    """Return what to say of a command that is no position, nothing if it is of no kind that a servo takes."""
+    for wanted, kind in (("rad/s", "speed"), ("N·m", "torque")):
+        try:
+            factor(unit, wanted)
+        except ValueError:
+            continue
+        own = f"keep it as a column of your own, signals: {{goal_{kind}: ...}}"
+        return f"is a command of {kind}; servos here follow positions, others are not taken yet: {own}"
+    return ""
 
 
 def _check_keys(where: str, name: str, signal: Signal, joints: Sequence[str] | None) -> None:

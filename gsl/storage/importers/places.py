@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from gsl.core.budget import within
 from gsl.errors import ConfigError, InputError
-from gsl.storage.importers.formats import ENDS, is_bag, readable, stem
+from gsl.storage.importers.formats import ENDS, HDF5, is_bag, is_npy_folder, readable, stem
+from gsl.storage.importers.hdf5_arrays import list_groups
 from gsl.storage.lerobot.dataset import Entry
 from gsl.version import PACKAGE
 
@@ -26,11 +27,13 @@ class Place(NamedTuple):
         name: Path below the source, without the end that tells the format.
         files: By role; the only one has the role "".
         entry: Which episode of a LeRobot data set it is, if it is of one.
+        group: Of an HDF5 file, if each of several is an episode.
     """
 
     name: str
     files: Mapping[str, Path]
     entry: Entry | None = None
+    group: str | None = None
 
 
 def locate(source: str) -> str:
@@ -40,31 +43,50 @@ def locate(source: str) -> str:
     return source
 
 
-def places(source: str, files: str | Mapping[str, str] | None) -> list[Place]:
+def places(source: str, files: str | Mapping[str, str] | None, records: str = "") -> list[Place]:
     """Return where the episodes of a source lie, in the order of their names.
 
     Args:
         source: A file, a folder, or a pattern such as logs/*.csv.
         files: Pattern of the files in a folder, or the names of one episode's files by role.
+        records: Pattern of groups of an HDF5 file, an episode each.
 
     Raises:
         InputError: There is nothing, or a file of an episode is missing.
     """
     base, found = _find(source)
     if isinstance(files, Mapping):
-        return [_several(base, folder, files) for folder in _folders(source, found, files)]
-    chosen = sorted({one for path in found for one in _below(path, files)})
+        return [one for folder in _folders(source, found, files) for one in _several(base, folder, files)]
+    chosen = sorted({one for path in found for one in _within(path, files)})
     if not chosen:
-        wanted = files or f"file that ends with {', '.join(ENDS)}"
-        raise InputError(f"{source}: holds no {wanted}")
-    return [Place(stem(_relative(path, base)), {"": path}) for path in chosen]
+        raise InputError(_nothing(source, found, files))
+    return [place for path in chosen for place in _apart(Place(stem(_relative(path, base)), {"": path}), records)]
+
+
+def _nothing(source: str, found: list[Path], pattern: str | None) -> str:
+    """Return what to say where no file fits: that there are some further down, if there are."""
+    wanted = pattern or f"file that ends with {', '.join(ENDS)}"
+    below = f"**/{pattern or '*'}"
+    there = [one for path in found if path.is_dir() for one in _fitting(path, below)]
+    if not there:
+        return f"{source}: holds no {wanted}"
+    deeper = f"{len(there)} in folders below, such as {os.path.relpath(there[0])}"
+    return f"{source}: holds no {wanted}; there are {deeper}: mapping.files='{below}' takes them"
+
+
+def _apart(place: Place, records: str) -> list[Place]:
+    """Return the episodes of an HDF5 file whose groups a pattern such as data/demo_* names; else the place."""
+    (path,) = place.files.values()
+    if "*" not in records or path.suffix not in HDF5:
+        return [place]
+    return [place._replace(name=f"{place.name}/{group}", group=group) for group in list_groups(path, records)]
 
 
 def _find(source: str) -> tuple[Path, list[Path]]:
     """Return the folder that names are relative to, and what the source names."""
     path = Path(source)
     if path.is_dir():
-        return (path.parent if is_bag(path) else path), [path]
+        return (path.parent if is_bag(path) or is_npy_folder(path) else path), [path]
     if path.is_file():
         return path.parent, [path]
     if path.exists():
@@ -75,13 +97,16 @@ def _find(source: str) -> tuple[Path, list[Path]]:
     return Path(re.split(r"[*?\[]", source)[0]).parent if found else path, found
 
 
-def _below(path: Path, pattern: str | None) -> Iterator[Path]:
-    if not path.is_dir() or is_bag(path):
-        yield path
-        return
-    below = sorted(one for one in path.rglob(pattern or "*") if readable(one) and not _is_hidden(one, path))
-    bags = [one for one in below if one.is_dir()]
-    yield from (one for one in below if not any(bag in one.parents for bag in bags))
+def _within(path: Path, pattern: str | None) -> Iterator[Path]:
+    """Return what is read of a path: itself, or the files in it, and in folders below if the pattern says so."""
+    whole = is_bag(path) or (pattern is None and is_npy_folder(path))
+    yield from [path] if whole or not path.is_dir() else _fitting(path, pattern or "*")
+
+
+def _fitting(folder: Path, pattern: str) -> list[Path]:
+    below = sorted(one for one in folder.glob(pattern) if readable(one) and not _is_hidden(one, folder))
+    whole = {one for one in below if one.is_dir()}
+    return [one for one in below if not whole.intersection(one.parents)]
 
 
 def _is_hidden(path: Path, folder: Path) -> bool:
@@ -98,16 +123,32 @@ def _folders(source: str, found: list[Path], files: Mapping[str, str]) -> list[P
     return folders
 
 
-def _several(base: Path, folder: Path, files: Mapping[str, str]) -> Place:
-    chosen = {}
-    for role, pattern in files.items():
-        fitting = sorted(folder.glob(pattern))
-        if len(fitting) != 1:
-            told = f"{len(fitting)} files are called {pattern}" if fitting else f"there is no {pattern}"
-            raise InputError(f"{folder}: {told}, which the mapping wants as its {role}")
-        chosen[role] = fitting[0]
+def _several(base: Path, folder: Path, files: Mapping[str, str]) -> list[Place]:
+    """Return the episode of a folder, or several whose files go together by what `*` stands for in their names."""
+    fitting = {role: sorted(folder.glob(pattern)) for role, pattern in files.items()}
     name = _relative(folder, base)
-    return Place(name if name != "." else folder.resolve().name, chosen)
+    name = name if name != "." else folder.resolve().name
+    if all(len(own) == 1 for own in fitting.values()):
+        return [Place(name, {role: own[0] for role, own in fitting.items()})]
+    if all(pattern.count("*") == 1 and "/" not in pattern for pattern in files.values()):
+        apart = {role: {_star(one.name, files[role]): one for one in own} for role, own in fitting.items()}
+        keys = sorted({key for own in apart.values() for key in own})
+        for key in keys:
+            for role, pattern in files.items():
+                if key not in apart[role]:
+                    due = pattern.replace("*", key)
+                    raise InputError(f"{folder}: there is no {due}, which the mapping wants as the {role} of {key}")
+        return [Place(f"{name}/{key}", {role: own[key] for role, own in apart.items()}) for key in keys]
+    role, own = next((role, own) for role, own in fitting.items() if len(own) != 1)
+    told = f"{len(own)} files are called {files[role]}" if own else f"there is no {files[role]}"
+    how = "; one * in the name of every role pairs files by what it stands for" if own else ""
+    raise InputError(f"{folder}: {told}, which the mapping wants as its {role}{how}")
+
+
+def _star(name: str, pattern: str) -> str:
+    """Return what the * of a pattern stands for in a name."""
+    before, after = pattern.split("*")
+    return name[len(before) : len(name) - len(after)]
 
 
 def _relative(path: Path, base: Path) -> str:

@@ -98,6 +98,8 @@ def _episodes(place: Place, mapping: LogMapping, tables: Mapping[str, Table]) ->
         signals, dropped = {}, 0
         for signal, one in named.items():
             reading = _Reading(signal, one, found[signal], tables[one.file], rows[one.file], mapping)
+            if one.optional and reading.is_empty(values[one.file]):
+                continue
             series, twice = reading.series(values[one.file], tuple(joints))
             signals[signal], dropped = series, max(dropped, twice)
         yield Raw(name, tuple(joints), signals, own, dropped)
@@ -109,7 +111,7 @@ def _tables(place: Place, mapping: LogMapping, memory: float) -> dict[str, Table
         role: table(
             place.files.get(role) or place.files[""],
             topic=role,
-            records=mapping.records,
+            records=mapping.records if place.group is None else place.group,
             memory=memory,
             entry=place.entry,
         )
@@ -187,7 +189,8 @@ class _Reading(NamedTuple):
         stamps = seconds(self.table.path, self._stamps(values), self.mapping.time, self._column())
         keep = self._find_filled(raw)
         stamps, raw, rows = stamps[keep], raw[keep], self.rows[keep]
-        keep = order_rows(self.table.path, stamps, self._column(), rows, drop=self.mapping.duplicates == "drop")
+        drop = self.mapping.duplicates == "drop"
+        keep = order_rows(self.table.path, stamps, self._column(), rows, drop=drop, unit=self.mapping.time.unit)
         stamps, raw = stamps[keep], raw[keep]
         names = output_names(self.name, raw.shape[1], joints)
         if self.name in FLAGS:
@@ -197,6 +200,11 @@ class _Reading(NamedTuple):
         if self.name in COMMANDS:
             stamps = stamps - self.mapping.command_offset
         return Series(stamps, self.signal.signed(raw) * gains + offsets, tuple(names)), int(np.sum(~keep))
+
+    def is_empty(self, values: Mapping[str, np.ndarray]) -> bool:
+        """Tell whether no row has a number: a logger that keeps a column for what it cannot measure."""
+        own = [values[reference.column][self.rows] for reference in self.found]
+        return all(one.dtype.kind == "f" and not np.isfinite(one).any() for one in own)
 
     def _keys(self, width: int, joints: Sequence[str]) -> Sequence[str]:
         """Return the joint or axis of each column; none of a signal that is one for all joints."""
@@ -224,6 +232,9 @@ class _Reading(NamedTuple):
         if self.mapping.blanks == "refuse" or np.isinf(raw).any() or empty.all():
             row = int(np.argmax(empty))
             column = self.found[int(np.argmax(wrong[row])) if len(self.found) > 1 else 0].column
-            problem = "is not a finite number; drop or mend the row, or say mapping.blanks=skip if it means no news"
+            mend = "drop or mend the row, or say mapping.blanks=skip if it means no news"
+            if empty.all():
+                mend = f"no row has one; leave {self.name} out of the mapping, or say optional: true"
+            problem = f"is not a finite number; {mend}"
             raise TrajectoryError(self.table.path, problem, column=column, row=int(self.rows[row]))
         return ~empty

@@ -32,6 +32,9 @@ class Time:
 
     column: Annotated[str, setting("column, path or key of the stamps", min_length=1)] = "time"
     unit: Annotated[str, setting("s, ms, us or ns; iso for dates in words")] = "s"
+    wrap: Annotated[
+        float | None, setting("what the stamps count to before they begin again, such as 4294967296", gt=0)
+    ] = None
     period: Annotated[float | None, setting("instead of stamps: time from one row to the next", unit="s", gt=0)] = None
 
     def __post_init__(self) -> None:

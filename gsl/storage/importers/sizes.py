@@ -73,7 +73,7 @@ class _Counted(io.RawIOBase):
         if self.count > self.most:
             problem = f"unpacks to more than {self.most / GB:.2g} GB; cut it into several files, or say memory=..."
             raise TrajectoryError(self.path, problem)
-        end = bytes(buffer[:size]).rfind(b"\n")
+        end = max(bytes(buffer[:size]).rfind(mark) for mark in (b"\n", b"\r"))
         self.line = self.line + size if end < 0 else size - end
         if self.lines and self.line > LONGEST_LINE:
             raise TrajectoryError(self.path, f"has a line of more than {LONGEST_LINE:,} bytes; it is no text table")

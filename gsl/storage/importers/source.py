@@ -54,7 +54,7 @@ def look_at(source: str, mapping: LogMapping, memory: float) -> Source:
     inside = find_data_set(folder / "x")
     if inside is not None and mapping.signals["position"].column == PLAIN:
         raise InputError(f"source = {source}: is a part of a LeRobot data set; say source={_short(inside)}, its folder")
-    return Source(places(source, mapping.files), mapping, [])
+    return Source(places(source, mapping.files, mapping.records), mapping, [])
 
 
 def list_files(source: str, mapping: LogMapping, memory: float) -> Mapping[str, Path]:
@@ -64,13 +64,13 @@ def list_files(source: str, mapping: LogMapping, memory: float) -> Mapping[str, 
         return {path.relative_to(folder).as_posix(): path for path in open_data_set(folder, memory).files}
     paths = {
         f"{one.name}/{role}".rstrip("/"): path
-        for one in places(source, mapping.files)
+        for one in places(source, mapping.files, mapping.records)
         for role, path in one.files.items()
     }
     return {
         name if file == path else f"{name}/{file.name}": file
         for name, path in paths.items()
-        for file in ([path] if path.is_file() else sorted(path.iterdir()))
+        for file in ([path] if path.is_file() else sorted(one for one in path.iterdir() if one.is_file()))
     }
 
 

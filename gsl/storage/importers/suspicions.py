@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -34,17 +34,20 @@ class Suspicion(NamedTuple):
     refused: bool
 
 
-def suspicions(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> list[Suspicion]:
+def suspicions(
+    found: Sequence[Episode], lags: Sequence[Sequence[Lag]], turning: Collection[str] = ()
+) -> list[Suspicion]:
     """Return all of them.
 
     Args:
         found: Trajectories of the same joints.
         lags: Of each trajectory and joint, from command to position.
+        turning: Joints of which the mapping says that they are in radians however far they turn.
     """
     joints = found[0].joints
     told = [*_time(found), *_order(found, lags), *_suspect_exchange(found)]
     for index, joint in enumerate(joints):
-        told += _joint(joint, index, found)
+        told += _joint(joint, index, found, endless=joint in turning)
     return told
 
 
@@ -122,13 +125,14 @@ def is_clear(one: Lag) -> bool:
     return one.correlation > ALIKE and one.contrast > CONTRAST
 
 
-def _joint(joint: str, index: int, found: Sequence[Episode]) -> Iterator[Suspicion]:
+def _joint(joint: str, index: int, found: Sequence[Episode], *, endless: bool) -> Iterator[Suspicion]:
     action, position, velocity = (_all(found, name, index) for name in ("action", "position", "velocity"))
     for name, values in (("action", action), ("position", position)):
         reach = float(np.abs(values).max())
-        if reach > FAR:
+        if reach > FAR and not endless:
             whole = reach > TICKS and np.allclose(values, np.round(values))
             asked = "are these ticks (unit: ticks/4096, zero: 2048)?" if whole else "are these degrees (unit: deg)?"
+            asked += f" One that turns so far: unit: {{{joint}: rad}}"
             yield Suspicion(f"{name}.{joint}", f"reaches {reach:.4g} rad; {asked}", True)
             return
     yield from _ratio(joint, action, position)

@@ -8,13 +8,13 @@ import re
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from gsl.core.budget import find_repeat
 from gsl.errors import TrajectoryError
-from gsl.storage.importers.sizes import check_need, open_log
+from gsl.storage.importers.sizes import LONGEST_LINE, check_need, open_log
 from gsl.storage.importers.table import check_columns, missing_column, numbers
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class TextTable:
         self.path, self.memory = path, memory
         self.fields: Mapping[str, Any] = {}
         with open_log(path, most=FACTOR * memory, lines=True) as file:
-            first, second = (_text(path, file.readline()) for _ in range(2))
+            first, second = _first_lines(path, file)
         self.separator = _separator(first)
         cells = _cells(first.lstrip("#% "), self.separator)
         self.header = not all(_NUMBER.fullmatch(cell.lower()) for cell in cells)
@@ -80,6 +80,15 @@ class TextTable:
                 raise TrajectoryError(self.path, f"has rows of another length than its header: {told}") from error
             except UnicodeDecodeError as error:
                 raise TrajectoryError(self.path, "is no text; which format is it?") from error
+
+
+def _first_lines(path: Path, file: IO[bytes]) -> tuple[str, str]:
+    """Return the first two lines of a file, whose lines may end as those of old Macintoshes do, with CR alone."""
+    first = _text(path, file.readline(LONGEST_LINE))
+    if "\r" in first:
+        lines = first.split("\r", 2)
+        return lines[0], lines[1]
+    return first, _text(path, file.readline(LONGEST_LINE))
 
 
 def _text(path: Path, line: bytes) -> str:

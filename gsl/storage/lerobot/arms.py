@@ -1,6 +1,6 @@
 """What is known of LeRobot's arms beyond their data sets: names of joints, where zero is, a gripper's range.
 
-Sources: lerobot/robots/so_follower and koch_follower (joints, their scales), docs/source/backwardcomp.mdx (zeros and
+Sources: lerobot/robots/so_follower and koch_follower (joints, their scales), its page backwardcomp (zeros and
 signs before May 2025, when names began with `main_`), and gsl/robots/so101.py (names and ranges of the world so101).
 """
 

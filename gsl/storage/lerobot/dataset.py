@@ -1,6 +1,6 @@
 """What a LeRobot data set says of itself: its robot, rate, joints and episodes, and in which file each episode is.
 
-Written after the format's pages and readers in huggingface/lerobot: docs/source/lerobot-dataset-v3.mdx and
+Written after the format's pages and readers in huggingface/lerobot: the page lerobot-dataset-v3 and
 src/lerobot/datasets. Version 2 keeps one parquet file an episode, version 3 several episodes in a file.
 """
 

@@ -1,0 +1,128 @@
+"""Arrays of an HDF5 file (ALOHA, robomimic, MATLAB 7.3), by their path below a group; links are not followed."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gsl.core.budget import COLUMNS, DEPTH
+from gsl.errors import InputError, TrajectoryError
+from gsl.storage.importers.array_table import Shapes
+
+MAGIC = b"\x89HDF\r\n\x1a\n"
+MATLAB_HEADER = 512  # bytes before the magic in a mat file of version 7.3
+
+
+def is_hdf5(path: Path) -> bool:
+    """Tell whether a file is one of HDF5, by its first bytes, or by those after a header of MATLAB's."""
+    with path.open("rb") as file:
+        start = file.read(MATLAB_HEADER + len(MAGIC))
+    return start.startswith(MAGIC) or start.endswith(MAGIC)
+
+
+def list_groups(path: Path, pattern: str) -> list[str]:
+    """Return the groups whose path fits a pattern such as data/demo_*, in the order of their numbers."""
+    parts = pattern.strip("/").split("/")
+    with _opened(path) as file:
+        found = [""]
+        for part in parts:
+            below = [
+                (before, name) for before in found for name in _names(file, before) if fnmatch.fnmatchcase(name, part)
+            ]
+            found = [f"{before}/{name}".strip("/") for before, name in below]
+    if not found:
+        raise TrajectoryError(path, f"has no group {pattern}")
+    return sorted(found, key=lambda name: (len(name), name))
+
+
+class Hdf5Arrays:
+    """The data sets below a group; those of MATLAB are `turned`: its rows are columns here."""
+
+    def __init__(self, path: Path, group: str, *, turned: bool = False) -> None:
+        self.path, self.group, self.turned = path, group.strip("/"), turned
+        with _opened(path) as file:
+            root = _at(file, self.group)
+            if root is None:
+                there = ", ".join(_names(file, "")) or "nothing"
+                raise TrajectoryError(path, f"has no group {group}; it has {there}")
+            found = dict(_data_sets(root))
+            self.fields: Mapping[str, Any] = dict(_attributes(root))
+        self.shapes: Shapes = {name: (_turn(shape) if turned else shape, kind) for name, (shape, kind) in found.items()}
+
+    def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return arrays by path."""
+        with _opened(self.path) as file:
+            root = _at(file, self.group)
+            try:
+                values = {name: np.asarray(root[name][()]) for name in names}
+            except (OSError, KeyError, ValueError) as error:
+                raise TrajectoryError(self.path, "is truncated or damaged; copy it again") from error
+        return {name: one.T.reshape(_turn(one.shape)) if self.turned else one for name, one in values.items()}
+
+
+def _turn(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the shape of a matrix of MATLAB as its user sees it, a vector as one number a row."""
+    return tuple(size for size in reversed(shape) if size != 1)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    try:
+        import h5py
+    except ImportError as error:
+        raise InputError(f"{path}: HDF5 files are read with the library h5py: pip install 'gsl[hdf5]'") from error
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise TrajectoryError(path, "is no HDF5 file, or truncated or damaged; copy it again") from error
+    with file:
+        yield file
+
+
+def _names(file: Any, group: str) -> list[str]:
+    """Return what lies in a group; links to elsewhere are left out: they may lead to other files."""
+    import h5py
+
+    place = _at(file, group)
+    if not isinstance(place, h5py.Group):
+        return []
+    return [name for name in place if isinstance(place.get(name, getlink=True), h5py.HardLink)]
+
+
+def _at(file: Any, group: str) -> Any:
+    """Return what is at a path, None if it is not there or behind a link."""
+    place = file
+    for part in group.split("/") if group else ():
+        import h5py
+
+        if not isinstance(place, h5py.Group) or not isinstance(place.get(part, getlink=True), h5py.HardLink):
+            return None
+        place = place[part]
+    return place
+
+
+def _data_sets(group: Any, prefix: str = "", depth: int = 0) -> Iterator[tuple[str, tuple[tuple[int, ...], Any]]]:
+    import h5py
+
+    for count, name in enumerate(group):
+        if count > COLUMNS or depth > DEPTH:
+            raise TrajectoryError(group.file.filename, f"holds more than {COLUMNS:,} arrays in a group, or is too deep")
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            continue
+        one = group[name]
+        if isinstance(one, h5py.Group):
+            yield from _data_sets(one, f"{prefix}{name}/", depth + 1)
+        elif isinstance(one, h5py.Dataset) and one.shape is not None and not (one.is_virtual or one.external):
+            yield f"{prefix}{name}", (one.shape, one.dtype)
+
+
+def _attributes(group: Any) -> Iterator[tuple[str, Any]]:
+    for name, value in group.attrs.items():
+        plain = value.item() if isinstance(value, np.generic) else value
+        if isinstance(plain, str | int | float | bool):
+            yield name, plain

@@ -1,0 +1,47 @@
+"""Matrices of a MATLAB file (`.mat` to version 7.2), by name; fields of structs by dotted paths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gsl.core.budget import DEPTH, within
+from gsl.errors import InputError, TrajectoryError
+from gsl.storage.importers.array_table import Shapes
+
+
+class MatlabArrays:
+    """The arrays of a mat file; a row of numbers is taken for a column."""
+
+    def __init__(self, path: Path, memory: float) -> None:
+        from scipy.io import loadmat
+
+        self.path = path
+        try:
+            with within(f"{path}: reading it", growth=memory):
+                saved = loadmat(path, simplify_cells=True)
+        except InputError:
+            raise
+        except Exception as error:  # a damaged file ends the reader in many ways
+            raise TrajectoryError(path, "is no MATLAB file, or truncated or damaged; save it again") from error
+        leaves = dict(_leaves({name: one for name, one in saved.items() if not name.startswith("__")}))
+        self.arrays = {name: one for name, one in leaves.items() if isinstance(one, np.ndarray) and one.ndim}
+        self.shapes: Shapes = {name: (one.shape, one.dtype) for name, one in self.arrays.items()}
+        self.fields: Mapping[str, Any] = {
+            name: one for name, one in leaves.items() if isinstance(one, str | int | float | bool)
+        }
+
+    def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return arrays by name."""
+        return {name: self.arrays[name] for name in names}
+
+
+def _leaves(value: dict[str, Any], prefix: str = "", depth: int = 0) -> Iterator[tuple[str, Any]]:
+    for name, one in value.items() if depth < DEPTH else ():
+        if isinstance(one, dict):
+            yield from _leaves(one, f"{prefix}{name}.", depth + 1)
+        else:
+            yield f"{prefix}{name}", one.item() if isinstance(one, np.generic) else one

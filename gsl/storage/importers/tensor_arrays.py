@@ -1,0 +1,72 @@
+"""Tensors that torch saved (`.pt`), by key; read without running the pickle they come in, as weights alone."""
+
+from __future__ import annotations
+
+import pickle
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gsl.core.budget import DEPTH, within
+from gsl.errors import TrajectoryError
+from gsl.storage.importers.array_table import Shapes
+from gsl.storage.importers.sizes import check_need
+
+_DAMAGED = (RuntimeError, OSError, EOFError, ValueError, KeyError, AttributeError, AssertionError, IndexError)
+
+
+class TensorArrays:
+    """A dictionary of tensors, nested or not, or a single one, which is called `tensor`."""
+
+    def __init__(self, path: Path, memory: float) -> None:
+        import torch
+
+        self.path = path
+        check_need(path, 2.0 * path.stat().st_size, memory)
+        try:
+            with within(f"{path}: reading it", growth=memory), warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # of pickles of another protocol, which are refused
+                saved = torch.load(path, map_location="cpu", weights_only=True)
+        except pickle.UnpicklingError as error:
+            problem = "holds more than tensors (a pickle, which can run code): none is read; save a dict of tensors"
+            raise TrajectoryError(path, problem) from error
+        except _DAMAGED as error:
+            raise TrajectoryError(path, "is no file of torch.save, or truncated or damaged; copy it again") from error
+        leaves = dict(_leaves(saved if isinstance(saved, dict) else {"tensor": saved}))
+        dense = {
+            name: one
+            for name, one in leaves.items()
+            if isinstance(one, torch.Tensor) and one.layout == torch.strided and not one.is_quantized
+        }
+        self.tensors = {name: one.detach() for name, one in dense.items()}
+        self.shapes: Shapes = {
+            name: (tuple(one.shape), np.dtype(str(one.dtype).removeprefix("torch.")))
+            for name, one in self.tensors.items()
+            if one.dtype in _plain()
+        }
+        self.fields: Mapping[str, Any] = {
+            name: one for name, one in leaves.items() if isinstance(one, str | int | float | bool)
+        }
+
+    def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return tensors by name."""
+        return {name: np.array(self.tensors[name].numpy()) for name in names}
+
+
+def _plain() -> set[Any]:
+    """Return the types of numbers that numpy has too."""
+    import torch
+
+    floats = {torch.float16, torch.float32, torch.float64}
+    return floats | {torch.bool, torch.uint8, torch.int8, torch.int16, torch.int32, torch.int64}
+
+
+def _leaves(value: dict[Any, Any], prefix: str = "", depth: int = 0) -> Iterator[tuple[str, Any]]:
+    for name, one in value.items() if depth < DEPTH else ():
+        if isinstance(one, dict):
+            yield from _leaves(one, f"{prefix}{name}.", depth + 1)
+        else:
+            yield f"{prefix}{name}", one
