@@ -171,7 +171,7 @@ class _Work(NamedTuple):
         """What it has built, as its manifest has it."""
         return tuple(
             Parent(one.manifest.kind, _relative(path, self.folder), one.manifest.contents)
-            for path, one in self.built.items()
+            for path, one in sorted(self.built.items())
         )
 
 
