@@ -48,8 +48,17 @@ def places(source: str, files: str | Mapping[str, str] | None) -> list[Place]:
         files: Pattern of the files in a folder, or the names of one episode's files by role.
 
     Raises:
-        InputError: There is nothing, or a file of an episode is missing.
+        InputError: There is nothing, or too much, or a file of an episode is missing.
     """
+    try:
+        with within(f"{source}: looking for logs in it"):
+            return _places(source, files)
+    except OSError as error:
+        problem = f"cannot be looked into: {error.strerror} ({error.filename})"
+        raise InputError(f"source = {source}: {problem}; name the folder of the logs") from error
+
+
+def _places(source: str, files: str | Mapping[str, str] | None) -> list[Place]:
     base, found = _find(source)
     if isinstance(files, Mapping):
         return [_several(base, folder, files) for folder in _folders(source, found, files)]
