@@ -3,57 +3,121 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import functools
 import json
+import os
 import re
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.hydra_config import HydraConfig
+from joblib import register_parallel_backend
+from joblib._parallel_backends import LokyBackend
 from omegaconf import DictConfig
 
 from gsl.commandline.composer import Composition
 from gsl.commandline.config import RUNS, execute, resolve
 from gsl.commandline.failure import describe_failure, report
 from gsl.commandline.overrides import file_of, key_of
+from gsl.core.interruption import end_with_parent
+from gsl.errors import GslError
 from gsl.report.console import Console
 from gsl.storage.documents import write_json
 
 RESULT = "result.json"
+AT_WORK = "."  # how the name of hydra's folder begins while jobs run
 LONGEST_LEVEL = 100
 _SILENT = ("hydra/job_logging=none", "hydra/hydra_logging=none", "hydra.output_subdir=null")
 
 
 def run_jobs(command: str, line: str, composition: Composition, console: Console) -> int:
-    """Run all jobs and return the worst of their exit codes; a job that fails does not stop the others."""
-    (RUNS / ".multirun").mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(prefix=f"{file_of(command)}-", dir=RUNS / ".multirun"))
+    """Run all jobs and return the worst of their exit codes; a job that fails does not stop the others.
+
+    Raises:
+        GslError: A process of the launcher died.
+    """
+    with _sweep_folder(file_of(command)) as folder:
+        _launch(command, line, composition, folder, json=console.json)
+        return _report_jobs(folder, console)
+
+
+@contextlib.contextmanager
+def _sweep_folder(command: str) -> Iterator[Path]:
+    """Yield hydra's folder; it stays for what launchers write of failed jobs, and goes otherwise, after a kill at last.
+
+    It is locked while it is in use, so that the next multirun sees which ones nobody uses any more.
+    """
+    place = RUNS / ".multirun"
+    with contextlib.ExitStack() as locks:
+        with _lock(Path(), wait=True):  # two multiruns that start at once
+            place.mkdir(parents=True, exist_ok=True)
+            for left in place.glob(f"{AT_WORK}*"):
+                with _lock(left) as unused:
+                    if unused:
+                        shutil.rmtree(left, ignore_errors=True)
+            folder = Path(tempfile.mkdtemp(prefix=f"{AT_WORK}{command}-", dir=place))
+            locks.enter_context(_lock(folder))
+        try:
+            yield folder
+            if any(outcome["exit_code"] for outcome in _outcomes(folder)):
+                folder.rename(folder.with_name(folder.name.removeprefix(AT_WORK)))
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            for emptied in (place, RUNS):
+                with contextlib.suppress(OSError):
+                    emptied.rmdir()
+
+
+@contextlib.contextmanager
+def _lock(folder: Path, *, wait: bool = False) -> Iterator[bool]:
+    """Hold a folder if nobody else does, or wait for it; yield whether it is held."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        held = True
+    except BlockingIOError:
+        held = False
+    try:
+        yield held
+    finally:
+        os.close(descriptor)
+
+
+def _launch(command: str, line: str, composition: Composition, folder: Path, *, json: bool) -> None:
     job = functools.partial(
         run_job,
         command=command,
         line=line,
         swept=composition.swept,
         trust=composition.trust,
-        json=console.json,
+        json=json,
     )
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None
-    hydra.multirun(
-        config_name=file_of(command),
-        task_function=job,
-        overrides=[
-            *_SILENT,
-            f"hydra.sweep.dir={folder}",
-            "hydra.sweep.subdir=${hydra.job.num}",
-            *composition.overrides,
-        ],
-        with_log_configuration=False,
+    # Processes of hydra's own launcher would outlive a kill -9 of this one.
+    register_parallel_backend(
+        "loky", functools.partial(LokyBackend, initializer=end_with_parent, initargs=(os.getpid(),))
     )
-    return _report_jobs(folder, console)
+    try:
+        hydra.multirun(
+            config_name=file_of(command),
+            task_function=job,
+            overrides=[
+                *_SILENT,
+                f"hydra.sweep.dir={folder}",
+                "hydra.sweep.subdir=${hydra.job.num}",
+                *composition.overrides,
+            ],
+            with_log_configuration=False,
+        )
+    except BrokenProcessPool as error:
+        raise GslError("a process of the launcher died; the same command goes on from what is built") from error
 
 
 def run_job(
@@ -82,17 +146,17 @@ def job_level(overrides: Sequence[str], swept: Sequence[str], number: int) -> st
 
 
 def _report_jobs(folder: Path, console: Console) -> int:
-    """Say what became of the jobs and return the worst exit code; hydra's folder stays where one failed."""
-    files = sorted(folder.glob(f"*/{RESULT}"), key=lambda path: int(path.parent.name))
-    outcomes = [json.loads(path.read_text(encoding="utf-8")) for path in files]
+    """Say what became of the jobs and return the worst exit code."""
+    outcomes = _outcomes(folder)
     worst = max((int(outcome["exit_code"]) for outcome in outcomes), default=0)
-    if worst == 0:
-        shutil.rmtree(folder)
-        with contextlib.suppress(OSError):
-            folder.parent.rmdir()
     console.table("jobs", ["job", "folder", "outcome"], [_row(outcome) for outcome in outcomes])
     console.result({"jobs": outcomes, "exit_code": worst})
     return worst
+
+
+def _outcomes(folder: Path) -> list[dict[str, Any]]:
+    files = sorted(folder.glob(f"*/{RESULT}"), key=lambda path: int(path.parent.name))
+    return [json.loads(path.read_text(encoding="utf-8")) for path in files]
 
 
 def _row(outcome: Mapping[str, Any]) -> tuple[str, str, str]:

@@ -11,7 +11,7 @@ from gsl.report.console import Console
 from gsl.report.render import portrait
 from gsl.robots.catalogue import robot
 from gsl.robots.urdf import urdf
-from gsl.storage.whole import explain_refusal
+from gsl.storage.whole import claim, explain_refusal
 
 
 def write_robot(name: str, folder: Path, console: Console) -> None:
@@ -31,8 +31,9 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
     shown = any(link.shapes for link in body.links.values())
     files = [str(model), str(picture)] if shown else [str(model)]
     remarks = [*body.remarks, *([] if shown else ["no picture: none of its links has a shape that could be shown"])]
-    with explain_refusal(folder):
+    with claim(folder):
         folder.mkdir(parents=True, exist_ok=True)
+    with explain_refusal(folder):
         text = urdf(body)
         _check_free(model, picture if shown else None, text)
         model.write_text(text, encoding="utf-8")

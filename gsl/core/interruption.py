@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 ECHO = 2.0  # seconds in which the same wish may arrive again, as from `timeout`, which tells the process and its group
@@ -71,6 +74,18 @@ def processes_starting() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@cache
+def end_with_parent(parent: int) -> None:
+    """Let this process end soon after the one that started it, which cannot see to it after a kill -9."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _interrupt(number: int, frame: Any) -> None:

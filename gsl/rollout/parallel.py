@@ -9,16 +9,14 @@ from __future__ import annotations
 import os
 import pickle
 import threading
-import time
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator
 
 from gsl.core.console import Progress
-from gsl.core.interruption import processes_starting
+from gsl.core.interruption import end_with_parent, processes_starting
 from gsl.core.own_code import name_failures
 from gsl.core.setting import setting
 from gsl.core.trajectory import Trajectory
@@ -83,6 +81,8 @@ def arriving(
     function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Progress
 ) -> Iterator[tuple[int, Any]]:
     """Yield (index of job, `function(pickled shared, job)`) of all jobs, as they end."""
+    if not jobs:
+        return
     cluster = chosen_cluster()
     frozen = _pickle(shared, alone=workers == 1 and cluster is None)
     if cluster is not None:
@@ -121,42 +121,29 @@ def _pickle(shared: Any, *, alone: bool) -> bytes:
 def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequence[int], workers: int) -> Iterator[Any]:
     """Yield (index, result) as they come, until a worker dies."""
     import joblib
+    from joblib._parallel_backends import LokyBackend
     from joblib.externals.loky.process_executor import TerminatedWorkerError
     from joblib.parallel import get_active_backend
 
-    if workers == 1 or joblib.effective_n_jobs(workers) == 1:  # a job in this process must not wait for its parent
+    engine = get_active_backend()[0]
+    # Threads, which joblib takes in a process of a launcher, would be as many times too many.
+    if workers == 1 or joblib.effective_n_jobs(workers) == 1 or getattr(engine, "uses_threads", False):
         yield from ((index, function(frozen, jobs[index])) for index in missing)
         return
-    parent = os.getpid() if type(get_active_backend()[0]).__name__ == "LokyBackend" else 0
+    ending = {"initializer": end_with_parent, "initargs": (os.getpid(),)} if isinstance(engine, LokyBackend) else {}
     # Without max_nbytes=None joblib leaves a file for every large array.
-    parallel = joblib.Parallel(n_jobs=workers, batch_size=1, max_nbytes=None, return_as="generator_unordered")
+    parallel = joblib.Parallel(workers, batch_size=1, max_nbytes=None, return_as="generator_unordered", **ending)
     try:
         with processes_starting():
-            found = parallel(
-                joblib.delayed(_run_numbered)(function, frozen, jobs[index], index, parent) for index in missing
-            )
+            found = parallel(joblib.delayed(_run_numbered)(function, frozen, jobs[index], index) for index in missing)
         yield from found
     except TerminatedWorkerError:
         return
 
 
-def _run_numbered(function: Any, frozen: bytes, job: Any, index: int, parent: int) -> tuple[int, Any]:
-    if parent:
-        _end_with_parent(parent)
+def _run_numbered(function: Any, frozen: bytes, job: Any, index: int) -> tuple[int, Any]:
     with name_failures():
         return index, function(frozen, job)
-
-
-@lru_cache(maxsize=1)
-def _end_with_parent(parent: int) -> None:
-    """Let this worker end soon after the process that started it, which cannot see to it after a kill -9."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def _trajectory(frozen: bytes, job: Job) -> Trajectory:
@@ -170,15 +157,22 @@ def _episode(frozen: bytes, job: Job) -> Episode:
     return Episode(done.value, done.ended_in_a_fall, len(done), scenario.task.outcome(scenario.world.layout, done))
 
 
-_STANDING: dict[bytes, tuple[Scenario, Any]] = {}  # what this process has ready, one at most
+class _StandingBy(threading.local):
+    """What a thread of this process has ready, one scenario with its environment at most."""
+
+    frozen: bytes | None = None
+    ready: tuple[Scenario, Any]
+
+
+_standing = _StandingBy()
 
 
 def _standing_by(frozen: bytes) -> tuple[Scenario, Any]:
-    """Return this process' scenario with its environment, kept from one job to the next."""
-    if frozen not in _STANDING:
-        for _, env in _STANDING.values():
-            env.close()
-        _STANDING.clear()
+    """Return a scenario with its environment, kept from one job to the next."""
+    if frozen != _standing.frozen:
+        if _standing.frozen is not None:
+            _standing.ready[1].close()
+            _standing.frozen = None
         scenario = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
-        _STANDING[frozen] = scenario, scenario.make()
-    return _STANDING[frozen]
+        _standing.ready, _standing.frozen = (scenario, scenario.make()), frozen
+    return _standing.ready

@@ -39,7 +39,7 @@ class Origin:
         """What has been built beside it, as its manifest names it."""
         return tuple(
             Parent(one.manifest.kind, relative(path, self.folder), one.manifest.contents)
-            for path, one in self.built.items()
+            for path, one in sorted(self.built.items())
         )
 
 

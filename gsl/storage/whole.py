@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gsl.errors import GslError
+from gsl.errors import GslError, InputError
 
 _REMEDIES = {
     errno.ENOSPC: "free space or choose another folder with out=",
@@ -21,6 +21,7 @@ _REMEDIES = {
 
 
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG}
+_NO_PLACE = {errno.ENOENT, errno.ENOTDIR, errno.EEXIST, errno.ELOOP, errno.ENAMETOOLONG, errno.EINVAL}
 _TEMPORARY = re.compile(r"\..+\.tmp-\d+")
 _HERE, _EXCHANGE = -100, 2  # AT_FDCWD, RENAME_EXCHANGE: linux/fcntl.h, linux/fs.h
 
@@ -38,6 +39,24 @@ def explain_refusal(folder: Path) -> Iterator[None]:
         remedy = _REMEDIES.get(error.errno or 0, "choose another folder with out=")
         place = folder.parent if folder.name.startswith(".") else folder  # what is hidden is gone when this is read
         raise GslError(f"{place}: cannot be written: {reason}{named}; {remedy}") from error
+
+
+@contextmanager
+def claim(out: Path) -> Iterator[None]:
+    """Within, the place of a new folder is made ready; where the system knows no such place, it is wrong.
+
+    Raises:
+        InputError: There can be no folder, such as below a file or in /proc.
+        GslError: It cannot be written.
+    """
+    try:
+        with explain_refusal(out.parent):
+            yield
+    except (FileNotFoundError, GslError) as error:
+        reason = error if isinstance(error, OSError) else error.__cause__
+        if isinstance(reason, OSError) and reason.errno in _NO_PLACE:
+            raise InputError(f"{out}: there can be no folder here ({reason.strerror}); choose another out=") from error
+        raise
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gsl.errors import ArtifactError
-from gsl.storage.whole import exchange, explain_refusal, flush, remove_temporary
+from gsl.storage.whole import claim, exchange, explain_refusal, flush, remove_temporary
 
 KEY = ".key"
 LOG = "log.txt"
@@ -30,7 +30,7 @@ def hold_lock(out: Path) -> Iterator[None]:
         GslError: The folder around it cannot be written.
     """
     lock = out.with_name(f".{out.name}.lock")
-    with explain_refusal(out.parent):
+    with claim(out):
         made = [folder for folder in (out.parent, *out.parent.parents) if not folder.exists()]
         out.parent.mkdir(parents=True, exist_ok=True)
         descriptor = _take(out, lock)

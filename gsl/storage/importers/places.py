@@ -52,8 +52,17 @@ def places(source: str, files: str | Mapping[str, str] | None, records: str = ""
         records: Pattern of groups of an HDF5 file, an episode each.
 
     Raises:
-        InputError: There is nothing, or a file of an episode is missing.
+        InputError: There is nothing, or too much, or a file of an episode is missing.
     """
+    try:
+        with within(f"{source}: looking for logs in it"):
+            return _places(source, files)
+    except OSError as error:
+        problem = f"cannot be looked into: {error.strerror} ({error.filename})"
+        raise InputError(f"source = {source}: {problem}; name the folder of the logs") from error
+
+
+def _places(source: str, files: str | Mapping[str, str] | None) -> list[Place]:
     base, found = _find(source)
     if isinstance(files, Mapping):
         return [one for folder in _folders(source, found, files) for one in _several(base, folder, files)]
