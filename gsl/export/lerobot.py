@@ -1,4 +1,4 @@
-"""Trajectories as a LeRobot data set, v3.0: joint angles in radians, named as the joints are, no videos."""
+"""Trajectories as a LeRobot data set, v3.0: joint angles in degrees, as LeRobot's arms have them, no videos."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from gsl.core.trajectory import Batch, Trajectory
 
 VERSION = "v3.0"
+DEGREES = 180.0 / np.pi
 _DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _EPISODES = "meta/episodes/chunk-000/file-000.parquet"
 _INDICES = ("frame_index", "episode_index", "index", "task_index")
@@ -59,7 +60,7 @@ def write_lerobot(folder: Path, batch: Batch, task: str) -> list[str]:
         "data_path": _DATA,
         "video_path": None,
         "features": features,
-        "unit": "rad",
+        **({} if batch.states else {"angles": "deg"}),  # gsl's own entry: LeRobot has none
     }
     _write_json(folder / "meta/info.json", info)
     arrays = {**vectors, "timestamp": times[:, None], **{name: counts[name][:, None] for name in _INDICES}}
@@ -89,14 +90,15 @@ def _vectors(batch: Batch) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     def position(episode: Trajectory) -> np.ndarray:
         return episode.state if episode.state is not None else episode.position
 
+    turn = 1.0 if batch.states else DEGREES
     state = [f"state.{k}" for k in range(batch.states)]
-    vectors = {"observation.state": stack(position), "action": stack(lambda episode: episode.action)}
+    vectors = {"observation.state": turn * stack(position), "action": turn * stack(lambda episode: episode.action)}
     names = {
         "observation.state": state or [f"{joint}.pos" for joint in batch.joints],
         "action": [f"{joint}.pos" for joint in batch.joints] if not state else list(batch.joints),
     }
     if not state:
-        vectors["observation.velocity"] = stack(lambda episode: episode.velocity)
+        vectors["observation.velocity"] = turn * stack(lambda episode: episode.velocity)
         names["observation.velocity"] = [f"{joint}.vel" for joint in batch.joints]
     if all(episode.reward is not None for episode in batch.episodes):
         vectors["next.reward"] = stack(lambda episode: np.asarray(episode.reward)[:, None])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from typing import Any
 
 import numpy as np
@@ -138,13 +139,13 @@ def _torchscript(module: Any) -> bytes:
     trace: Any = torch.jit.trace
     save: Any = torch.jit.save
     buffer = io.BytesIO()
-    save(trace(module, _examples(len(module.stiffness))), buffer)
+    with warnings.catch_warnings():  # of torch, which would like torch.export; simulators load TorchScript
+        warnings.simplefilter("ignore")
+        save(trace(module, _examples(len(module.stiffness))), buffer)
     return buffer.getvalue()
 
 
 def _onnx(module: Any, n: int) -> bytes:
-    import warnings
-
     import onnx
     import torch
 

@@ -74,7 +74,11 @@ class ExportStage:
         for line in missing:
             console.status(f"not held: {line}")
         names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
-        return {"format": self.format, "files": [name for name in names if name not in _OWN and not name.startswith(".")], "not_held": missing}
+        return {
+            "format": self.format,
+            "files": [name for name in names if name not in _OWN and not name.startswith(".")],
+            "not_held": missing,
+        }
 
     def _simulator(self) -> Export:
         world = self.world
