@@ -54,6 +54,9 @@ add_stage(
     app, "cross-validate", "See whether what a diagnosis finds in a part of the trajectories is true of the rest."
 )
 add_stage(app, "evaluate", "Measure policies in the real world.")
+add_stage(
+    app, "export", "Write a simulator or trajectories for other tools: MJCF, Isaac Lab, bam, URDF, LeRobot, Minari."
+)
 add_stage(app, "survey", "See how far real worlds are from the simulator.")
 add_stage(app, "answer", "Check logs and measured returns of a real robot, and take them in for a request.")
 add_stage(app, "rehearse", "Let a simulated world answer a request as the real robot would.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
@@ -51,7 +52,9 @@ class TorchScript:
 
         try:
             load: Any = torch.jit.load
-            self._module: Any = load(str(path), map_location="cpu").eval()
+            with warnings.catch_warnings():  # of torch, which would like torch.export
+                warnings.simplefilter("ignore")
+                self._module: Any = load(str(path), map_location="cpu").eval()
         except (RuntimeError, ValueError) as error:
             advice = "write it with torch.jit.script(module).save(file)"
             raise ConfigError(

@@ -20,7 +20,7 @@ FLOORS = (  # from the ground up: a room imports from lower floors alone
     ("policies",),
     ("worlds", "storage", "optimizers"),
     ("grounding",),
-    ("rollout", "report"),
+    ("rollout", "report", "export"),
     ("diagnosis", "real_robot", "commandline"),
     ("training", "api", "cli"),
     ("validation", "gym", "testing", "__main__"),

@@ -46,7 +46,7 @@ class Entry(NamedTuple):
 
 
 class DataSet(NamedTuple):
-    """A folder with meta/info.json."""
+    """A folder with meta/info.json; `angles` is what they are in, deg or percent, where it says so as gsl's do."""
 
     folder: Path
     version: str
@@ -54,6 +54,7 @@ class DataSet(NamedTuple):
     names: Mapping[str, tuple[str, ...]]
     widths: Mapping[str, int]
     episodes: tuple[Entry, ...]
+    angles: str | None = None
 
     @property
     def files(self) -> list[Path]:
@@ -114,7 +115,8 @@ def open_data_set(folder: Path, memory: float) -> DataSet:
         task = {"task": "; ".join(map(str, tasks))} if isinstance(tasks, list) and tasks else {}
         found.append(Entry(index, one["length"], folder / place, {**known, "episode_index": index, **task}, names))
     _check_files(folder, found)
-    return DataSet(folder, version, robot, names, widths, tuple(found))
+    angles = "deg" if info.get("angles") == "deg" else None
+    return DataSet(folder, version, robot, names, widths, tuple(found), angles)
 
 
 def _read_info(folder: Path) -> dict[str, Any]:

@@ -97,12 +97,15 @@ def _scales(
     """Return unit, factor, zero, sign and offset by joint, and which scale that is and why."""
     old = any(OLD in entry for entry in entries.values())
     grippers = {joint for joint, entry in entries.items() if is_gripper(entry) and (arm or mapping.angles == "percent")}
+    grippers -= set(entries) if data.angles else set()
     body = [joint for joint in entries if joint not in grippers]
     values = _measured(data, entries, memory)
     ranges = _read_calibration(mapping.calibration, entries, arm) if mapping.calibration else {}
     if mapping.angles is not None:
         kind: str = mapping.angles
         why = f"angles are in {mapping.angles}, as mapping.angles says"
+    elif data.angles:
+        kind, why = data.angles, f"angles are in {data.angles}, as the data set says"
     elif old:
         kind, why = "deg", f"angles are in degrees: names begin with {OLD}"
     else:

@@ -1,0 +1,1 @@
+"""What leaves gsl: simulators, learned servos and trajectories in the formats of other tools."""

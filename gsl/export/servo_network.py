@@ -1,0 +1,161 @@
+"""A learned servo as TorchScript and ONNX, with its numbers and a reference in twenty lines of numpy."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from typing import Any
+
+import numpy as np
+
+from gsl.core.plant import Plant
+from gsl.core.servo import numbers
+from gsl.core.servo_law import LAG, LAGS, NOBODY, SIGN, SPEED_UNIT
+from gsl.errors import ConfigError
+from gsl.export.parts import Export, Simulator, by_joint, unheld
+from gsl.storage.documents import pretty
+from gsl.worlds.servo import BRISTLE
+
+OPSET = 17
+_REFERENCE = '''"""The servos of {robot} at one physics step, as gsl simulates them. Arrays have an entry a joint."""
+
+import json
+
+import numpy as np
+import torch
+
+NUMBERS = json.load(open("{name}_servo.json"))
+LAW = torch.jit.load("{name}_servo.pt")
+N = {{key: np.array(list(values.values())) for key, values in NUMBERS["joints"].items()}}
+
+
+def torque(targets, q, v, bristle, dahl, step):
+    """targets: what was commanded 0, {lag:g}, ... {last:g} s before (now - delay) [rad], shape ({lags}, n)."""
+    errors = targets + N["offset"] - q
+    bristle[:] = np.clip(bristle + v * step, -{bristle:g}, {bristle:g})
+    dahl[:] = np.clip(dahl + v * step, -{bristle:g}, {bristle:g})
+    inputs = [torch.tensor(part, dtype=torch.float32)[None] for part in (errors.T, v, bristle)]
+    drive, output = (part[0].detach().numpy() for part in LAW(*inputs))
+    e = errors[0] - np.clip(errors[0], -N["deadband"], N["deadband"])
+    u = N["kp"] * e - N["kd"] * v + drive
+    line = np.clip(1.0 - np.abs(v) / N["no_load_speed"], 0.0, 1.0)  # where the motor drives; braking has its limit
+    high, low = N["limit"] * np.where(v > 0, line, 1.0), -N["limit"] * np.where(v < 0, line, 1.0)
+    return np.clip(u, low, high) - N["viscous"] * v - N["coulomb"] * dahl / {bristle:g} + output
+'''
+HELD = ("kp", "kd", "limit", "no_load_speed", "coulomb", "viscous", "deadband", "offset", "delay", "armature", "law")
+UNREACHED = 1e9  # a limit that there is none of, in a JSON file
+
+
+def export_servo(simulator: Simulator) -> Export:
+    """Return the files of a simulator with a learned servo.
+
+    Raises:
+        ConfigError: It has none.
+    """
+    plant = simulator.plant
+    if plant.law is None:
+        raise ConfigError("world.servo", "is missing; format=servo is for a world with a learned servo")
+    name, module = simulator.name, law_module(plant)
+    joints = {key: by_joint(plant, np.clip(getattr(plant.servo, key), -UNREACHED, UNREACHED)) for key in numbers()}
+    about = {
+        "robot": plant.robot.name,
+        "inputs": {"errors": f"(1, n, {LAGS}) [rad]", "velocity": "(1, n) [rad/s]", "bristle": "(1, n) [rad]"},
+        "outputs": {"drive": "before the torque limit (1, n) [N·m]", "output": "behind it (1, n) [N·m]"},
+        "lag": LAG,
+        "bristle": BRISTLE,
+        "joints": joints,
+    }
+    reference = _REFERENCE.format(
+        robot=plant.robot.name, name=name, lag=LAG, last=LAG * (LAGS - 1), lags=LAGS, bristle=BRISTLE
+    )
+    files: dict[str, str | bytes] = {
+        f"{name}_servo.pt": _torchscript(module),
+        f"{name}_servo.json": pretty(about),
+        f"{name}_servo_reference.py": reference,
+    }
+    missing = unheld(plant, HELD)
+    try:
+        files[f"{name}_servo.onnx"] = _onnx(module, len(plant.robot.motors))
+    except ImportError as error:
+        missing.append(f"the ONNX file, which needs gsl[onnx]: pip install 'gsl[onnx]' ({error})")
+    return Export(files, missing)
+
+
+def law_module(plant: Plant) -> Any:
+    """Return the law as a module of torch, all joints at once: see gsl/core/servo_law.py."""
+    import torch
+
+    law = plant.law
+    assert law is not None, "asked before"
+    group = np.maximum(law.group, 0)
+    acts = (law.group != NOBODY).astype(float)
+    one_of = {key: torch.tensor(getattr(law, key)[group], dtype=torch.float32) for key in law._fields[4:]}
+    each = {"stiffness": law.stiffness, "torque": law.torque * acts, "lag": law.lag}
+
+    class Law(torch.nn.Module):
+        stiffness: torch.Tensor
+        torque: torch.Tensor
+        lag: torch.Tensor
+        first: torch.Tensor
+        first_bias: torch.Tensor
+        second: torch.Tensor
+        second_bias: torch.Tensor
+        last: torch.Tensor
+        last_bias: torch.Tensor
+
+        def __init__(self) -> None:
+            super().__init__()
+            for key, values in {**one_of, **each}.items():
+                self.register_buffer(key, torch.as_tensor(values, dtype=torch.float32))
+
+        def act(self, z: torch.Tensor) -> torch.Tensor:
+            z = torch.clamp(z, -3.0, 3.0)
+            return z * (27.0 + z * z) / (27.0 + 9.0 * z * z)
+
+        def forward(
+            self, errors: torch.Tensor, velocity: torch.Tensor, bristle: torch.Tensor
+        ) -> tuple[torch.Tensor, torch.Tensor]:
+            lagged = errors * self.stiffness[:, None]
+            others = [velocity / SPEED_UNIT, self.act(SIGN * velocity), bristle / BRISTLE]
+            x = torch.cat([lagged, torch.stack(others, dim=-1)], dim=-1)[..., None, :]
+            x = self.act(torch.matmul(x, self.first) + self.first_bias[:, None])
+            x = self.act(torch.matmul(x, self.second) + self.second_bias[:, None])
+            x = (torch.matmul(x, self.last) + self.last_bias[:, None])[..., 0, :]
+            drive = x[..., 0] + (self.lag * lagged).sum(dim=-1)
+            return self.torque * drive, self.torque * x[..., 1]
+
+    return Law().eval()
+
+
+def _examples(n: int) -> tuple[Any, ...]:
+    import torch
+
+    return torch.zeros(1, n, LAGS), torch.zeros(1, n), torch.zeros(1, n)
+
+
+def _torchscript(module: Any) -> bytes:
+    import torch
+
+    trace: Any = torch.jit.trace
+    save: Any = torch.jit.save
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():  # of torch, which would like torch.export; simulators load TorchScript
+        warnings.simplefilter("ignore")
+        save(trace(module, _examples(len(module.stiffness))), buffer)
+    return buffer.getvalue()
+
+
+def _onnx(module: Any, n: int) -> bytes:
+    import onnx
+    import torch
+
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():  # of the exporter that needs no further library
+        warnings.simplefilter("ignore")
+        write: Any = torch.onnx.export
+        write(
+            module, _examples(n), buffer, input_names=["errors", "velocity", "bristle"],
+            output_names=["drive", "output"], opset_version=OPSET, dynamo=False,
+        )  # fmt: skip
+    onnx.checker.check_model(onnx.load_from_string(buffer.getvalue()))
+    return buffer.getvalue()

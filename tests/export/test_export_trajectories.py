@@ -1,0 +1,112 @@
+"""Trajectories that are exported are read again, by gsl or by the format's own library, to the number."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from commands import done, refused
+
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.storage.trajectories import read, write
+
+pytestmark = pytest.mark.slow
+
+JOINTS, PERIOD = ("shoulder_pan", "shoulder_lift", "elbow_flex"), 0.04
+
+
+def episode(length: int, phase: float) -> Trajectory:
+    time = PERIOD * np.arange(length + 1)
+    position = np.sin(time[:, None] + phase + np.arange(len(JOINTS)))
+    action = position[:-1] + 0.1 * np.cos(3.0 * time[:-1, None])
+    return Trajectory(time, action, position, np.cos(time[:, None] + phase + np.arange(len(JOINTS))))
+
+
+@pytest.fixture
+def batch(tmp_path: Path) -> Batch:
+    kept = Batch((episode(40, 0.0), episode(55, 0.7)), JOINTS, PERIOD, {"robot": "so100", "role": "imported"})
+    write(tmp_path / "log.parquet", kept)
+    return kept
+
+
+def export(folder: Path, kind: str) -> Path:
+    done("export", "trajectories=log.parquet", f"format={kind}", "name=out", folder=folder)
+    return folder / f"runs/out/export_{kind}"
+
+
+def check_alike(again: Batch, batch: Batch, *, rows: int, precision: float) -> None:
+    assert len(again) == len(batch)
+    for one, other in zip(again.episodes, batch.episodes, strict=True):
+        n = len(other) - (1 - rows)
+        np.testing.assert_allclose(one.position[:n], other.position[:n], atol=precision)
+        np.testing.assert_allclose(one.action[: n - 1], other.action[: n - 1], atol=precision)
+
+
+def test_a_lerobot_data_set_is_imported_again(batch: Batch, tmp_path: Path) -> None:
+    place = export(tmp_path, "lerobot")
+    info = json.loads((place / "meta/info.json").read_text(encoding="utf-8"))
+    assert (info["codebase_version"], info["total_frames"], info["fps"]) == ("v3.0", 95, 25)
+    frames = pd.read_parquet(place / "data/chunk-000/file-000.parquet")
+    assert frames["index"].tolist() == list(range(95))
+    episodes = pd.read_parquet(place / "meta/episodes/chunk-000/file-000.parquet")
+    assert episodes["dataset_to_index"].tolist() == [40, 95]
+    for name, feature in info["features"].items():
+        assert np.atleast_1d(frames[name][0]).shape == tuple(feature["shape"]), name
+    done("import", f"source={place}", "name=again", "accept=true", folder=tmp_path)
+    again = read(tmp_path / "runs/again/import/trajectories.parquet")
+    assert [joint.removesuffix(".pos") for joint in again.joints] == list(JOINTS)
+    check_alike(again, batch, rows=0, precision=1e-6)
+
+
+def test_a_csv_is_imported_again(batch: Batch, tmp_path: Path) -> None:
+    place = export(tmp_path, "csv")
+    table = pd.read_csv(place / "trajectories.csv")
+    assert table["episode"].nunique() == len(batch)
+    np.testing.assert_array_equal(
+        table[[f"position.{joint}" for joint in JOINTS]].to_numpy(),
+        np.concatenate([one.position for one in batch.episodes]),
+    )
+
+
+def test_a_bag_holds_states_and_commands_with_their_times(batch: Batch, tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    from gsl.storage.importers.bag_table import BagTable
+
+    place = export(tmp_path, "mcap")
+    for number, one in enumerate(batch.episodes):
+        states = BagTable(place / f"episode_{number:03d}", "/joint_states", 1e9)
+        names = [f"position.{joint}" for joint in JOINTS]
+        columns = states.columns(["time", *names])
+        np.testing.assert_allclose(columns["time"], one.time, atol=1e-9)
+        np.testing.assert_array_equal(np.column_stack([columns[name] for name in names]), one.position)
+        commands = BagTable(place / f"episode_{number:03d}", "/joint_commands", 1e9).columns(names)
+        np.testing.assert_array_equal(np.column_stack([commands[name] for name in names]), one.action)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_minari_loads_its_data_set(batch: Batch, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    minari = pytest.importorskip("minari")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(export(tmp_path, "minari")))
+    data = minari.load_dataset("gsl/trajectories-v0")
+    assert (data.total_episodes, data.total_steps) == (2, 95)
+    for stored, one in zip(data, batch.episodes, strict=True):
+        np.testing.assert_array_equal(stored.observations, np.hstack([one.position, one.velocity]))
+        np.testing.assert_array_equal(stored.actions, one.action)
+        assert stored.truncations[-1] and not stored.terminations.any()
+
+
+def test_rerun_writes_a_recording(batch: Batch, tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    assert (export(tmp_path, "rerun") / "trajectories.rrd").read_bytes()[:3] == b"RRF"
+
+
+def test_what_is_missing_or_wrong_is_one_line(batch: Batch, tmp_path: Path) -> None:
+    assert "format=csv is of trajectories=RUN" in refused("export", "format=csv", folder=tmp_path)
+    assert "format=mjcf is of world=NAME" in refused("export", "format=mjcf", folder=tmp_path)
+    said = refused("export", "format=stl", "world=so101", folder=tmp_path)
+    assert "must be one of" in said
+    said = refused("export", "format=bam", "world=inverted_pendulum", folder=tmp_path)
+    assert said == "world: has no joints with servos"
