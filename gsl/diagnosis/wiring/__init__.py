@@ -1,0 +1,1 @@
+"""Wiring before physics: what is wrong between robot, log and simulator that no effect of physics could do."""

@@ -1,0 +1,285 @@
+"""The search for wiring faults: screen the menu, fit the leads with physics beside them, keep what physics cannot do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from gsl.core.plant import Plant
+from gsl.core.trajectory import Batch
+from gsl.diagnosis.log.log import Log, cut_log
+from gsl.diagnosis.settings import FloorSettings, LogSettings, SearchSettings
+from gsl.diagnosis.wiring.fault import BOTH, Fault, gains, permute, rescale
+from gsl.diagnosis.wiring.options import Spread, by_range, by_relation, find_beyond, gain_grid, permutations, timings
+from gsl.diagnosis.wiring.physics import DELAY, KD, KP, Contest, Fit
+from gsl.errors import GslError
+
+NOISE_COST = SearchSettings.noise_cost
+WINDOWS = LogSettings(  # short ones: a log whose rate is five times too high has no longer ones
+    warm_up=0.3, scored=0.4, floor=FloorSettings(rests=10**9, unsteady=np.inf)  # every joint has its own floor
+)
+EXPLAINED = 1.1  # factor on the cost of noise up to which nothing is left
+NEEDED = 1.5  # factor on that by which a log is off without physics beyond what one make differs by
+BETTER, MUCH = 0.02, 100.0  # share of the cost, and cost, by which a fault without physics beats physics without it
+BAD = 2.0  # floors, above which a joint is worth a question
+BAD_ANGLE = 0.004  # and angle [rad]: below, physics of every kind comes to as much
+HALF = 0.5  # factor that residuals have to fall by, beside the best physics, for a fault to stand
+SHARE = 0.6  # share of the excess that has to go with it
+PROMISING = 0.8  # factor on a joint's cost by which a hypothesis has to lower it before it is fitted
+ALL = 0.7  # share of the joints in question, from which on a fault of timing is one of all
+LEADS = 3  # that are fitted in a round
+ROUNDS = 6
+EVEN = 1.1  # factor on the cost of what is left within which another kind of fault does as well
+WHOLE = 0.04  # of a row, by which a delay may be off a whole number of rows
+AGREE = 0.1  # of a row, by which delays of the joints may differ then
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A fault that stands.
+
+    Attributes:
+        fault: What.
+        before, after: Physics alone, and physics beside the fault.
+        rivals: Other faults that do about as well.
+    """
+
+    fault: Fault
+    before: Fit
+    after: Fit
+    rivals: tuple[Fault, ...] = ()
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """What a search found.
+
+    Attributes:
+        stands: Faults, in the order in which they were found.
+        before, after: The best physics of the log as it is, and of the mended log.
+        late: By how many whole rows all commands act later, 0 if by none: a shift, or a latency.
+    """
+
+    stands: tuple[Stand, ...]
+    before: Fit
+    after: Fit
+    late: int
+
+
+def cut_motions(batch: Batch, plant: Plant) -> Log:
+    """Return a log in windows of which every second motion, or block of unnamed motions, is held out."""
+    return cut_log(batch, plant.robot, blocks=True, settings=WINDOWS)
+
+
+@dataclass(frozen=True)
+class Search:
+    """A log under search.
+
+    Attributes:
+        batch: As mended so far.
+        plant: As changed so far.
+        step: Its physics period [s].
+        floor: Noise floor of the positions [rad], shape (n_joints,).
+        excluded: Joints whose signals are known to be wrong.
+        tick: Called after every replay.
+    """
+
+    batch: Batch
+    plant: Plant
+    step: float
+    floor: np.ndarray
+    excluded: frozenset[int]
+    tick: Callable[[], None]
+
+    def run(self) -> Wiring:
+        """Return all faults that stand."""
+        search, stands = self, list[Stand]()
+        first = fit = search._contest().fit()
+        for _ in range(ROUNDS):
+            stand = search._round(fit) or search._without_physics(fit)
+            if stand is None:
+                break
+            stands.append(stand)
+            search, fit = search._mended(stand.fault), stand.after
+        return Wiring(tuple(stands), first, fit, _rows_late(fit, search.batch.control_period))
+
+    def _mended(self, fault: Fault) -> Search:
+        batch, plant, floor = fault.mend(self.batch), fault.change(self.plant), fault.refloor(self.floor)
+        return replace(self, batch=batch, plant=plant, floor=floor)
+
+    def _contest(self, fault: Fault | None = None) -> Contest:
+        mended = self._mended(fault) if fault else self
+        log = cut_motions(mended.batch, mended.plant)
+        if not len(log.train) or not len(log.held_out):
+            raise GslError("too short for a window to fit and one to check")
+        return Contest(mended.plant, self.step, log, mended.floor, self.tick)
+
+    def _screen(self, fault: Fault) -> np.ndarray | None:
+        try:
+            return self._contest(fault).screen()
+        except GslError:  # a rate at which no episode is long enough
+            return None
+
+    def _round(self, fit: Fit) -> Stand | None:
+        """Return the fault that explains most of what physics leaves, None where none stands."""
+        bad = [int(k) for k in np.flatnonzero((fit.rms > BAD) & (fit.angle > BAD_ANGLE)) if k not in self.excluded]
+        if not bad:
+            return None
+        base = self._contest().screen()
+        for tier in (self._relations, self._others):  # what does not move as commanded spoils the rest
+            leads = sorted(tier(bad, base), key=lambda lead: -lead[0])[:LEADS]
+            tried = [(fault, self._contest(fault).fit()) for _, fault in leads]
+            if standing := [(fault, after) for fault, after in tried if _stands(fault, fit, after)]:
+                return _best(standing, fit)
+        return None
+
+    def _without_physics(self, fit: Fit) -> Stand | None:
+        """Return the fault that explains everything with no physics at all, where physics explains nearly as much.
+
+        Free physics of every joint can come near a slower rate or other gains. What needs none of it, and leaves
+        nothing, is the simpler explanation.
+        """
+        contest = self._contest()
+        off = np.flatnonzero(contest.fit(make=True).cost > NEEDED * NOISE_COST).tolist()
+        if self.excluded or not off:
+            return None
+        leads = sorted(self._others(off, contest.screen()), key=lambda lead: -lead[0])[:LEADS]
+        count = contest.count
+        for _, lead in leads:
+            fault = self._refined(lead)
+            after = self._contest(fault).fit(make=True)
+            gain = float((fit.cost - after.cost).mean())
+            if after.cost.mean() < EXPLAINED * NOISE_COST and gain > max(BETTER * fit.cost.mean(), MUCH / count):
+                return Stand(fault, fit, after)
+        return None
+
+    def _refined(self, fault: Fault) -> Fault:
+        """Return gains as a fit has them, which beside those of the menu are others; any other fault as it is."""
+        if fault.kind != "gains":
+            return fault
+        own = list(fault.joints)
+        kp, kd = np.exp(self._contest(fault).fit().parameters[[KP, KD]][:, own])
+        return gains(kp * fault.value["kp"], kd * fault.value["kd"], own)
+
+    def _relations(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
+        """Yield faults of how positions follow commands, and values beyond the joints' limits, with what they lower."""
+        for fault in permutations(self.batch):
+            if promising := self._promising(fault, bad, base):
+                yield promising[0], fault
+        beyond = find_beyond(self.batch, self.plant)
+        spreads = [(bad, one) for one in by_relation(self.batch, self.plant)]
+        spreads += [([k for k in bad if k in beyond], one) for one in by_range(self.batch, self.plant) if beyond]
+        yield from self._spreads(spreads, base)
+
+    def _spreads(self, spreads: Sequence[tuple[Sequence[int], Spread]], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
+        for joints, spread in spreads:
+            fault = spread.fault(joints)
+            if fault and (promising := self._promising(fault, joints, base)):
+                chosen = spread.fault(promising[1])
+                assert chosen is not None
+                yield promising[0], chosen
+
+    def _others(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
+        """Yield faults that a replay alone shows, with by how much they lower the cost."""
+        yield from self._spreads([(bad, one) for one in by_range(self.batch, self.plant)], base)
+        yield from self._timings(bad, base)
+        yield from self._gains(bad, base)
+        yield from self._both(bad, base)
+
+    def _promising(self, fault: Fault, bad: Sequence[int], base: np.ndarray) -> tuple[float, list[int]] | None:
+        cost = self._screen(fault)
+        if cost is None:
+            return None
+        better = [k for k in bad if cost[k] < PROMISING * base[k] and k in fault.joints]
+        return (float((base - cost)[better].sum()), better) if better else None
+
+    def _timings(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
+        everyone = range(len(base))
+        rows = min(len(one) for one in self.batch.episodes)
+        for fault in timings(everyone, rows):
+            promising = self._promising(fault, bad, base)
+            if promising is None:
+                continue
+            if fault.kind == "rate" or len(promising[1]) >= ALL * len(bad):
+                yield promising[0], fault
+            else:
+                alone = next(one for one in timings(promising[1], rows) if one.value == fault.value)
+                yield promising[0], alone
+
+    def _gains(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
+        """Yield the best gains of each joint, if they are far from what they are."""
+        grid = [(fault, cost) for fault in gain_grid(bad, self.plant) if (cost := self._screen(fault)) is not None]
+        costs = np.array([cost for _, cost in grid])
+        best = costs.argmin(axis=0)
+        better = [k for k in bad if costs[best[k], k] < PROMISING * base[k]]
+        if better:
+            place = {k: list(bad).index(k) for k in better}
+            kp, kd = ([grid[best[k]][0].value[name][place[k]] for k in better] for name in ("kp", "kd"))
+            fault = gains(kp, kd, better)
+            yield float(sum(base[k] - costs[best[k], k] for k in better)), fault
+
+    def _both(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
+        """Yield axes that point the other way, and joints that have each other's names, in commands and positions."""
+        n = len(base)
+        minus, nothing = np.full(n, -1.0), np.zeros(n)
+        turned = {k: self._screen(rescale("sign", [k], BOTH, minus, nothing, {})) for k in bad}
+        better = [k for k, cost in turned.items() if cost is not None and cost[k] < PROMISING * base[k]]
+        if better:
+            drop = sum(float(base[k] - cost[k]) for k in better if (cost := turned[k]) is not None)
+            yield drop, rescale("sign", better, BOTH, minus, nothing, {})
+        if len(bad) > 1:
+            yield from self._exchanged(list(bad), base)
+
+    def _exchanged(self, bad: list[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
+        """Yield the exchange of joints in question that fits best, from how well each joint replays each channel."""
+        matrix = np.diag(base[bad] * PROMISING)
+        for turn in range(1, len(bad)):
+            order = list(range(len(base)))
+            for place, joint in enumerate(bad):
+                order[joint] = bad[(place + turn) % len(bad)]
+            cost = self._screen(permute(order, BOTH))
+            for place, joint in enumerate(bad):
+                matrix[place, (place + turn) % len(bad)] = np.inf if cost is None else cost[joint]
+        _, chosen = linear_sum_assignment(np.where(np.isfinite(matrix), matrix, 1e6))
+        if (chosen == np.arange(len(bad))).all():
+            return
+        order = list(range(len(base)))
+        for place, other in enumerate(chosen):
+            order[bad[place]] = bad[int(other)]
+        fault = permute(order, BOTH)
+        cost = self._screen(fault)
+        if cost is not None and (drop := float((base - cost).sum())) > 0.0:
+            yield drop, fault
+
+
+def _best(standing: Sequence[tuple[Fault, Fit]], before: Fit) -> Stand:
+    """Return the fault that leaves least, with those of other kinds that leave hardly more."""
+    best, after = min(standing, key=lambda pair: float(pair[1].cost.sum()))
+    rivals = tuple(
+        fault for fault, other in standing if fault.kind != best.kind and other.cost.sum() < EVEN * after.cost.sum()
+    )
+    return Stand(best, before, after, rivals)
+
+
+def _stands(fault: Fault, before: Fit, after: Fit) -> bool:
+    """Whether a fault leaves so much less of its joints than physics alone that physics is out of the question."""
+    own = list(fault.joints)
+    left = float(np.sqrt((after.rms[own] ** 2).mean()) / np.sqrt((before.rms[own] ** 2).mean()))
+    excess = float((before.cost[own] - NOISE_COST).sum())
+    gone = float((before.cost[own] - after.cost[own]).sum()) / excess if excess > 0.0 else 0.0
+    return left <= HALF and gone >= SHARE
+
+
+def _rows_late(fit: Fit, period: float) -> int:
+    """Return by how many whole rows all joints' commands act later, 0 if by none or by no whole number."""
+    delays = fit.parameters[DELAY] / period
+    clear = fit.rms < BAD
+    if clear.sum() < max(1, 0.5 * len(delays)):
+        return 0
+    middle = float(np.median(delays[clear]))
+    apart = float(np.median(np.abs(delays[clear] - middle)))
+    rows = round(middle)
+    return rows if rows >= 1 and abs(middle - rows) < WHOLE and apart < AGREE else 0

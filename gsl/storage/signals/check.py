@@ -1,0 +1,51 @@
+"""All checks of the signals of a log that need no simulator, and the log with what can be mended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gsl.core.trajectory import Trajectory
+from gsl.storage.signals.base_frame import find_base_frames
+from gsl.storage.signals.copies import find_copies
+from gsl.storage.signals.finding import Finding, together
+from gsl.storage.signals.glitches import find_glitches, mend
+from gsl.storage.signals.stuck import find_stuck
+from gsl.storage.signals.velocities import find_velocities
+from gsl.storage.signals.wraps import find_wraps, join, wrapped
+
+
+def check_signals(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Finding]:
+    """Return what looks wrong with the signals of a log.
+
+    Args:
+        episodes: Trajectories of the same joints, in the contract's units.
+        joints: Names, in order.
+    """
+    wraps = find_wraps(episodes, joints)
+    whole = join_turns(episodes) if wraps else episodes
+    checks = (find_glitches, find_copies, find_stuck, find_velocities)
+    found = [*wraps, *(one for check in checks for one in check(whole, joints))]
+    return [*together(found, joints), *find_base_frames(episodes)]
+
+
+def join_turns(episodes: Sequence[Trajectory]) -> list[Trajectory]:
+    """Return trajectories whose wrapping angles go on; velocities of these are derived anew."""
+    turns = wrapped(episodes)
+    made = []
+    for one in episodes:
+        position, action, velocity = one.position.copy(), one.action.copy(), one.velocity.copy()
+        for (signal, k), turn in turns.items():
+            values = position if signal == "position" else action
+            values[:, k] = join(values[:, k], turn)
+            if signal == "position":
+                velocity[:, k] = np.gradient(position[:, k], one.time)
+        made.append(replace(one, position=position, action=action, velocity=velocity))
+    return made
+
+
+def mend_signals(episodes: Sequence[Trajectory]) -> list[Trajectory]:
+    """Return trajectories without the wraps and the one-sample glitches that `check_signals` reports."""
+    return [replace(one, position=mend(one.position), action=mend(one.action)) for one in join_turns(episodes)]
