@@ -171,10 +171,8 @@ def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr
         in table
     )
     assert metrics["verdict"] in table
-    assert (
-        "plots: runs/whole/iterate/ (joint_trace.png, learning_curve.png, walk.png)\npage: runs/whole/iterate/report.html\n"
-        in table
-    )
+    assert "plots: runs/whole/iterate/ (joint_trace.png, learning_curve.png, walk.png)\n" in table
+    assert "page: runs/whole/iterate/report.html\n" in table
     assert table.splitlines()[-1] == "runs/whole/iterate"
     grown = [line for line in said.lines if line.startswith("  ")]
     assert grown[0].split()[:2] == ["iteration", "policy"]
