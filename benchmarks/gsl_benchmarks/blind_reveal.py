@@ -73,11 +73,7 @@ def _labels(seals: Path, path: Path) -> dict[str, Label]:
 
 
 def _check_answers(seals: Path, path: Path) -> None:
-    """Refuse answers that were changed after they were sealed, or are to other data.
-
-    Raises:
-        GslError: Names the file.
-    """
+    """Refuse answers that were changed after they were sealed, or are to other data."""
     sealed, folder = document(path), path.parent
     if sealed["data"] != file_hash(seals):
         raise GslError(f"{path}: these are answers to other data than {seals.parent}")

@@ -118,11 +118,10 @@ def _signed_rank(difference: np.ndarray) -> float:
 
 def _corrected(found: Sequence[Order]) -> list[Order]:
     """Holm's correction: the k-th least of n p-values times n - k + 1, none less than one before it."""
-    n, highest, corrected = len(found), 0.0, {}
-    for k, index in enumerate(np.argsort([one.p for one in found])):
-        highest = max(highest, min(1.0, found[index].p * (n - k)))
-        corrected[int(index)] = highest
-    return [one._replace(p=corrected[index]) for index, one in enumerate(found)]
+    p = np.array([one.p for one in found])
+    order = np.argsort(p)
+    p[order] = np.maximum.accumulate(np.minimum(1.0, p[order] * np.arange(len(p), 0, -1)))
+    return [one._replace(p=value) for one, value in zip(found, p.tolist(), strict=True)]
 
 
 def _summary(cell: Cell, trials: list[Trial]) -> Summary:

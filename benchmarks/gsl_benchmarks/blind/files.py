@@ -21,11 +21,7 @@ ANSWERS, BASELINES, SEAL = "answers", "baselines", "seal.json"  # of the answers
 
 
 def found(reference: str, file: str, kind: str) -> Path:
-    """Return a file of a folder that anyone wrote, or of the artifact of `kind` that a path or a run's name stands for.
-
-    Raises:
-        ArtifactError: There is none.
-    """
+    """Return a file of a folder that anyone wrote, or of the artifact of `kind` that a path or a run stands for."""
     place = Path(reference)
     folder = place if (place / file).is_file() else resolve(reference, kind=kind)
     if not (folder / file).is_file():
@@ -61,11 +57,7 @@ def seals_of(path: Path) -> dict[str, Any]:
 
 
 def document(path: Path) -> dict[str, Any]:
-    """Return a JSON document of this version, with or without a version number.
-
-    Raises:
-        ArtifactError: It is none.
-    """
+    """Return a JSON document of this version, with or without a version number."""
     try:
         read_in: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
