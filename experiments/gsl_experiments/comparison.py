@@ -97,7 +97,9 @@ def orders(
         if not {method, other} <= there or method == other:
             continue
         first, second = _paired(trials, Cell(simulator, world, method, 1), other, attrgetter("stable"))
-        found.append(Order(method, other, float(np.mean(first - second)), _signed_rank(first - second)))
+        apart = first - second
+        p = float(wilcoxon(apart).pvalue) if apart.any() else 1.0
+        found.append(Order(method, other, float(np.mean(apart)), p))
     return _corrected(found)
 
 
@@ -110,10 +112,6 @@ def _paired(trials: Sequence[Trial], cell: Cell, other: str, figure: Figure) -> 
     numbers = sorted(values[cell.method].keys() & values[other].keys())
     first, second = (np.array([values[name][number] for number in numbers], float) for name in (cell.method, other))
     return first, second
-
-
-def _signed_rank(difference: np.ndarray) -> float:
-    return 1.0 if not difference.any() else float(wilcoxon(difference).pvalue)
 
 
 def _corrected(found: Sequence[Order]) -> list[Order]:
