@@ -37,7 +37,7 @@ from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
 from gsl_experiments.replay import Replay
 from gsl_experiments.replays_table import FIGURE, TABLE, Shown
 from gsl_experiments.sizes import First, PresetName, numbers, sizes_of, trials_of
-from gsl_experiments.trial_dots import method_colour
+from gsl_experiments.trials_picture import method_colour
 from gsl_experiments.yielding import Loads
 
 DATA = "replays.json"

@@ -56,13 +56,13 @@ def places(source: str, files: str | Mapping[str, str] | None, records: str = ""
     """
     try:
         with within(f"{source}: looking for logs in it"):
-            return _places(source, files)
+            return _places(source, files, records)
     except OSError as error:
         problem = f"cannot be looked into: {error.strerror} ({error.filename})"
         raise InputError(f"source = {source}: {problem}; name the folder of the logs") from error
 
 
-def _places(source: str, files: str | Mapping[str, str] | None) -> list[Place]:
+def _places(source: str, files: str | Mapping[str, str] | None, records: str) -> list[Place]:
     base, found = _find(source)
     if isinstance(files, Mapping):
         return [one for folder in _folders(source, found, files) for one in _several(base, folder, files)]
