@@ -32,12 +32,13 @@ from gsl_benchmarks.blind.files import (
     REFERENCE,
     SEAL,
     SEALS,
+    answers_below,
     document,
     found,
     read_case,
     seals_of,
 )
-from gsl_benchmarks.blind.seals import VERSION, files_below, total
+from gsl_benchmarks.blind.seals import VERSION, total
 
 ANSWERED = "answered.jsonl"
 """What a run that was stopped goes on from: the cases that have an answer, with the hashes of its files."""
@@ -85,9 +86,7 @@ class BlindAnswer:
             self._all(set(leaders.values()), {}, folder, answered, progress)
             self._all(set(cases), leaders, folder, answered, progress)
         answers = [document(_file(folder, case)) for case in cases]
-        hashes = files_below(folder / ANSWERS)
-        for place in sorted((folder / BASELINES).glob("*")):
-            hashes |= {f"{place.name}/{name}": sha for name, sha in files_below(place).items()}
+        hashes = answers_below(folder)
         sealed = {"schema_version": VERSION, "data": file_hash(seals), "answers": hashes, "total": total(hashes)}
         documents.write_json(folder / SEAL, sealed)
         (folder / ANSWERED).unlink()  # its order is that in which the answers came

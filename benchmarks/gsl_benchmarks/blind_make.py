@@ -116,11 +116,7 @@ class BlindMake:
         return kept.read_text(encoding="utf-8").strip()
 
     def _keep(self, labels: Mapping[str, Any]) -> None:
-        """Write the labels; those of another benchmark stay.
-
-        Raises:
-            GslError: There are others.
-        """
+        """Write the labels; those of another benchmark stay."""
         path, told = Path(self.labels) / LABELS, documents.text({"schema_version": VERSION, "cases": labels}, indent=2)
         if path.exists() and path.read_text(encoding="utf-8").strip() != told:
             raise GslError(f"{path}: holds the labels of another benchmark; choose another labels=")

@@ -12,11 +12,11 @@ from gsl.errors import GslError
 from gsl.storage import documents
 from gsl.storage.hashing import file_hash
 from gsl_benchmarks.blind.figures import figures
-from gsl_benchmarks.blind.files import ANSWERS, BASELINES, LABELS, SEAL, SEALS, document, found, seals_of
+from gsl_benchmarks.blind.files import ANSWERS, BASELINES, LABELS, SEAL, SEALS, answers_below, document, found, seals_of
 from gsl_benchmarks.blind.label import WALK, Label
 from gsl_benchmarks.blind.mark import Mark, marked
 from gsl_benchmarks.blind.results import OURS, markdown, results
-from gsl_benchmarks.blind.seals import check_label, files_below
+from gsl_benchmarks.blind.seals import check_label
 
 DATA, TABLE = "results.json", "results.md"
 
@@ -73,17 +73,11 @@ def _labels(seals: Path, path: Path) -> dict[str, Label]:
 
 
 def _check_answers(seals: Path, path: Path) -> None:
-    """Refuse answers that were changed after they were sealed, or are to other data.
-
-    Raises:
-        GslError: Names the file.
-    """
+    """Refuse answers that were changed after they were sealed, or are to other data."""
     sealed, folder = document(path), path.parent
     if sealed["data"] != file_hash(seals):
         raise GslError(f"{path}: these are answers to other data than {seals.parent}")
-    there = files_below(folder / ANSWERS)
-    for place in sorted((folder / BASELINES).glob("*")):
-        there |= {f"{place.name}/{name}": sha for name, sha in files_below(place).items()}
+    there = answers_below(folder)
     for name in sorted({*there, *sealed["answers"]}):
         if there.get(name) != sealed["answers"].get(name):
             raise GslError(f"{folder}: the seal of {name} does not hold, the answer was changed after it was given")

@@ -109,16 +109,11 @@ def untrained(scenario: Scenario) -> Scenario:
     rng, joints = np.random.default_rng(0), scenario.world.layout.joints
     config = ModelConfig(family="mlp", sensors=("gyro", "tilt", "foot_force"))
     windows = (config.of_body, config.of_joints)
-    nets = [_network((window.size(len(joints)), *config.hidden, len(joints)), rng) for window in windows]
+    sizes = [(window.size(len(joints)), *config.hidden, len(joints)) for window in windows]
+    nets = [Network([(0.01 * rng.standard_normal((b, a)), np.zeros(b)) for a, b in pairwise(one)]) for one in sizes]
     forward = ForwardModel(nets[0], windows[0], joints)
     inverse = Regression(nets[1], windows[1], joints)
     return replace(scenario, grounding=LoadedTransformation(forward, inverse, alpha=TRUST))
-
-
-def _network(sizes: tuple[int, ...], rng: np.random.Generator) -> Network:
-    return Network(
-        [(0.01 * rng.standard_normal((after, before)), np.zeros(after)) for before, after in pairwise(sizes)]
-    )
 
 
 @contextmanager

@@ -22,12 +22,13 @@ from gsl.grounding.none import NoGrounding
 from gsl.models.free_run import TICKS
 from gsl.report.markdown import table
 from gsl.report.study_page import write_study_page
+from gsl.report.style import save
 from gsl.rollout.rollout import Scenario
 from gsl.stages.iterate import Iterate, check_trainable
 from gsl.training.data import FEWEST, degrees
 from gsl.validation.replay import replay_starts
 from gsl_experiments.answer import answer_difference
-from gsl_experiments.budget_curve import Line, budget_curve
+from gsl_experiments.budget_curve import Line, budget_curve_figure
 from gsl_experiments.compare import Compare
 from gsl_experiments.comparison_table import bounds, finely, told_difference
 from gsl_experiments.effort import check_search, seconds
@@ -207,7 +208,7 @@ class Budget:
         panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
         bases = dict(zip(panels, (without.mean, plain.mean), strict=True))
         title = "What a grounding makes of more real data, with 95 % intervals"
-        picture = budget_curve(folder / FIGURE, panels, bases, title)
+        picture = save(budget_curve_figure(panels, bases, title), folder / FIGURE)
         last = [one.value for one in points if (one.method, one.trajectories) == (method, self.budgets[-1])]
         apart = mean_interval(np.subtract(last, [one.value for one in points if one.method == NONE]))
         what = f"With {self.budgets[-1]} real trajectories, {method} minus none"

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from gsl.core.statistics import Interval
-from gsl.report.style import COMMAND, figure, headline, label_ends, look, method_colour, save
+from gsl.report.style import COMMAND, figure, headline, label_ends, look, method_colour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,13 +20,6 @@ class Line(NamedTuple):
 
     budgets: Sequence[int]
     found: Sequence[Interval]
-
-
-def budget_curve(
-    path: Path, panels: Mapping[str, Mapping[str, Line]], bases: Mapping[str, float], title: str
-) -> Figure:
-    """Write the figure as a PNG file and return it; arguments as those of `budget_curve_figure`."""
-    return save(budget_curve_figure(panels, bases, title), path)
 
 
 def budget_curve_figure(panels: Mapping[str, Mapping[str, Line]], bases: Mapping[str, float], title: str) -> Figure:

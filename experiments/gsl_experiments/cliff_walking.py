@@ -20,10 +20,11 @@ from gsl.grounding.states import TableTransformation
 from gsl.models.counts import Counts
 from gsl.report.markdown import table as markdown
 from gsl.report.study_page import write_study_page
+from gsl.report.style import save
 from gsl.storage.documents import write_json
 from gsl.worlds.gymnasium import GymnasiumWorld
 from gsl_experiments.answer import answer_difference
-from gsl_experiments.noise_curve import Curve, noise_curve
+from gsl_experiments.noise_curve import Curve, noise_curve_figure
 from gsl_experiments.sizes import PresetName, check_rising, sizes_of
 from gsl_experiments.table_episodes import played
 
@@ -178,4 +179,4 @@ def _draw(path: Path, points: Sequence[Point], bounds: Mapping[float, tuple[floa
         for method in METHODS
     }
     exact = {"real optimum": [best for _, best in bounds.values()], "edge path": [edge for edge, _ in bounds.values()]}
-    return noise_curve(path, curves, exact, title="Cliff Walking: return in the real world")
+    return save(noise_curve_figure(curves, exact, "Cliff Walking: return in the real world"), path)

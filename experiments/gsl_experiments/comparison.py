@@ -97,7 +97,9 @@ def orders(
         if not {method, other} <= there or method == other:
             continue
         first, second = _paired(trials, Cell(simulator, world, method, 1), other, attrgetter("stable"))
-        found.append(Order(method, other, float(np.mean(first - second)), _signed_rank(first - second)))
+        apart = first - second
+        p = float(wilcoxon(apart).pvalue) if apart.any() else 1.0
+        found.append(Order(method, other, float(np.mean(apart)), p))
     return _corrected(found)
 
 
@@ -112,17 +114,12 @@ def _paired(trials: Sequence[Trial], cell: Cell, other: str, figure: Figure) -> 
     return first, second
 
 
-def _signed_rank(difference: np.ndarray) -> float:
-    return 1.0 if not difference.any() else float(wilcoxon(difference).pvalue)
-
-
 def _corrected(found: Sequence[Order]) -> list[Order]:
     """Holm's correction: the k-th least of n p-values times n - k + 1, none less than one before it."""
-    n, highest, corrected = len(found), 0.0, {}
-    for k, index in enumerate(np.argsort([one.p for one in found])):
-        highest = max(highest, min(1.0, found[index].p * (n - k)))
-        corrected[int(index)] = highest
-    return [one._replace(p=corrected[index]) for index, one in enumerate(found)]
+    p = np.array([one.p for one in found])
+    order = np.argsort(p)
+    p[order] = np.maximum.accumulate(np.minimum(1.0, p[order] * np.arange(len(p), 0, -1)))
+    return [one._replace(p=value) for one, value in zip(found, p.tolist(), strict=True)]
 
 
 def _summary(cell: Cell, trials: list[Trial]) -> Summary:

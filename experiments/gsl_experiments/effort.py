@@ -7,6 +7,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from gsl.core.interfaces import REAL, SIM, Grounding, Search, World
+from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, innermost, is_learned
 from gsl.grounding.none import NoGrounding
@@ -32,12 +33,14 @@ FLOWN = {  # a second of motion in the air, on two cores [s]
 }
 
 
-def check_search(iterate: Iterate, where: str) -> None:
-    """Refuse an optimizer that does not search; `where` is the setting that the iteration is.
+def duration_told(duration: float) -> str:
+    """Return words for a duration [s]."""
+    minutes = max(1, round(duration / 60.0))
+    return f"about {several(minutes, 'minute')}" if minutes < 90 else f"about {minutes / 60.0:.1f} hours"
 
-    Raises:
-        ConfigError: It is another.
-    """
+
+def check_search(iterate: Iterate, where: str) -> None:
+    """Refuse an optimizer that does not search; `where` is the setting that the iteration is."""
     if not isinstance(iterate.optimizer, Search):
         raise ConfigError(f"{where}.optimizer", "studies of robots search: take cma_es")
 

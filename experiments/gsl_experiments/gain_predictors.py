@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import rankdata
@@ -50,7 +50,8 @@ def searched(files: Iterable[Path]) -> list[Trial]:
         ArtifactError: One of them holds something else.
     """
     rows = {key: made for file in files for key, made in read(file, Trial).items()}
-    trials = (_trial(row) for made in rows.values() for row in made)
+    own = ({name: row[name] for name in Trial._fields if name in row} for made in rows.values() for row in made)
+    trials = map(Trial.read, own)
     return [trial for trial in trials if trial.iteration == 1]
 
 
@@ -124,10 +125,6 @@ def predictors(rows: Sequence[Replay], trials: Sequence[Trial], seed: int) -> st
         "is the mean of what is closed joint by joint in stiffness and in strength, as far as these differ."
     )
     return f"{HEAD}\n\n{table(titles, shown)}\n{about}"
-
-
-def _trial(row: Mapping[str, Any]) -> Trial:
-    return Trial.read({name: row[name] for name in Trial._fields if name in row})
 
 
 def _standard(values: Sequence[float]) -> np.ndarray:

@@ -24,11 +24,7 @@ MEASURED = f"Joints are measured on at most {HELD_OUT} further real trajectories
 
 
 def check_first_iteration(iterate: Iterate) -> None:
-    """Refuse what is not the first iteration from π0 as it is, which such a study is of.
-
-    Raises:
-        ConfigError: Under the study's names of settings.
-    """
+    """Refuse what is not the first iteration from π0 as it is, which such a study is of."""
     if iterate.iterations != 1:
         raise ConfigError("iterate.iterations", "this study is of the first", given=str(iterate.iterations))
     if iterate.pretrained:

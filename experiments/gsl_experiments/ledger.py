@@ -19,7 +19,7 @@ from gsl.storage.identity import WITHOUT_EFFECT, without
 from gsl.storage.read_files import read_files
 from gsl.storage.references import resolve
 from gsl.storage.versions import commit
-from gsl_experiments.duration import duration_told
+from gsl_experiments.effort import duration_told
 from gsl_experiments.ledger_file import MADE_BY, RECIPE, Figures, check, read, write
 
 DIGITS, SHORT = 12, 7  # of a recipe's hash, of a commit's

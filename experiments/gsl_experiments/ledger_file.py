@@ -61,11 +61,7 @@ def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def check(path: Path) -> None:
-    """Refuse a growing file that is not as a study wrote it; one without a hash, as a copy is, passes.
-
-    Raises:
-        ArtifactError: It was changed.
-    """
+    """Refuse a growing file that is not as a study wrote it; one without a hash, as a copy is, passes."""
     if _seal(path).is_file() and file_hash(path) not in _seal(path).read_text(errors="replace").split():
         advice = "take it away, or give it as known= if it was you who changed it"
         raise ArtifactError(path, f"is not as the study wrote it; {advice}")

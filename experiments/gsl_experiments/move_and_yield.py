@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gsl.report.style import INK, QUIET, figure, headline, look, save
+from gsl.report.style import INK, QUIET, figure, headline, look
 from gsl_experiments.trial_dots import CLOSE, Dots, draw_methods
 
 if TYPE_CHECKING:
@@ -25,13 +24,6 @@ class Shares(NamedTuple):
 
     stiffness: Sequence[float]
     strength: Sequence[float]
-
-
-def move_and_yield(
-    path: Path, moving: Mapping[str, Mapping[str, Dots]], yielding: Mapping[str, Mapping[str, Shares]], *, group: str
-) -> Figure:
-    """Write the figure as a PNG file and return it; arguments as those of `move_and_yield_figure`."""
-    return save(move_and_yield_figure(moving, yielding, group=group), path)
 
 
 def move_and_yield_figure(

@@ -23,6 +23,7 @@ from gsl.grounding.none import NoGrounding
 from gsl.optimizers.trpo import Trpo
 from gsl.policies.policy import size
 from gsl.report.study_page import write_study_page
+from gsl.report.style import save
 from gsl.rollout.parallel import Workers
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
@@ -30,7 +31,7 @@ from gsl.stages.optimize import BEST
 from gsl.storage.policy_choice import EVALUATION
 from gsl.worlds.gymnasium import GymnasiumWorld, try_out
 from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
-from gsl_experiments.noise_bars import Bars, noise_bars
+from gsl_experiments.noise_bars import Bars, noise_bars_figure
 from gsl_experiments.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl_experiments.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
 from gsl_experiments.tasks import side_by_side
@@ -144,7 +145,7 @@ class NoiseStudy:
             panels[f"{of}{world.replace('_', ' ')}"] = Bars(ticks, table.means(where))
         hatched = "without real data" if self.choice == SIM else "no model of real"
         title = f"Return in real, mean ± standard error ({trials_of(self.first, self.trials)}); hatched: {hatched}"
-        return noise_bars(path, panels, REFERENCE, title=title, along=along, alike=alike)
+        return save(noise_bars_figure(panels, REFERENCE, title=title, along=along, alike=alike), path)
 
     @property
     def _shown(self) -> dict[str, str]:

@@ -6,12 +6,11 @@ As the paper's figures 12 and 13: models of striped bars knew no real data.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gsl.report.style import REAL, figure, headline, look, method_colour, save
+from gsl.report.style import REAL, figure, headline, look, method_colour
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,13 +23,6 @@ class Bars(NamedTuple):
 
     ticks: Sequence[str]
     values: Mapping[str, Sequence[tuple[float, float]]]
-
-
-def noise_bars(
-    path: Path, panels: Mapping[str, Bars], reference: str, *, title: str, along: str, alike: bool = False
-) -> Figure:
-    """Write the figure as a PNG file and return it; arguments as those of `noise_bars_figure`."""
-    return save(noise_bars_figure(panels, reference, title=title, along=along, alike=alike), path)
 
 
 def noise_bars_figure(

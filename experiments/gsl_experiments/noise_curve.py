@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from gsl.core.statistics import Interval
-from gsl.report.style import COMMAND, figure, headline, look, method_colour, save
+from gsl.report.style import COMMAND, figure, headline, look, method_colour
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,11 +19,6 @@ class Curve(NamedTuple):
 
     noises: Sequence[float]
     found: Sequence[Interval]
-
-
-def noise_curve(path: Path, curves: Mapping[str, Curve], exact: Mapping[str, Sequence[float]], *, title: str) -> Figure:
-    """Write the figure as a PNG file and return it; arguments as those of `noise_curve_figure`."""
-    return save(noise_curve_figure(curves, exact, title), path)
 
 
 def noise_curve_figure(curves: Mapping[str, Curve], exact: Mapping[str, Sequence[float]], title: str) -> Figure:

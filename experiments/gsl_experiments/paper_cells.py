@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from operator import attrgetter
 from typing import NamedTuple
 
 from gsl.core.interfaces import Task
@@ -62,28 +62,24 @@ def every_trial(trials: Sequence[Trial]) -> str:
 def one_by_one(trials: Sequence[Trial], task: Task) -> str:
     """Return all that is told of each single trial as a table."""
     where = places(summaries(trials))
-    tellers: dict[str, Callable[[Trial], str]] = {
-        **{title: partial(_field, name) for title, name in where.items()},
-        "grounding": lambda one: one.method,
-        "trial": lambda one: str(one.number),
+    tellers: dict[str, Callable[[Trial], object]] = {
+        **{title: attrgetter(name) for title, name in where.items()},
+        "grounding": attrgetter("method"),
+        "trial": attrgetter("number"),
         f"π0 [{task.unit}]": lambda one: f"{task.shown * one.start:z.1f}",
         f"returned [{task.unit}]": lambda one: f"{task.shown * one.value:z.1f}",
         "improvement [%]": lambda one: "" if one.told_improvement is None else f"{one.told_improvement:z.1f}",
         f"gained at least, 95 % [{task.unit}]": lambda one: f"{task.shown * one.surely:.1f}",
-        "best generation": lambda one: str(one.generation or ""),
+        "best generation": lambda one: one.generation or "",
         "stable winners": lambda one: f"{one.stable} of {one.winners}",
-        "improving winners": lambda one: str(one.improving),
+        "improving winners": attrgetter("improving"),
         "falls": lambda one: f"{one.falls} of {one.episodes}",
         "rank": lambda one: "" if one.rank is None else f"{one.rank:.2f}",
         "alpha": lambda one: "" if one.alpha is None else f"{one.alpha:g}",
         "refused": lambda one: "yes" if one.refused else "no",
-        "real episodes": lambda one: str(one.real_episodes),
+        "real episodes": attrgetter("real_episodes"),
     }
-    return table(tuple(tellers), [[tell(one) for tell in tellers.values()] for one in trials])
-
-
-def _field(name: str, trial: Trial) -> str:
-    return str(getattr(trial, name))
+    return table(tuple(tellers), [[str(tell(one)) for tell in tellers.values()] for one in trials])
 
 
 def _one(trial: Trial) -> str:

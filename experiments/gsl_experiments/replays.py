@@ -34,10 +34,10 @@ from gsl_experiments.effort import seconds
 from gsl_experiments.gain_predictors import TRIALS, predictors, searched
 from gsl_experiments.held_out import MEASURED, check_first_iteration, check_robot, held_out, starts
 from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
-from gsl_experiments.method_colour import method_colour
 from gsl_experiments.replay import Replay
 from gsl_experiments.replays_table import FIGURE, TABLE, Shown
 from gsl_experiments.sizes import First, PresetName, numbers, sizes_of, trials_of
+from gsl_experiments.trials_picture import method_colour
 from gsl_experiments.yielding import Loads
 
 DATA = "replays.json"

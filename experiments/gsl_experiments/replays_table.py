@@ -14,12 +14,13 @@ from gsl.core.statistics import mean_interval
 from gsl.core.unit import Unit
 from gsl.report.markdown import table
 from gsl.report.run_page import Answer
+from gsl.report.style import save
 from gsl_experiments.answer import CHOSEN, answer_difference
 from gsl_experiments.comparison_table import finely, told_difference
 from gsl_experiments.gain_predictors import STANDS
-from gsl_experiments.move_and_yield import Shares, move_and_yield
+from gsl_experiments.move_and_yield import Shares, move_and_yield_figure
 from gsl_experiments.replay import Replay
-from gsl_experiments.trial_dots import Dots, trial_dots
+from gsl_experiments.trial_dots import Dots, trial_dots_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -92,12 +93,13 @@ class Shown:
         }
         group = STANDS if STANDS in self._measured else next(iter(self._measured), "")
         if not group:
-            return trial_dots(path, moving, axis=TITLES[2], title="How far simulators are from real joints, each trial")
+            title = "How far simulators are from real joints, each trial"
+            return save(trial_dots_figure(moving, axis=TITLES[2], title=title), path)
         yielding = {
             world: {method: Shares(*self._shares(world, method, group)) for method in self.colours}
             for world in self.worlds
         }
-        return move_and_yield(path, moving, yielding, group=group)
+        return save(move_and_yield_figure(moving, yielding, group=group), path)
 
     @property
     def _measured(self) -> dict[str, None]:

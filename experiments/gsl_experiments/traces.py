@@ -32,8 +32,7 @@ from gsl.training.data import degrees
 from gsl.validation.model_requirements import extra_ticks
 from gsl.validation.replay import PAST, Place, replay
 from gsl.worlds.grounded import GroundedEnv
-from gsl_experiments.duration import duration_told
-from gsl_experiments.effort import seconds_of_models
+from gsl_experiments.effort import duration_told, seconds_of_models
 from gsl_experiments.sizes import PresetName, sizes_of
 
 if TYPE_CHECKING:

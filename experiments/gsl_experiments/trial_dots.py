@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from gsl.core.statistics import mean_interval
-from gsl.report.style import INK, QUIET, figure, headline, look, save
+from gsl.report.style import INK, QUIET, figure, headline, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,11 +24,6 @@ class Dots(NamedTuple):
     values: Sequence[float]
     failed: Sequence[bool]
     colour: str = INK
-
-
-def trial_dots(path: Path, panels: Mapping[str, Mapping[str, Dots]], *, axis: str, title: str) -> Figure:
-    """Write the figure as a PNG file and return it; arguments as those of `trial_dots_figure`."""
-    return save(trial_dots_figure(panels, axis=axis, title=title), path)
 
 
 def trial_dots_figure(panels: Mapping[str, Mapping[str, Dots]], *, axis: str, title: str) -> Figure:

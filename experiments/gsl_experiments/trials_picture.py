@@ -6,13 +6,27 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from gsl.core.interfaces import Grounding
-from gsl_experiments.method_colour import method_colour
+from gsl.grounding.effects import DiagnosedEffects, innermost
+from gsl.grounding.gat import ActionTransformation
+from gsl.grounding.servo import LearnedServo
+from gsl.report.style import EFFECTS, GAT, SERVO, SGAT, UNINFORMED
 from gsl_experiments.paper_cells import Drawn
 from gsl_experiments.trial import Trial
 from gsl_experiments.trial_dots import Dots, trial_dots_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def method_colour(grounding: Grounding) -> str:
+    """Return the colour of a method's dots: what it learns from, and whether it draws."""
+    if isinstance(innermost(grounding), LearnedServo):
+        return SERVO
+    if isinstance(grounding, DiagnosedEffects):
+        return EFFECTS
+    if not isinstance(grounding, ActionTransformation):
+        return UNINFORMED
+    return GAT if grounding.predicts == "point" else SGAT
 
 
 def trials_figure(trials: Sequence[Trial], methods: Mapping[str, Grounding], drawn: Drawn, *, tolerant: bool) -> Figure:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import typer
 
@@ -50,14 +49,7 @@ def suggestions(command: str, typed: str, *, config_dir: Path | None = None) -> 
     if "=" in typed:
         words = [f"{key}={name}" for name in explanation.options.get(key, ())]
     else:
-        words = [*_groups(explanation.options), *_settings(explanation.defaults)]
+        words = [f"{group}={name}" for group, names in explanation.options.items() for name in names]
+        # a key alone and with its value: two words, so that the shell goes on without a blank
+        words += [word for key, value in explanation.defaults.items() for word in (f"{key}=", f"{key}={value}")]
     return [word for word in words if word.startswith(typed)]
-
-
-def _groups(options: Mapping[str, Sequence[str]]) -> list[str]:
-    return [f"{group}={name}" for group, names in options.items() for name in names]
-
-
-def _settings(defaults: Mapping[str, Any]) -> list[str]:
-    """A key alone and with its value: two words, so that the shell goes on without a blank."""
-    return [word for key, value in defaults.items() for word in (f"{key}=", f"{key}={value}")]

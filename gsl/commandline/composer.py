@@ -13,6 +13,7 @@ from hydra import initialize_config_dir
 from hydra.core.config_search_path import ConfigSearchPath, SearchPathQuery
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override
 from hydra.errors import CompactHydraException, HydraException
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from hydra.types import RunMode
@@ -104,37 +105,35 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
     Raises:
         ConfigError: An argument is malformed, or names a setting, option or effect that does not exist.
     """
-    vocabulary, typed = Vocabulary((), {}, options), find_trust(arguments)
+    typed = find_trust(arguments)
     find_own_modules(typed)
     trust = (*typed, *(package for package in packages() if not is_ours(package)))
+    words = Vocabulary(OmegaConf.create(), {})
     try:
-        base = _compose(command, [], trust)
-        vocabulary = Vocabulary(list_keys(_without_hydra(base)), _choices(base), options)
-        overrides = rewrite(arguments, vocabulary.chosen)
-        _check_grammar(overrides)
-        composition = _add_declared(command, overrides, trust, multirun)
+        whole = _compose(command, [], trust)
+        base, words = plain(whole), Vocabulary(_without_hydra(whole), _choices(whole))
+        overrides = _parse(rewrite(arguments, words.chosen), multirun)
+        if choices := [_first_value(one) for one in overrides if _is_choice(one)]:
+            words = replace(words, config=_without_hydra(_compose(command, choices, trust)))
+        signs = [_sign(one, words.config) for one in overrides]
+        config = _compose(
+            command, [sign + _first_value(one) for sign, one in zip(signs, overrides, strict=True)], trust
+        )
     except (CompactHydraException, OmegaConfBaseException, YAMLError) as error:
-        words = _with_choices(command, arguments, vocabulary, trust)
         raise unfit(command, arguments, unknown_key(error)) or translate(error, words) from error
     except ValueError as error:
-        raise misshapen(arguments, error, vocabulary) from error
+        raise misshapen(arguments, error) from error
+    lines = tuple(f"{sign}{one.input_line}" for sign, one in zip(signs, overrides, strict=True))
+    swept = tuple(key_of(str(one.input_line)) for one in overrides if one.is_sweep_override())
+    composition = Composition(_without_hydra(config), lines, _choices(config), swept, trust)
     _check_effects(composition)
     _check_referred(command, composition)
     _check_made(command, composition)
-    config = plain(composition.config)
-    strangers = config.keys() - read_declared(config).keys() - plain(base).keys() - {*COMMAND_KEYS}
+    values = plain(composition.config)
+    strangers = values.keys() - read_declared(values).keys() - base.keys() - {*COMMAND_KEYS}
     if misfit := unfit(command, arguments, min(strangers, default=None)):
         raise misfit
     return composition
-
-
-def _with_choices(command: str, arguments: Sequence[str], words: Vocabulary, trust: Sequence[str]) -> Vocabulary:
-    """Return the words of a command with what is typed of choices, the same ones if these are what is wrong."""
-    try:
-        chosen = _compose(command, _of_choices(_first_values(rewrite(arguments, words.chosen))[0]), trust)
-    except (ConfigError, CompactHydraException, OmegaConfBaseException, YAMLError, ValueError):
-        return words
-    return replace(words, keys=list_keys(_without_hydra(chosen)))
 
 
 def options(group: str) -> list[str]:
@@ -147,18 +146,26 @@ def groups() -> list[str]:
     return [group for group in _loader().list_groups("") if group != "hydra"]
 
 
-def _check_grammar(overrides: Sequence[str]) -> None:
-    parser = OverridesParser.create(config_loader=_loader())
+def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
+    """Return overrides as hydra reads them; several values are for a multirun, a group takes a name."""
+    parser, parsed = OverridesParser.create(config_loader=_loader()), []
     for override in overrides:
+        key, value = key_of(override), override.partition("=")[2]
         try:
-            parser.parse_override(override)
+            parsed.append(one := parser.parse_override(override))
         except HydraException as error:
-            key, _, value = override.partition("=")
-            raise ConfigError(key_of(override), _unreadable(key, value, parser), given=value) from error
+            raise ConfigError(key, _unreadable(override, parser), given=value) from error
+        if one.is_sweep_override() and not multirun:
+            listed = f"; a list is written '{key}=[{value}]'" if one.is_choice_sweep() else ""
+            raise ConfigError(key, f"several values need --multirun{listed}")
+        if _is_choice(one) and not (one.is_sweep_override() or isinstance(one.value(), str | list | dict)):
+            raise ConfigError(key.rpartition("@")[2], "takes the name of a file", given=value)
+    return parsed
 
 
-def _unreadable(key: str, value: str, parser: OverridesParser) -> str:
+def _unreadable(override: str, parser: OverridesParser) -> str:
     """Return what is wrong with a value: that it takes quotes within those of the shell, if these mend it."""
+    key, _, value = override.partition("=")
     quoted = f'{key}="{value}"'
     if not value or "'" in value or value[0] in '[{"':  # more than a word that has odd characters
         return "cannot be read"
@@ -201,32 +208,19 @@ def _check_made(command: str, composition: Composition) -> None:
             raise ConfigError(key, "is made here; gsl optimize takes one that is there")
 
 
-def _add_declared(command: str, overrides: list[str], trust: tuple[str, ...], multirun: bool) -> Composition:
-    """Compose, adding settings that only the class names, and what it lets the user name."""
-    while True:
-        first, swept = _first_values(overrides) if multirun else (overrides, ())
-        try:
-            config = _compose(command, first, trust)
-        except CompactHydraException as error:
-            key = unknown_key(error)
-            others = [override for override, one in zip(overrides, first, strict=True) if key_of(one) != key]
-            if key is None or len(others) == len(overrides) or not _declares(command, others, key, trust):
-                raise
-            overrides = [f"++{one}" if key_of(one) == key else one for one in overrides]
-            continue
-        return Composition(_without_hydra(config), tuple(overrides), _choices(config), swept, trust)
+def _is_choice(override: Override) -> bool:
+    return not override.is_delete() and override.key_or_group in groups()
 
 
-def _declares(command: str, overrides: list[str], key: str, trust: Sequence[str]) -> bool:
-    parent, _, name = key.rpartition(".")
-    config = _compose(command, _first_values(_of_choices(overrides))[0], trust)
-    if name in _find_declared(config, parent):
-        return True
+def _sign(override: Override, config: DictConfig) -> str:
+    """Return the `++` of what only the class of a component names, or what that lets the user name."""
+    parent, _, name = override.key_or_group.rpartition(".")
+    if _is_choice(override) or str(override.input_line).startswith(("+", "~")):
+        return ""
     above, _, mapping = parent.rpartition(".")
-    around = _find_declared(config, above)
-    if name in read_parts(_node(config, above)).get(mapping, {}):
-        return True
-    return mapping in around and around[mapping].named
+    around = _find_declared(config, above).get(mapping)
+    known = {*_find_declared(config, parent), *read_parts(_node(config, above)).get(mapping, {})}
+    return "++" if name in known or (around is not None and around.named) else ""
 
 
 def _find_declared(config: DictConfig, path: str) -> Mapping[str, Setting]:
@@ -237,22 +231,12 @@ def _node(config: DictConfig, path: str) -> dict[str, Any]:
     return plain(OmegaConf.select(config, path) if path else config)
 
 
-def _of_choices(overrides: Sequence[str]) -> list[str]:
-    return [one for one in overrides if "=" in one and key_of(one).partition("@")[0] in groups()]
-
-
-def _first_values(overrides: Sequence[str]) -> tuple[list[str], tuple[str, ...]]:
-    parsed = OverridesParser.create(config_loader=_loader()).parse_overrides(list(overrides))
-    swept = tuple(key_of(str(override.input_line)) for override in parsed if override.is_sweep_override())
-    return [_first_value(override) for override in parsed], swept
-
-
-def _first_value(override: Any) -> str:
+def _first_value(override: Override) -> str:
     if not override.is_sweep_override():
         return str(override.input_line)
-    if override.is_discrete_sweep():
-        return f"{override.get_key_element()}={next(iter(override.sweep_string_iterator()))}"
-    return f"{override.get_key_element()}={override.value().start}"
+    sweep: Any = override.value()
+    first = next(iter(override.sweep_string_iterator())) if override.is_discrete_sweep() else sweep.start
+    return f"{override.get_key_element()}={first}"
 
 
 def _compose(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:

@@ -10,14 +10,7 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
-from gsl.commandline.composer import (
-    Composition,
-    compose,
-    configuration_folder,
-    groups,
-    open_hydra,
-    options,
-)
+from gsl.commandline.composer import compose, configuration_folder, groups, open_hydra, options
 from gsl.commandline.config import WORKERS, CommandSettings, resolve
 from gsl.commandline.known_settings import plain, read_declared
 from gsl.commandline.overrides import EXECUTOR_KEYS, OPTIONAL_GROUPS
@@ -66,7 +59,8 @@ def explain(command: str, typed: Sequence[str] = (), *, config_dir: Path | None 
             composition = compose(command, [])
         keys = {choice.partition("@")[2] or choice: choice for choice in composition.chosen}
         found = {key: options(choice.partition("@")[0]) for key, choice in keys.items()}
-        found |= {group: options(group) for group in OPTIONAL_GROUPS if group in groups() and _fits(group, composition)}
+        fitting = {"experiment", *map(str, composition.config)}  # groups without a default that it can choose from
+        found |= {group: options(group) for group in OPTIONAL_GROUPS if group in groups() and group in fitting}
         chosen = {key: composition.chosen[choice] for key, choice in keys.items()}
         try:
             values = resolve(composition)
@@ -85,11 +79,6 @@ def explain(command: str, typed: Sequence[str] = (), *, config_dir: Path | None 
         if not any(WORKERS in settings for settings in sections.values()):
             sections[""] = {name: one for name, one in sections[""].items() if name not in EXECUTOR_KEYS}
         return Explanation(found, chosen, {path: one for path, one in sections.items() if one})
-
-
-def _fits(group: str, composition: Composition) -> bool:
-    """Whether a command can choose from a group without a default: an experiment always, others if it has the key."""
-    return group == "experiment" or group in composition.config
 
 
 def _notes(group: str, name: str, config_dir: Path | None) -> dict[str, str]:

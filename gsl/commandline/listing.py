@@ -21,7 +21,7 @@ from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.identity import content_hash
 from gsl.storage.lineage import out_of_date
 from gsl.storage.manifest import Manifest, Parent, find_damage, read
-from gsl.storage.references import RUNS, find_all, find_damaged, resolve
+from gsl.storage.references import RUNS, find_all, find_damaged, name_run, resolve
 
 
 def list_runs(console: Console) -> None:
@@ -30,7 +30,7 @@ def list_runs(console: Console) -> None:
     for folder in find_damaged():
         console.status(f"{folder.as_posix()}: its manifest cannot be read; gsl verify says why")
     rows = [
-        (_name_run(one.folder), one.manifest.kind, _local(one.manifest.created), _span(one.manifest), headline(one))
+        (name_run(one.folder), one.manifest.kind, _local(one.manifest.created), _span(one.manifest), headline(one))
         for one in found
     ]
     if rows:
@@ -46,10 +46,6 @@ def list_runs(console: Console) -> None:
         for one in found
     ]
     console.result({"artifacts": documents}, text="" if rows else "no artifacts below runs/")
-
-
-def _name_run(folder: Path) -> str:
-    return (folder.relative_to(RUNS) if folder.is_relative_to(RUNS) else folder).as_posix()
 
 
 def show_artifact(reference: str, console: Console) -> int:
@@ -72,7 +68,8 @@ def show_artifact(reference: str, console: Console) -> int:
     with suppress(*[ArtifactError] * bool(damaged)):
         for told in account(artifact):
             console.table(*told)
-        console.table("settings", ["setting", "value"], _settings(artifact.config))
+        rows = [_setting(name, value) for name, value in artifact.config.items() if not name.startswith("_")]
+        console.table("settings", ["setting", "value"], rows)
     files = [(name, _size(file.bytes), file.sha256[:SHORT]) for name, file in artifact.manifest.files.items()]
     state = f"changed since it was made: {damaged}" if damaged else "all files are as they were made"
     console.table("files", ["file", "size", "sha256"], files, state)
@@ -125,10 +122,6 @@ def _state(place: Path, expected: str) -> str:
         return f"{same}, but {stale}" if (stale := out_of_date(place)) else same
     except InputError:
         return "gone or damaged"
-
-
-def _settings(config: Mapping[str, Any]) -> list[tuple[str, str]]:
-    return [_setting(name, value) for name, value in config.items() if not name.startswith("_")]
 
 
 def _setting(name: str, value: Any) -> tuple[str, str]:

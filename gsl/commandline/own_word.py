@@ -23,9 +23,6 @@ _TRUTH = ("true", "false")
 def find_trust(arguments: Sequence[str]) -> tuple[str, ...]:
     """Return the modules that a command line names: in `trust=`, and wherever it says itself which class to take.
 
-    Args:
-        arguments: As they were typed.
-
     Raises:
         ConfigError: `trust` names no module.
     """

@@ -55,15 +55,7 @@ class BudgetedFiles(FileConfigSource):
 
 
 def check_file(path: Path, name: str) -> None:
-    """Refuse a file that is too large, or that sets what only the user can set.
-
-    Args:
-        path: The file.
-        name: Below the folder of the configuration.
-
-    Raises:
-        InputError: It says why.
-    """
+    """Refuse a file that is too large, or that sets what only the user can set."""
     text = read_text(path)
     tree = yaml_tree(path, text)
     if not isinstance(tree, dict | None):

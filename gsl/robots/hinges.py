@@ -160,11 +160,7 @@ def _driven(hinge: Hinge, told: JointSettings) -> Joint:
 
 
 def _soft(hinge: Hinge, joint: Joint, follows: Follows) -> dict[str, tuple[float, float]]:
-    """Return the range that commands of a joint keep, by name; none where its <safety_controller> leaves it open.
-
-    Raises:
-        ConfigError: It leaves no range at all.
-    """
+    """Return the range that commands of a joint keep, by name; none where its <safety_controller> leaves it open."""
     ends = hinge.soft
     if not ends or (not ends.get("lower") and not ends.get("upper")):  # 0 and 0 are the defaults: nothing is said
         return {}

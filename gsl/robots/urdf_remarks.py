@@ -3,45 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree as xml
 
 import numpy as np
 
 from gsl.core.body import Link
 
+if TYPE_CHECKING:
+    from gsl.robots.urdf_xml import Hinge
+
 FAR = 4.0 * math.pi  # a limit beyond this is hardly in radians [rad]
 ROUNDED = 1.01  # by which a moment of a thin plate may exceed the other two as it is written
 
 
-class Limited(Protocol):
-    """A joint as far as its limits go: what <limit> says, lower and upper [rad]."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def kind(self) -> str:
-        """Its type."""
-
-    @property
-    def limit(self) -> Mapping[str, float]:
-        """Its limits."""
-
-    @property
-    def soft(self) -> Mapping[str, float]:
-        """Its soft limits."""
-
-
-def remarks(root: xml.Element, links: Iterable[Link], hinges: Iterable[Limited]) -> list[str]:
+def remarks(root: xml.Element, links: Iterable[Link], hinges: Iterable[Hinge]) -> list[str]:
     """Return what there is to say of a file and what it holds."""
     return [*_meshes(root), *_dynamics(root), *_floating(root), *_limits(hinges), *_soft(hinges), *_inertias(links)]
 
 
-def _limits(hinges: Iterable[Limited]) -> Iterator[str]:
+def _limits(hinges: Iterable[Hinge]) -> Iterator[str]:
     for hinge in hinges:
         ends = [hinge.limit[key] for key in ("lower", "upper") if key in hinge.limit]
         if hinge.kind == "revolute" and ends and max(map(abs, ends)) > FAR:
@@ -49,7 +32,7 @@ def _limits(hinges: Iterable[Limited]) -> Iterator[str]:
             yield f"joint {hinge.name} has the limits {told} rad: are they in degrees? A URDF's are in radians"
 
 
-def _soft(hinges: Iterable[Limited]) -> Iterator[str]:
+def _soft(hinges: Iterable[Hinge]) -> Iterator[str]:
     for hinge in hinges:
         if any(hinge.soft.values()):
             ends = " and ".join(f"{hinge.soft[key]:g}" for key in ("lower", "upper") if key in hinge.soft)

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from gsl.core.body import Robot
-from gsl.core.budget import read_json
 from gsl.core.validation import did_you_mean
 from gsl.errors import ArtifactError
 from gsl.policies.limits import Limits, breach, limits
@@ -60,7 +59,10 @@ def read_commands(path: Path, robot: Robot) -> Commands:
     Raises:
         ArtifactError: It is damaged, of another version or robot, or asks for what the robot's limits do not allow.
     """
-    stored = _document(path)
+    damaged = "is not a command file, or damaged: it cannot be read as JSON"
+    stored = documents.read_versioned(path, SCHEMA_VERSION, damaged)
+    if missing := [key for key in _KEYS if key not in stored]:
+        raise ArtifactError(path, f"has no {missing[0]}")
     if stored["robot"] != robot.name:
         raise ArtifactError(path, f"is for the robot {stored['robot']!r}, not for {robot.name}")
     period, joints, entries = stored["control_period"], stored["joints"], stored["episodes"]
@@ -72,21 +74,6 @@ def read_commands(path: Path, robot: Robot) -> Commands:
     bounds = limits(robot)
     episodes = tuple(_episode(path, number, entry, order, bounds, period) for number, entry in enumerate(entries))
     return Commands(robot.name, robot.controlled, float(period), episodes, stored.get("about") or {})
-
-
-def _document(path: Path) -> Mapping[str, Any]:
-    try:
-        stored = read_json(path)
-    except FileNotFoundError as error:
-        raise ArtifactError(path, "does not exist") from error
-    except (ValueError, OSError) as error:
-        raise ArtifactError(path, "is not a command file, or damaged: it cannot be read as JSON") from error
-    version = stored.get("schema_version") if isinstance(stored, dict) else None
-    if version != SCHEMA_VERSION:
-        raise ArtifactError(path, f"schema_version {version!r} is unknown; this gsl reads {SCHEMA_VERSION}")
-    if missing := [key for key in _KEYS if key not in stored]:
-        raise ArtifactError(path, f"has no {missing[0]}")
-    return dict(stored)
 
 
 def _order(path: Path, joints: Any, wanted: tuple[str, ...]) -> list[int]:

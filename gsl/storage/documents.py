@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.budget import read_json
+from gsl.errors import ArtifactError
 from gsl.storage.whole import replacing
 
 _NUMBERS = re.compile(r"\[\n *(?:(?:-?[0-9][0-9.eE+-]*|null),?\n *)+\]")  # no string of JSON holds a bare line end
@@ -58,6 +60,24 @@ def write_json(path: Path, value: Any) -> None:
 def pretty(value: Any) -> str:
     """Return `value` as JSON a person can read, numbers of a list on one line."""
     return _NUMBERS.sub(_on_one_line, text(value, indent=2)) + "\n"
+
+
+def read_versioned(path: Path, version: int, damaged: str) -> dict[str, Any]:
+    """Return a document that has this `schema_version`; `damaged` says what is wrong with one that is no JSON.
+
+    Raises:
+        ArtifactError: There is none, or it is damaged or of another version.
+    """
+    try:
+        stored = read_json(path)
+    except FileNotFoundError as error:
+        raise ArtifactError(path, "does not exist") from error
+    except (ValueError, OSError) as error:
+        raise ArtifactError(path, damaged) from error
+    found = stored.get("schema_version") if isinstance(stored, dict) else None
+    if found != version:
+        raise ArtifactError(path, f"schema_version {found!r} is unknown; this gsl reads {version}")
+    return dict(stored)
 
 
 def _on_one_line(numbers: re.Match[str]) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from gsl.core.checkpoint import read_checkpoint
 from gsl.errors import ArtifactError
@@ -49,33 +51,23 @@ def read_forward_model(reference: str) -> AnyForward:
     Raises:
         ArtifactError: There is none, or the file is damaged or of another kind or version.
     """
-    path = model_file(reference, FORWARD)
-    arrays, about = read_checkpoint(path, kind=FORWARD)
-    with _understood(path):
-        if about.get("space") == Counts.space:
-            return Counts.from_arrays(arrays, about)
-        return StateForward.from_arrays(arrays, about) if "space" in about else forward_from(arrays, about)
+    model: AnyForward = _read(reference, FORWARD, StateForward.from_arrays, forward_from)
+    return model
 
 
 def read_inverse_model(reference: str) -> AnyInverse:
     """Read an inverse model; errors as those of `read_forward_model`."""
-    path = model_file(reference, INVERSE)
-    arrays, about = read_checkpoint(path, kind=INVERSE)
-    with _understood(path):
-        if about.get("space") == Counts.space:
-            return Counts.from_arrays(arrays, about)
-        return state_inverse_from(arrays, about) if "space" in about else inverse_from(arrays, about)
+    model: AnyInverse = _read(reference, INVERSE, state_inverse_from, inverse_from)
+    return model
 
 
-class _understood:
-    """Turns what is missing in a checkpoint into one line."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, (KeyError, IndexError, TypeError, AssertionError)):
-            raise ArtifactError(self._path, f"lacks part of the model ({error}); train it again") from error
+def _read(reference: str, kind: str, of_states: Callable[..., Any], of_joints: Callable[..., Any]) -> Any:
+    """Return a model of counts, or made by one of two functions of arrays and metadata."""
+    path = model_file(reference, kind)
+    arrays, about = read_checkpoint(path, kind=kind)
+    space = about.get("space")
+    make = Counts.from_arrays if space == Counts.space else of_joints if space is None else of_states
+    try:
+        return make(arrays, about)
+    except (KeyError, IndexError, TypeError, AssertionError) as error:
+        raise ArtifactError(path, f"lacks part of the model ({error}); train it again") from error

@@ -27,11 +27,7 @@ def count_bytes(metadata: pq.FileMetaData, names: Sequence[str] | None = None) -
 
 
 def check_declared(path: Path, metadata: pq.FileMetaData) -> None:
-    """Refuse a trajectory file that says it holds more than fits into any memory.
-
-    Raises:
-        TrajectoryError: It says how much it is.
-    """
+    """Refuse a trajectory file that says it holds more than fits into any memory."""
     need = count_bytes(metadata)
     if need > MOST:
         problem = f"declares {metadata.num_rows:,} rows, {need / 1e9:.3g} GB of memory; a log this long has to be cut"

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gsl.core.budget import read_json
 from gsl.errors import ArtifactError
 from gsl.storage import documents
 
@@ -71,15 +70,8 @@ def read_policies(path: Path) -> Policies:
     Raises:
         ArtifactError: It is missing, damaged, of another version, or a number in it is not finite.
     """
-    try:
-        stored = read_json(path)
-    except FileNotFoundError as error:
-        raise ArtifactError(path, "does not exist") from error
-    except (ValueError, OSError) as error:
-        raise ArtifactError(path, "is not a policy file, or damaged; write it again with gsl optimize") from error
-    version = stored.get("schema_version") if isinstance(stored, dict) else None
-    if version != SCHEMA_VERSION:
-        raise ArtifactError(path, f"schema_version {version!r} is unknown; this gsl reads {SCHEMA_VERSION}")
+    damaged = "is not a policy file, or damaged; write it again with gsl optimize"
+    stored = documents.read_versioned(path, SCHEMA_VERSION, damaged)
     try:
         records = tuple(PolicyRecord(**entry) for entry in stored["policies"])
         policies = Policies(stored["policy"], stored["task"], records)

@@ -48,7 +48,7 @@ def resolve(reference: str | Path, *, kind: str | tuple[str, ...] | None = None,
     if len(fitting) == 1:
         return fitting[0].folder
     if fitting:
-        choices = ", ".join(_name_run(one.folder, runs) for one in fitting)
+        choices = ", ".join(name_run(one.folder, runs) for one in fitting)
         raise ArtifactError(reference, f"several artifacts fit, name one of them: {choices}")
     if own:
         raise ArtifactError(place, f"holds {own[0].manifest.kind}, but {wanted} is needed")
@@ -112,7 +112,7 @@ def _alternatives(reference: str, runs: Path) -> str:
     run, _, stage = reference.rpartition("/")
     maker = f"; gsl {MAKERS[stage]} name={run} makes it" if run and stage in MAKERS else ""
     names = {path.name for path in runs.iterdir() if not path.name.startswith(".")} if runs.is_dir() else set()
-    names |= {_name_run(one.folder, runs) for one in _artifacts(runs)}
+    names |= {name_run(one.folder, runs) for one in _artifacts(runs)}
     close = difflib.get_close_matches(reference, sorted(names), n=1, cutoff=0.85 if maker else 0.6)
     return f", did you mean {close[0]}?" if close else maker
 
@@ -136,5 +136,6 @@ def _readable(folder: Path) -> manifest.Manifest | None:
         return None
 
 
-def _name_run(folder: Path, runs: Path) -> str:
+def name_run(folder: Path, runs: Path = RUNS) -> str:
+    """Return the name of a run's folder as a reference."""
     return (folder.relative_to(runs) if folder.is_relative_to(runs) else folder).as_posix()

@@ -82,7 +82,7 @@ def workplace(out: Path, key: str, *, progress: str, kept: Collection[str] = ())
     """
     folder = _partial(out) if progress else out.with_name(f".{out.name}.tmp-{os.getpid()}")
     with explain_refusal(out.parent):
-        if folder.exists() and not _belongs(folder, key):
+        if folder.exists() and not ((folder / KEY).is_file() and (folder / KEY).read_bytes() == key.encode()):
             shutil.rmtree(folder)
         folder.mkdir(exist_ok=True)
         _clear(folder, {progress, KEY, LOG, *kept})
@@ -90,7 +90,7 @@ def workplace(out: Path, key: str, *, progress: str, kept: Collection[str] = ())
     try:
         yield folder
     finally:
-        if not (progress and _begun(folder / progress)):
+        if not (progress and (folder / progress).is_file() and (folder / progress).stat().st_size):
             shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -100,14 +100,6 @@ def destination(folder: Path) -> Path:
     if not name.startswith("."):
         return folder
     return folder.with_name(name[1:].removesuffix(".partial").partition(".tmp-")[0])
-
-
-def _begun(progress: Path) -> bool:
-    return progress.is_file() and progress.stat().st_size > 0
-
-
-def _belongs(folder: Path, key: str) -> bool:
-    return (folder / KEY).is_file() and (folder / KEY).read_bytes() == key.encode()
 
 
 def _clear(folder: Path, kept: Collection[str]) -> None:

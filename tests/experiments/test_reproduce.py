@@ -19,7 +19,7 @@ from gsl.tasks.arm import Arm
 from gsl.tasks.distance import Distance
 from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld
-from gsl_experiments.duration import duration_told
+from gsl_experiments.effort import duration_told
 from gsl_experiments.ledger import Ledger, recipe
 from gsl_experiments.paper_cells import one_by_one
 from gsl_experiments.paper_table_2 import Table2

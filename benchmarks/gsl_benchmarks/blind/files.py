@@ -12,7 +12,7 @@ from gsl.errors import ArtifactError
 from gsl.storage.documents import write_json
 from gsl.storage.references import resolve
 from gsl.storage.trajectories import read, write
-from gsl_benchmarks.blind.seals import VERSION, check_files
+from gsl_benchmarks.blind.seals import VERSION, check_files, files_below
 
 CASES, SEALS = "cases", "seals.json"  # of the data
 LOG, REFERENCE, CASE = "log.parquet", "reference.parquet", "case.json"  # of a case
@@ -21,16 +21,20 @@ ANSWERS, BASELINES, SEAL = "answers", "baselines", "seal.json"  # of the answers
 
 
 def found(reference: str, file: str, kind: str) -> Path:
-    """Return a file of a folder that anyone wrote, or of the artifact of `kind` that a path or a run's name stands for.
-
-    Raises:
-        ArtifactError: There is none.
-    """
+    """Return a file of a folder that anyone wrote, or of the artifact of `kind` that a path or a run stands for."""
     place = Path(reference)
     folder = place if (place / file).is_file() else resolve(reference, kind=kind)
     if not (folder / file).is_file():
         raise ArtifactError(folder, f"holds no {file}; is this a folder of gsl {kind.replace('_', ' ')}?")
     return folder / file
+
+
+def answers_below(folder: Path) -> dict[str, str]:
+    """Return the SHA-256 of every answer in a folder of answers, those of the baselines by name of these."""
+    hashes = files_below(folder / ANSWERS)
+    for place in sorted((folder / BASELINES).glob("*")):
+        hashes |= {f"{place.name}/{name}": sha for name, sha in files_below(place).items()}
+    return hashes
 
 
 def write_case(folder: Path, log: Batch, reference: Batch | None, case: Mapping[str, Any]) -> None:
@@ -61,11 +65,7 @@ def seals_of(path: Path) -> dict[str, Any]:
 
 
 def document(path: Path) -> dict[str, Any]:
-    """Return a JSON document of this version, with or without a version number.
-
-    Raises:
-        ArtifactError: It is none.
-    """
+    """Return a JSON document of this version, with or without a version number."""
     try:
         read_in: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -60,13 +60,7 @@ class Workshop:
     programmes: Sequence[Programme]
 
     def case(self, name: str, slot: Slot, rng: np.random.Generator) -> Case:
-        """Make one case.
-
-        Args:
-            name: Of the case.
-            slot: What it has to be.
-            rng: Of everything in it.
-        """
+        """Make one case."""
         noise = float(rng.uniform(*NOISE))
         label = Label(name, slot.kind, slot.generator, slot.strength, programme=slot.programme, noise=noise)
         if slot.kind != NULL:

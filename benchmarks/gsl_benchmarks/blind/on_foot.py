@@ -113,11 +113,6 @@ class Track:
 
         The effect whose turn it is comes first; then all others in random order, until one reaches the strength,
         leaves the robot on its feet, and is to be seen.
-
-        Args:
-            name: Of the case.
-            slot: What it has to be.
-            rng: Of everything in it.
         """
         noise = float(rng.uniform(*NOISE))
         label = Label(name, slot.kind, slot.generator, slot.strength, noise=noise)

@@ -52,6 +52,8 @@ def markdown(marks: Mapping[str, Sequence[Mark]], about: str) -> str:
     """
     own = marks[OURS]
     wrong = [mark for mark in own if not right(mark)]
+    counted = {truth: [f"{name} {count}" for name, count in row.items()] for truth, row in confusion(own).items()}
+    answers = [(truth, ", ".join(row)) for truth, row in counted.items()]
     parts = [
         f"# Blind benchmark\n\n{about}\n",
         table(COLUMNS, figure_rows(own)),
@@ -60,7 +62,7 @@ def markdown(marks: Mapping[str, Sequence[Mark]], about: str) -> str:
         table(("generator", "said", "right", "causes"), _reliability_rows(own)),
         "## Answers by truth\n",
         "In brackets what the library that answered did not have. Cases of two effects are left out.\n",
-        table(("truth", "answers"), [(truth, _counted(row)) for truth, row in confusion(own).items()]),
+        table(("truth", "answers"), answers),
         "## Baselines\n" if len(marks) > 1 else "",
         table(("figure", *marks), _compared(marks)) if len(marks) > 1 else "",
         "## Every answer that is not right\n",
@@ -106,10 +108,6 @@ def _compared(marks: Mapping[str, Sequence[Mark]]) -> list[tuple[str, ...]]:
         of_all = [{f.name: f for f in figures(found) if f.generator == generator} for found in marks.values()]
         rows += [(f"{name}, {generator}", *(_shown(one[name]) for one in of_all)) for name in COMPARED]
     return rows
-
-
-def _counted(row: Mapping[str, int]) -> str:
-    return ", ".join(f"{name} {count}" for name, count in row.items())
 
 
 def _told(mark: Mark) -> tuple[str, ...]:

@@ -35,7 +35,8 @@ def ruled(found: Log, arena: Problem) -> tuple[list[str], list[str]]:
         "torque_limit": np.abs(_mean(error * np.sign(load), np.abs(load) > 0.9)),
         "encoder_noise": np.sqrt(np.mean(np.diff(real, 2, axis=1) ** 2, axis=(0, 1)) / 6.0) - floor,
     }
-    scored = {name: values / floor for name, values in features.items() if name in _known(arena)}
+    known = {candidate.effect for candidate in arena.library}
+    scored = {name: values / floor for name, values in features.items() if name in known}
     order = sorted(scored, key=lambda name: -float(np.sqrt(np.mean(scored[name] ** 2))))
     strength = scored[order[0]]
     if np.sqrt(np.mean(strength**2)) < CLEAR:
@@ -43,10 +44,6 @@ def ruled(found: Log, arena: Problem) -> tuple[list[str], list[str]]:
     worst = int(np.argmax(strength))
     alone = strength[worst] ** 2 > ALONE * np.sum(strength**2)
     return order, [found.joints[worst]] if alone else list(found.joints)
-
-
-def _known(arena: Problem) -> set[str]:
-    return {candidate.effect for candidate in arena.library}
 
 
 def _mean(values: np.ndarray, mask: np.ndarray) -> np.ndarray:

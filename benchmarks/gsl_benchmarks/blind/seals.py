@@ -30,11 +30,7 @@ def files_below(folder: Path) -> dict[str, str]:
 
 
 def check_files(folder: Path, hashes: Mapping[str, str]) -> None:
-    """Refuse a case whose files are not those that were sealed.
-
-    Raises:
-        GslError: Names the file.
-    """
+    """Refuse a case whose files are not those that were sealed."""
     there = files_below(folder) if folder.is_dir() else {}
     for name in sorted({*hashes, *there}):
         if name not in there:
@@ -44,11 +40,7 @@ def check_files(folder: Path, hashes: Mapping[str, str]) -> None:
 
 
 def check_label(place: Path, case: str, seal: str, entry: Mapping[str, Any]) -> None:
-    """Refuse a label that is not the one that was sealed.
-
-    Raises:
-        GslError: Names the case.
-    """
+    """Refuse a label that is not the one that was sealed."""
     if sealed(str(entry.get("nonce", "")), entry.get("label", {})) != seal:
         raise GslError(f"{place}: the seal of {case} does not hold, its label or nonce was changed after it was made")
 

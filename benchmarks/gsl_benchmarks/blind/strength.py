@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -29,20 +29,11 @@ LEAST_SHARE = 1e-3  # of a range, where a search begins
 HALVINGS, CLOSE = 14, 0.02  # of the search; relative distance from the target at which it ends
 WORST = 1e3  # floors that a diverging replay counts
 
-
-class Player(Protocol):
-    """A generator: what the encoders of a robot with effects tell while it plays a programme."""
-
-    def __call__(
-        self,
-        plant: Plant,
-        effects: Mapping[str, Any],
-        extra: Mapping[str, Any] | None,
-        targets: Sequence[np.ndarray],
-        starts: Sequence[np.ndarray],
-        period: float,
-    ) -> list[np.ndarray]:
-        """See `same.play_same`."""
+Player = Callable[
+    [Plant, Mapping[str, Any], Mapping[str, Any] | None, Sequence[np.ndarray], Sequence[np.ndarray], float],
+    list[np.ndarray],
+]
+"""A generator, see `same.play_same`: what the encoders of a robot with effects tell while it plays a programme."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ import numpy as np
 
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.sizes import check_need
-from gsl.storage.importers.table import missing_column
 
 Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]
 
@@ -48,8 +47,6 @@ class ArrayTable:
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return the wanted arrays."""
         for name in wanted:
-            if name not in self.names:
-                raise missing_column(self, name)
             shape, kind = self.arrays.shapes[name]
             if kind.hasobject:
                 problem = "holds Python objects (a pickle, which can run code): none is read; save plain numbers"

@@ -11,7 +11,7 @@ import numpy as np
 
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.sizes import check_need
-from gsl.storage.importers.table import missing_column, numbers
+from gsl.storage.importers.table import numbers
 
 STAMP = "time"
 NANOSECOND = 1e-9
@@ -35,9 +35,6 @@ class BagTable:
 
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return the wanted fields, a row a message."""
-        for name in wanted:
-            if name not in self.names:
-                raise missing_column(self, name)
         found: dict[str, list[Any]] = {name: [] for name in wanted}
         fields = {re.split(r"[.\[]", name, maxsplit=1)[0] for name in wanted}
         for row, (stamp, message) in enumerate(self._messages()):

@@ -11,7 +11,7 @@ import numpy as np
 
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.sizes import check_need, open_log
-from gsl.storage.importers.table import missing_column, numbers
+from gsl.storage.importers.table import numbers
 
 FACTOR = 10.0  # bytes of memory that a byte of a document takes while it is read
 LINES = (".jsonl", ".ndjson")
@@ -44,10 +44,7 @@ class JsonTable:
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return the wanted columns."""
         if self.rows is None and not self.lines:
-            return {name: numbers(self.path, name, self._list(name)) for name in wanted}
-        for name in wanted:
-            if name not in self.names:
-                raise missing_column(self, name)
+            return {name: numbers(self.path, name, _at(self.place, name)) for name in wanted}
         found: dict[str, list[Any]] = {name: [] for name in wanted}
         for row, record in enumerate(_records(self.path, self.memory) if self.lines else self.rows or []):
             for name, values in found.items():
@@ -58,12 +55,6 @@ class JsonTable:
             if row % 10_000 == 0:
                 check_need(self.path, 50.0 * row * len(found), self.memory)
         return {name: numbers(self.path, name, values) for name, values in found.items()}
-
-    def _list(self, name: str) -> list[Any]:
-        value = _at(self.place, name)
-        if not isinstance(value, list):
-            raise missing_column(self, name)
-        return value
 
 
 def _document(path: Path, memory: float) -> Any:

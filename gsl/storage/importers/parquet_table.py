@@ -10,7 +10,7 @@ import numpy as np
 
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.sizes import check_need
-from gsl.storage.importers.table import missing_column, numbers
+from gsl.storage.importers.table import numbers
 from gsl.storage.parquet import count_bytes
 
 if TYPE_CHECKING:
@@ -32,9 +32,6 @@ class ParquetTable:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        for name in wanted:
-            if name not in self.names:
-                raise missing_column(self, name)
         try:
             with pq.ParquetFile(self.path) as file:
                 check_need(self.path, 2.0 * count_bytes(file.metadata, wanted), self.memory)

@@ -19,11 +19,7 @@ PICKLE = b"\x80"
 
 
 def check_need(path: Path, need: float, memory: float) -> None:
-    """Refuse to read what needs more memory than allowed, both in [bytes].
-
-    Raises:
-        TrajectoryError: It says how much is needed.
-    """
+    """Refuse to read what needs more memory than allowed, both in [bytes]."""
     if need > memory:
         problem = f"would need about {need / GB:.2g} GB of memory, {memory / GB:.2g} GB are allowed"
         raise TrajectoryError(path, f"{problem}; cut it into several files, or say memory={1.1 * need / GB:.2g}")

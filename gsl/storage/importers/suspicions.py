@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.series import Lag, lag
+from gsl.core.series import Lag, lag, likeness
+from gsl.core.trajectory import Trajectory
 from gsl.storage.importers.assembly import Episode
-from gsl.storage.importers.exchanged import find_exchanges
 
 MOVES = 0.02  # range of a command below which it tells nothing of what follows it [rad]
 ALIKE = 0.8  # correlation above which a signal is taken to follow a command
@@ -23,6 +23,9 @@ STUCK = 0.05  # share of the rows at one end, above which a channel is told to b
 SAME, BEYOND = 1e-6, 0.1  # of a range: what is no difference, and what is one
 CONTRAST = 2e-3  # of correlations, from which on a lag is clear
 MOSTLY = 0.75  # share of the contrast that has to be of negative lags before columns are called swapped
+FOLLOWS, UNLIKE = 0.9, 0.5  # correlations above and below which a position follows a command, or does not
+AS_FAR = 0.33  # of the command that it follows: a joint that is dragged along moves less
+AGAINST = 3  # times as many episodes that say so as say the contrary
 NONE = Lag(0.0, 0.0, 0.0)
 
 
@@ -115,9 +118,34 @@ def _order(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> Iterator[
 def _suspect_exchange(found: Sequence[Episode]) -> Iterator[Suspicion]:
     """Tell of positions that follow another joint's command and not their own."""
     joints = found[0].joints
-    for joint, other in find_exchanges([one.trajectory for one in found], MOVES).items():
+    for joint, other in find_exchanges([one.trajectory for one in found]).items():
         problem = f"follows action.{joints[other]} and not action.{joints[joint]}: are the columns of joints swapped?"
         yield Suspicion(f"position.{joints[joint]}", problem, True)
+
+
+def find_exchanges(found: Sequence[Trajectory]) -> dict[int, int]:
+    """Return for each joint whose position is another's that other joint; episodes of like commands say nothing."""
+    told = {}
+    for joint in range(found[0].action.shape[1]):
+        own = [_likeness(one, joint, joint) for one in found]
+        unlike = [one for one, alike in zip(found, own, strict=True) if alike < UNLIKE]
+        votes = np.zeros(found[0].action.shape[1], dtype=int)
+        for other in set(range(len(votes))) - {joint}:
+            votes[other] = sum(_likeness(one, other, joint) > FOLLOWS for one in unlike)
+        best = int(np.argmax(votes))
+        like = [one for one, alike in zip(found, own, strict=True) if alike > FOLLOWS] if votes[best] else []
+        contrary = sum(_likeness(one, best, joint) < UNLIKE for one in like)
+        if votes[best] and votes[best] >= AGAINST * contrary:
+            told[joint] = best
+    return told
+
+
+def _likeness(one: Trajectory, command: int, measured: int) -> float:
+    """Return how much like a joint's command a position is; 0 where the command rests or it moves much less far."""
+    action, position = one.action[:, command], one.position[:-1, measured]
+    if np.ptp(action) < MOVES or (command != measured and np.std(position) < AS_FAR * np.std(action)):
+        return 0.0
+    return likeness(action, position, one.time[:-1])
 
 
 def is_clear(one: Lag) -> bool:

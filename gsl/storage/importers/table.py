@@ -36,11 +36,7 @@ class Table(Protocol):
 
 
 def check_columns(path: Path, names: Sequence[str]) -> None:
-    """Refuse a table of more columns than any robot logs.
-
-    Raises:
-        TrajectoryError: It says how many there are.
-    """
+    """Refuse a table of more columns than any robot logs."""
     if len(names) > COLUMNS:
         raise TrajectoryError(path, f"has {len(names):,} columns; {COLUMNS:,} are read; cut what is no signal")
 

@@ -15,7 +15,7 @@ import numpy as np
 from gsl.core.budget import find_repeat
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.sizes import LONGEST_LINE, check_need, open_log
-from gsl.storage.importers.table import check_columns, missing_column, numbers
+from gsl.storage.importers.table import check_columns, numbers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,9 +48,6 @@ class TextTable:
 
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return the wanted columns, read in pieces."""
-        for name in wanted:
-            if name not in self.names:
-                raise missing_column(self, name)
         pieces: dict[str, list[np.ndarray]] = {name: [] for name in wanted}
         rows = 0
         for piece in self._pieces(wanted):

@@ -27,15 +27,11 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
 
 _TICKS = re.compile(r"ticks/(\d+)(/s)?")
 _SPELLINGS = {
-    "degrees": "deg",
-    "degree": "deg",
-    "°": "deg",
-    "°/s": "deg/s",
-    "radians": "rad",
-    "°C": "degC",
-    "C": "degC",
+    **dict.fromkeys(("degrees", "degree", "deg.", "°"), "deg"),
+    **dict.fromkeys(("°/s", "dps"), "deg/s"),
+    **dict.fromkeys(("°C", "C"), "degC"),
+    **{"radians": "rad", "m/s2": "m/s²", "rev": "turn", "rev/s": "turn/s", "sec": "s"},
 }
-_SPELLINGS |= {"deg.": "deg", "m/s2": "m/s²", "rev": "turn", "rev/s": "turn/s", "dps": "deg/s", "sec": "s"}
 
 
 def factor(unit: str, wanted: str) -> float:
