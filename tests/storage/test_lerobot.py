@@ -260,6 +260,11 @@ def test_what_is_typed_wrongly_gets_the_command_that_was_meant(tmp_path: Path) -
     for part in ("wave/data", "wave/data/chunk-000/episode_000000.parquet", "wave/meta"):
         line = refused("import", f"source={part}", folder=tmp_path)
         assert line == f"source = {part}: is a part of a LeRobot data set; say source=wave, its folder"
+    write_data_set(tmp_path / "all/jump", "v3.0", recorded(degrees, 1))
+    line = refused("import", "source=all", folder=tmp_path)
+    assert line == "source = all: holds a LeRobot data set; say it: source=all/jump"
+    line = refused("import", "source=wave", "mapping.files='*.parquet'", folder=tmp_path)
+    assert line.endswith("wave is a LeRobot data set, which says where its files are; leave it out")
     line = refused("import", "source=wave", "mapping.joints=[shoulder_pam]", folder=tmp_path)
     assert "is no joint of the data set" in line and "shoulder_pan" in line
     line = refused("import", "source=wave", "mapping.calibration=arm.json", folder=tmp_path)

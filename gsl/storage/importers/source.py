@@ -9,7 +9,7 @@ from typing import NamedTuple
 from gsl.errors import ConfigError, InputError
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, places
-from gsl.storage.lerobot.dataset import find_data_set, is_data_set, open_data_set
+from gsl.storage.lerobot.dataset import INFO, find_data_set, is_data_set, open_data_set
 from gsl.storage.lerobot.own_mapping import own_mapping
 
 PLAIN = "position.{joint}"  # where positions are in files in our own words, and so in none of LeRobot's
@@ -42,18 +42,16 @@ def look_at(source: str, mapping: LogMapping, memory: float) -> Source:
     """
     folder = Path(source)
     if is_data_set(folder):
+        if mapping.files is not None:
+            problem = f"{source} is a LeRobot data set, which says where its files are; leave it out"
+            raise ConfigError("mapping.files", problem)
         data = open_data_set(folder, memory)
         notes: list[str] = []
         if mapping.signals["position"].column == PLAIN:
             mapping, notes = own_mapping(data, mapping, memory)
         name = folder.resolve().name
         return Source([Place(f"{name}/{one.name}", {"": one.file}, one) for one in data.episodes], mapping, notes)
-    for key in ("angles", "calibration"):
-        if getattr(mapping, key) is not None:
-            raise ConfigError(f"mapping.{key}", f"is for LeRobot data sets; {source} has no meta/info.json")
-    inside = find_data_set(folder / "x")
-    if inside is not None and mapping.signals["position"].column == PLAIN:
-        raise InputError(f"source = {source}: is a part of a LeRobot data set; say source={_short(inside)}, its folder")
+    _check_plain(source, mapping)
     return Source(places(source, mapping.files, mapping.records), mapping, [])
 
 
@@ -62,6 +60,7 @@ def list_files(source: str, mapping: LogMapping, memory: float) -> Mapping[str, 
     folder = Path(source)
     if is_data_set(folder):
         return {path.relative_to(folder).as_posix(): path for path in open_data_set(folder, memory).files}
+    _check_plain(source, mapping)
     paths = {
         f"{one.name}/{role}".rstrip("/"): path
         for one in places(source, mapping.files, mapping.records)
@@ -72,6 +71,21 @@ def list_files(source: str, mapping: LogMapping, memory: float) -> Mapping[str, 
         for name, path in paths.items()
         for file in ([path] if path.is_file() else sorted(one for one in path.iterdir() if one.is_file()))
     }
+
+
+def _check_plain(source: str, mapping: LogMapping) -> None:
+    """Refuse what is said of LeRobot data sets where there is none, and a part or a folder of some in place of one."""
+    for key in ("angles", "calibration"):
+        if getattr(mapping, key) is not None:
+            raise ConfigError(f"mapping.{key}", f"is for LeRobot data sets; {source} has no {INFO}")
+    inside = find_data_set(Path(source) / "x")
+    if inside is not None and mapping.signals["position"].column == PLAIN:
+        raise InputError(f"source = {source}: is a part of a LeRobot data set; say source={_short(inside)}, its folder")
+    if sets := sorted(one.parents[1] for one in Path(source).glob(f"*/{INFO}")):
+        problem = (
+            f"holds {len(sets)} LeRobot data sets; say one" if len(sets) > 1 else "holds a LeRobot data set; say it"
+        )
+        raise InputError(f"source = {source}: {problem}: source={sets[0]}")
 
 
 def _short(folder: Path) -> str:
