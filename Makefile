@@ -26,10 +26,10 @@ demo: $(INSTALLED) ## Improve a walk for a "real" robot that the optimiser never
 # Two workers have two cores: threads of matrix products would only be in their way.
 test: $(INSTALLED) ## Check the style, run the tests.
 	$(VENV)/bin/ruff check
-	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n 2
+	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n 2 --dist worksteal
 
 quick: $(INSTALLED) ## Run the tests that take no simulation of seconds; a minute.
-	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n 2 -m "not slow"
+	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n 2 --dist worksteal -m "not slow"
 
 torture: $(INSTALLED) ## Kill commands, flip bits, feed rubbish, fill the disk; an hour (docs/reference/reliability.md).
 	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python tests/support/torture.py $(TORTURE)

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from test_limits import found
+from swinging_arm import FEW, found
 from test_verdict import EMPTY, friction, selection, with_both
 
 from gsl.diagnosis.verdict.caveats import caveats
@@ -20,15 +20,19 @@ LEFT: dict[str, Any] = {"fraction": 0.63}
 NAMED = Verdict("causes", (), (), 0.97, 1.0, 1.0)
 
 
+def nothing_found() -> Findings:
+    return found({}, without=FEW.without)
+
+
 def named(result: Findings, **changes: Any) -> Findings:
     return replace(result, verdict=NAMED, **changes)
 
 
 def test_what_remains_is_told_of_held_out_squares() -> None:
-    told = caveats(named(found({})), (), LEFT, [{"part": "fast", "before": 5.1, "after": 5.3}])
+    told = caveats(named(nothing_found()), (), LEFT, [{"part": "fast", "before": 5.1, "after": 5.3}])
     assert "37 % of the held-out excess remains: something else is at work as well." in told
     assert told[1].endswith("fast (5.1 → 5.3 ×). What is not named is not excluded there.")
-    assert not any("remains" in one for one in caveats(named(found({})), (), {"fraction": 0.98}, []))
+    assert not any("remains" in one for one in caveats(named(nothing_found()), (), {"fraction": 0.98}, []))
 
 
 def test_a_value_that_hangs_on_another_effect_is_told() -> None:
@@ -36,7 +40,7 @@ def test_a_value_that_hangs_on_another_effect_is_told() -> None:
     other = replace(EMPTY.candidates[0].on("elbow"), effect="backlash")
     both = with_both(one, replace(one, candidates=(other,)), 290.0)
     both = replace(both, parameters=(np.array([0.04]), np.array([0.02])), costs=np.array([260.0, 320.0] * 4))
-    result = found({})
+    result = nothing_found()
     chosen = cast(Any, selection(one, both))
     (told,) = [
         line for line in caveats(named(result, selection=chosen), (), {"fraction": 1.0}, []) if "besides" in line
@@ -48,5 +52,5 @@ def test_a_value_that_hangs_on_another_effect_is_told() -> None:
 def test_a_value_beyond_its_documented_range_is_told() -> None:
     one = friction("all", 300.0)
     beyond = replace(one, parameters=(np.array([99.0]),))
-    told = caveats(named(found({}), selection=cast(Any, selection(beyond))), (), {"fraction": 1.0}, [])
+    told = caveats(named(nothing_found(), selection=cast(Any, selection(beyond))), (), {"fraction": 1.0}, [])
     assert any(line.startswith("coulomb friction's torque of 99 is beyond what is documented") for line in told)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import done, refused
-from swinging_arm import PERIOD, QUICK, arm, log
+from swinging_arm import FEW, PERIOD, arm, log
 
 from gsl.core.history import History
 from gsl.core.labels import alike
@@ -70,7 +70,7 @@ def test_what_is_known_of_a_trajectory_is_no_gap() -> None:
 
 
 def test_a_cause_is_found_beside_what_is_known() -> None:
-    options = replace(QUICK, held_out={"gain": 0.5}, most=2)
+    options = replace(FEW, held_out={"gain": 0.5}, most=2)
     found = diagnose(both(command_latency={"delay": 0.016}), nominal(arm()), 0.002, options, lambda _: None)
     assert found.selection.chosen.names == ("command_latency",)
     held = {found.log.records[k].about["gain"] for k in found.log.pieces.record[found.log.held_out]}

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 import pytest
-from swinging_arm import NOISE, PERIOD, QUICK, arm, found, log, logged, motions
+from swinging_arm import FEW, NOISE, PERIOD, QUICK, arm, found, log, logged, motions
 
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
@@ -148,10 +148,10 @@ def test_a_reference_log_takes_the_model_error_away() -> None:
     foreign = {"viscous_friction": {"coefficient": 0.25}}
     reference = log(foreign, seed=5)
     late = log({**foreign, "command_latency": {"delay": 0.015}}, seed=5)
-    result = diagnose(late, nominal(arm()), 0.002, QUICK, lambda phase: None, reference=reference)
+    result = diagnose(late, nominal(arm()), 0.002, FEW, lambda phase: None, reference=reference)
     assert result.selection.chosen.names == ("command_latency",)
     alike, reference = (log(foreign, seed=seed, jitter=0.0) for seed in (6, 7))
-    same = diagnose(alike, nominal(arm()), 0.002, QUICK, lambda phase: None, reference=reference)
+    same = diagnose(alike, nominal(arm()), 0.002, FEW, lambda phase: None, reference=reference)
     assert same.verdict.word == "no_gap"
 
 
@@ -244,7 +244,7 @@ def test_the_library_is_tried_whole_but_for_what_is_left_out() -> None:
 
 def test_threads_do_not_change_the_answer() -> None:
     one, other = (
-        diagnose(log({}, 3), nominal(arm()), 0.002, replace(QUICK, threads=threads), lambda phase: None)
+        diagnose(log({}, 3), nominal(arm()), 0.002, replace(FEW, threads=threads), lambda phase: None)
         for threads in (1, 3)
     )
     assert one.selection.none.cost == other.selection.none.cost

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from swinging_arm import QUICK, arm, found, log
+from swinging_arm import FEW, arm, found, log
 
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch
@@ -52,7 +52,7 @@ def test_a_joint_that_shakes_is_told_as_large_as_it_is_and_in_no_regime() -> Non
 def test_intervals_of_one_held_out_trajectory_have_a_width() -> None:
     whole = log({"command_latency": {"delay": 0.02}})
     two = replace(whole, episodes=whole.episodes[:2], metadata={"episodes": whole.metadata["episodes"][:2]})
-    result = diagnose(two, nominal(arm()), 0.002, QUICK, lambda phase: None)
+    result = diagnose(two, nominal(arm()), 0.002, FEW, lambda phase: None)
     cause = result.verdict.causes[0]
     assert result.selection.chosen.names == ("command_latency",)
     assert cause.low < cause.value < cause.high
@@ -61,7 +61,7 @@ def test_intervals_of_one_held_out_trajectory_have_a_width() -> None:
 def test_a_joint_that_is_stuck_is_told_first() -> None:
     whole = log({})
     still = tuple(replace(one, position=one.position * [1.0, 0.0]) for one in whole.episodes)
-    result = diagnose(replace(whole, episodes=still), nominal(arm()), 0.002, QUICK, lambda phase: None)
+    result = diagnose(replace(whole, episodes=still), nominal(arm()), 0.002, FEW, lambda phase: None)
     (said,) = [one for one in document(result)["caveats"] if "do not" in one]
     assert "elbow" in said and "shoulder" not in said
 

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from test_limits import found
+from swinging_arm import FEW, found
 from test_plausibility import claim
 
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
@@ -26,7 +26,7 @@ PARTS = ("kp", "kd", "coulomb", "viscous", "armature", "offset", "load_friction"
     ids=["friction", "gains"],
 )
 def test_a_calibration_of_either_sign_is_in_the_file(cause: Hypothesis, size: float) -> None:
-    result = found({})
+    result = found({}, without=FEW.without)
     fit = result.answer.fit
     shifted = calibration.clip_shifts(size * calibration.SPREADS[:, None] * np.ones_like(fit.shifts))
     parts = {"candidates": cause.candidates, "parameters": cause.parameters}

@@ -9,7 +9,7 @@ from torture import campaign
 
 pytestmark = pytest.mark.slow
 
-PARTS = {"kills": 1, "flips": 40, "inputs": 30, "disks": 1}
+PARTS = {"kills": 1, "flips": 20, "inputs": 16, "disks": 1}
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -15,12 +15,14 @@ from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.simulate import calibration
 from gsl.diagnosis.verdict.findings import Findings
-from gsl.effects.effect import apply_all, build
+from gsl.effects.effect import apply_all, build, names
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo_state import COMMANDS
 
 PERIOD, NOISE = 0.02, 0.0015
 QUICK = Options(duels=0, nulls=0, most=1, threads=1)
+KEPT = {"command_latency", "coulomb_friction", "viscous_friction", "servo_gain", "load_friction", "target_smoothing"}
+FEW = replace(QUICK, without=tuple(sorted({*names()} - KEPT)))  # where it does not matter what else there might be
 
 
 @cache
@@ -59,12 +61,12 @@ def log(effects: Mapping[str, Any], seed: int = 1, *, jitter: float = 1.0, noise
     drawn[calibration.COULOMB] = np.abs(drawn[calibration.COULOMB])
     held = Held.of(calibration.calibrate(apply_all(nominal(robot), build(effects)), drawn), 0.002, PERIOD)
     played = motions()
-    names = [*played, "steps_a"]
+    order = [*played, "steps_a"]
     return Batch(
-        tuple(logged(held, played[name], noise, rng) for name in names),
+        tuple(logged(held, played[name], noise, rng) for name in order),
         robot.controlled,
         PERIOD,
-        {"episodes": [{"policy": name} for name in names], "world": {"step": 0.002}},
+        {"episodes": [{"policy": name} for name in order], "world": {"step": 0.002}},
     )
 
 
