@@ -27,7 +27,10 @@ def find_exchanges(found: Sequence[Trajectory], moves: float) -> dict[int, int]:
         unlike = [one for one, alike in zip(found, own, strict=True) if alike < UNLIKE]
         votes = np.zeros(found[0].action.shape[1], dtype=int)
         for other in set(range(len(votes))) - {joint}:
-            votes[other] = sum(_likeness(one, other, joint, moves) > FOLLOWS for one in unlike)
+            votes[other] = sum(
+                _likeness(one, other, joint, moves) > FOLLOWS and _likeness(one, other, other, moves) < FOLLOWS
+                for one in unlike
+            )  # where the other joint follows its own command as well, two commands are nearly equal, or one is a copy
         best = int(np.argmax(votes))
         like = [one for one, alike in zip(found, own, strict=True) if alike > FOLLOWS] if votes[best] else []
         contrary = sum(_likeness(one, best, joint, moves) < UNLIKE for one in like)

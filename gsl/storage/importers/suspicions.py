@@ -10,6 +10,7 @@ import numpy as np
 from gsl.core.series import Lag, lag
 from gsl.storage.importers.assembly import Episode
 from gsl.storage.importers.exchanged import find_exchanges
+from gsl.storage.signals.check import check_signals
 
 MOVES = 0.02  # range of a command below which it tells nothing of what follows it [rad]
 ALIKE = 0.8  # correlation above which a signal is taken to follow a command
@@ -23,6 +24,7 @@ STUCK = 0.05  # share of the rows at one end, above which a channel is told to b
 SAME, BEYOND = 1e-6, 0.1  # of a range: what is no difference, and what is one
 CONTRAST = 2e-3  # of correlations, from which on a lag is clear
 MOSTLY = 0.75  # share of the contrast that has to be of negative lags before columns are called swapped
+SENSELESS = ("wrap",)  # signals after which nothing sensible can follow: velocities, filters, replays
 NONE = Lag(0.0, 0.0, 0.0)
 
 
@@ -45,7 +47,10 @@ def suspicions(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> list[
     told = [*_time(found), *_order(found, lags), *_suspect_exchange(found)]
     for index, joint in enumerate(joints):
         told += _joint(joint, index, found)
-    return told
+    seen = {one.column for one in told}
+    signals = check_signals([one.trajectory for one in found], joints)
+    said = [one for one in signals if not (len(one.columns) == 1 and one.columns[0] in seen)]
+    return [*told, *(Suspicion(one.where, f"{one.problem}; {one.remedy}", one.kind in SENSELESS) for one in said)]
 
 
 def lags_of(episode: Episode) -> list[Lag]:
