@@ -48,6 +48,9 @@ add_stage(
 add_stage(app, "train-grounding", "Let a grounding of your own learn from trajectories.")
 add_stage(app, "wiring", "Audit how a policy that gsl did not make is wired to a world: names, shapes, order, ranges.")
 add_stage(app, "optimize", "Improve a policy in the simulator, grounded or not.")
+add_stage(
+    app, "audit", "Is it wiring? See in seconds whether a log and a simulator fit: names, signs, units, rows, rate."
+)
 add_stage(app, "diagnose", "Say where the simulator is wrong, which effect is missing, and how far the gap shrinks.")
 add_stage(app, "identify", "Fit every parameter of the effect library at once: system identification, no verdict.")
 add_stage(

@@ -11,6 +11,7 @@ blind = typer.Typer(rich_markup_mode=None)
 add_stage(blind, "blind make", "Draw robots with known causes, log what they do, and seal the labels.")
 add_stage(blind, "blind answer", "Diagnose every case without its label, and seal the answers.")
 add_stage(blind, "blind reveal", "Check the seals, set the answers against the labels, and count.")
+add_stage(blind, "blind wiring", "Audit robots with sealed wiring faults and robots with physics alone, and count.")
 
 
 @blind.callback(invoke_without_command=True)

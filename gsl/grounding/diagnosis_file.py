@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gsl.grounding.draws import UncertainCause
+from gsl.errors import ArtifactError
 from gsl.storage.diagnosis_report import DIGITS, report_of
 from gsl.storage.references import load
 
@@ -62,6 +63,8 @@ def read_diagnosis(reference: str, kind: str) -> Diagnosis:
     """
     artifact = load(reference, kind)
     report, sim = report_of(artifact.folder), artifact.config["sim"]
+    if report["verdict"] == "wiring":
+        raise ArtifactError(artifact.folder, f"{report['summary']} Mend the log and diagnose it again")
     gap = report["shrinkage"]
     return Diagnosis(
         verdict=report["verdict"],

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from gsl.core.unit import Unit
 from gsl.core.words import in_unit
 from gsl.models.free_run import TICKS
+from gsl.report.audit import audit_table
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.evaluation_cells import cells, columns
 from gsl.report.headline import unit_of
@@ -241,7 +242,13 @@ def _diagnose(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> list[Told
     return [Told(part[0], tuple(part[1]), [tuple(row) for row in part[2]], part[3]) for part in parts]
 
 
+def _audit(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+    document = json.loads((folder / "audit.json").read_text(encoding="utf-8"))
+    return Told(*audit_table(document))
+
+
 _TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told | list[Told]]] = {
+    "audit": _audit,
     "collect": _collect,
     "import": _import,
     "diagnose": _diagnose,

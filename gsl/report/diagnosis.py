@@ -37,7 +37,7 @@ _SECTIONS = (
     self_test,
     method,
 )
-_MARKS = {"no_gap": "✓", "causes": "!", "inseparable": "?", "unknown": "?"}
+_MARKS = {"no_gap": "✓", "causes": "!", "inseparable": "?", "unknown": "?", "wiring": "!"}
 
 
 def report_html(document: Document) -> str:

@@ -15,12 +15,16 @@ from gsl.report.diagnosis_verdict import (
     verdict,
     where_sentence,
 )
-from gsl.report.diagnosis_words import Document, entries, interval, name, part, value
+from gsl.report.diagnosis_words import Document, entries, interval, name, part, read_word, value
 from gsl.report.parts import Part, bullets, command, element, join, prose
 
 
 def cards(document: Document) -> list[tuple[str, Markup]]:
     """Return the questions of the first screen with their answers."""
+    if verdict(document) == "wiring":
+        sentences = [prose(read_word(one, "sentence")) for one in entries(document, "wiring")]
+        steps_to_take = element("ol", *(_step(step) for step in steps(document)))
+        return [("What is wrong?", join(bullets(sentences))), ("What next?", steps_to_take)]
     extent = "How large is it?" if verdict(document) == "no_gap" else "How far does it shrink?"
     return [
         ("Where is the gap?", element("p", prose(where_sentence(document)))),

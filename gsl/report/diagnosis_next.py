@@ -31,6 +31,8 @@ def steps(document: Document) -> list[Step]:
     given = entries(document, "commands")
     if given:
         return [Step(str(one.get("why") or ""), str(one.get("command") or "")) for one in given]
+    if verdict(document) == "wiring":
+        return [*_mending(document), Step("Then audit again, and diagnose.", f"gsl audit real={_source(document)}")]
     first = {"no_gap": _as_it_is, "causes": _advise_correction, "inseparable": _either, "unknown": _advise_learning}[
         verdict(document)
     ]
@@ -38,6 +40,15 @@ def steps(document: Document) -> list[Step]:
     if verdict(document) == "inseparable":
         return [*experiment, first(document)]
     return [first(document), *(experiment or (_surer(document) if verdict(document) == "causes" else []))]
+
+
+def _mending(document: Document) -> list[Step]:
+    remedies = dict.fromkeys(read_word(one, "remedy") for one in entries(document, "wiring"))
+    return [Step(remedy) for remedy in remedies if remedy]
+
+
+def _source(document: Document) -> str:
+    return shlex.quote(str(part(document, "data").get("source") or "LOG"))
 
 
 def _as_it_is(document: Document) -> Step:

@@ -16,6 +16,7 @@ from gsl.report.diagnosis_verdict import (
     nearest,
     places,
     shrinkage_sentence,
+    verdict,
 )
 from gsl.report.diagnosis_words import (
     Document,
@@ -26,6 +27,7 @@ from gsl.report.diagnosis_words import (
     name,
     part,
     probability,
+    read_word,
     share,
     value,
 )
@@ -50,6 +52,9 @@ def summary_lines(document: Document) -> list[Told]:
 
 def _causes(document: Document) -> Told:
     summary = "\n".join(filter(None, [str(document.get("summary") or ""), *policy_lines(document)])) or None
+    if verdict(document) == "wiring":
+        found = [(read_word(one, "kind"), read_word(one, "sentence")) for one in entries(document, "wiring")]
+        return Told(headline(document), ("kind", "what is wrong"), found)
     rows = [*_list_causes(document)]
     if not rows:
         alike = [("either", alternatives(group)) for group in entries(document, "inseparable")]

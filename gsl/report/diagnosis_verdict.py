@@ -22,7 +22,7 @@ from gsl.report.diagnosis_words import (
     share,
 )
 
-VERDICTS = ("no_gap", "causes", "inseparable", "unknown")
+VERDICTS = ("no_gap", "causes", "inseparable", "unknown", "wiring")
 
 
 def verdict(document: Document) -> str:
@@ -33,9 +33,13 @@ def verdict(document: Document) -> str:
 
 def headline(document: Document) -> str:
     """Return the verdict in a line."""
-    return {"no_gap": _no_gap, "causes": _causes, "inseparable": _inseparable, "unknown": _unknown}[verdict(document)](
-        document
-    )
+    sentences = {"no_gap": _no_gap, "causes": _causes, "inseparable": _inseparable, "wiring": _wiring}
+    return sentences.get(verdict(document), _unknown)(document)
+
+
+def _wiring(document: Document) -> str:
+    found = entries(document, "wiring")
+    return f"Wiring, before any physics: {list_words(list(dict.fromkeys(read_word(one, 'kind') for one in found)))}"
 
 
 def _no_gap(document: Document) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, ClassVar
@@ -29,6 +29,7 @@ from gsl.report.diagnosis import report_html
 from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.diagnosis_report import REPORT, SIMULATOR, WORLD, report_of
+from gsl.stages.audit import audit_log, write_wiring
 from gsl.storage.hashing import PAGE
 from gsl.validation.policy_gap import Effort, policy_gap
 from gsl.validation.real_returns import RealReturns, list_parents, real_returns
@@ -66,6 +67,7 @@ class Diagnose:
         Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
     ] = field(default_factory=dict)
     trust: Annotated[tuple[str, ...], setting("modules of your own whose classes the policies' files may name")] = ()
+    audit: Annotated[bool, setting("look at the wiring first, and name no physics where it explains the gap")] = True
     seed: Annotated[int, setting("of all randomness", ge=0)] = 1
 
     def __post_init__(self) -> None:
@@ -81,6 +83,9 @@ class Diagnose:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json, report.html, the diagnosed world and the next experiment."""
         begin = time.perf_counter()
+        wiring = audit_log(read_logs(self.real), self.sim, self.real) if self.audit else None
+        if wiring and wiring.spoils:
+            return write_wiring(wiring, folder, real=self.real, sim=self.sim.robot, command=self._command())
         measured = real_returns(self.policies, self.sim, trust=self.trust) if self.policies else None
         logs = {role: self._read(role) for role in ("real", "reference") if getattr(self, role)}
         if "reference" in logs and any(on_ground(log) for log in logs.values()):
@@ -93,7 +98,8 @@ class Diagnose:
         plant, step = self.sim.plant, self.sim.step
         findings = diagnose(logs["real"], plant, step, options, tick, reference=logs.get("reference"))
         gap = self._policy_gap(measured, findings, console) if measured else None
-        return self._write(findings, logs["real"], gap, folder, tick, begin)
+        remarks = wiring.doubts if wiring else ()
+        return self._write(findings, logs["real"], gap, folder, tick, begin, remarks)
 
     def document(self, folder: Path) -> dict[str, Any]:
         """Return what --json shows of an artifact: the report without its curves."""
@@ -132,6 +138,7 @@ class Diagnose:
         folder: Path,
         tick: PhaseReporter,
         begin: float,
+        remarks: Sequence[str],
     ) -> Mapping[str, Any]:
         report = document(
             findings,
@@ -148,7 +155,7 @@ class Diagnose:
         if self.limits:
             report["limits"] = [asdict(one) for one in limits(findings, report["shrinkage"], tick)]
         report["seconds"] = time.perf_counter() - begin
-        report["caveats"] += filter(None, [self._stranger(batch), clock_caveat(batch, self.clocks)])
+        report["caveats"] += filter(None, [*remarks, self._stranger(batch), clock_caveat(batch, self.clocks)])
         documents.write_json(folder / REPORT, report)
         (folder / PAGE).write_text(report_html(report), encoding="utf-8")
         (folder / WORLD).parent.mkdir()
@@ -190,6 +197,7 @@ class Diagnose:
         held = ", ".join(f"{key}: {_format_typed(value)}" for key, value in self.held_out.items())
         said += [f"held_out={{{held}}}"] if held else []
         said += [f"clocks={self.clocks}"] if self.clocks else []
+        said += [] if self.audit else ["audit=false"]
         return shlex.join(["gsl", "diagnose", *said])
 
     def _data(self, findings: Findings, batch: Batch) -> dict[str, Any]:

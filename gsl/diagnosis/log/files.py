@@ -124,17 +124,7 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
     Raises:
         InputError: with what is wrong and what to do.
     """
-    if set(batch.joints) != set(robot.controlled):
-        missing = [joint for joint in robot.controlled if joint not in batch.joints]
-        other = [joint for joint in batch.joints if joint not in robot.controlled]
-        what = f"lacks {missing[0]}" if missing else f"has {other[0]}, which the {robot.name} has not"
-        hold = ", or hold the joint in a robot file (docs/howto/own-robot.md)" if missing else ""
-        raise InputError(f"{name}: a log of another robot? It {what}; choose the simulator with sim={hold}")
-    needed = ("base.position.x", "base.orientation.w")
-    if on_ground(batch) and not all(column in episode.sensors for episode in batch.episodes for column in needed):
-        raise InputError(
-            f"{name}: a walk needs base.position and base.orientation columns; or log the robot in the air"
-        )
+    check_joints(batch, robot, name)
     _check_time(batch, name)
     longest = max(len(episode) for episode in batch.episodes) * batch.control_period
     least = LogSettings().warm_up + LogSettings().scored
@@ -146,6 +136,25 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
         )
     _check_units(batch, robot, name)
     _check_velocities(batch, name)
+
+
+def check_joints(batch: Batch, robot: Robot, name: str) -> None:
+    """Refuse a log of another robot, or of a walk that lacks its base.
+
+    Raises:
+        InputError: with what is wrong and what to do.
+    """
+    if set(batch.joints) != set(robot.controlled):
+        missing = [joint for joint in robot.controlled if joint not in batch.joints]
+        other = [joint for joint in batch.joints if joint not in robot.controlled]
+        what = f"lacks {missing[0]}" if missing else f"has {other[0]}, which the {robot.name} has not"
+        hold = ", or hold the joint in a robot file (docs/howto/own-robot.md)" if missing else ""
+        raise InputError(f"{name}: a log of another robot? It {what}; choose the simulator with sim={hold}")
+    needed = ("base.position.x", "base.orientation.w")
+    if on_ground(batch) and not all(column in episode.sensors for episode in batch.episodes for column in needed):
+        raise InputError(
+            f"{name}: a walk needs base.position and base.orientation columns; or log the robot in the air"
+        )
 
 
 def _check_time(batch: Batch, name: str) -> None:

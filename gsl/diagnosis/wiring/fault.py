@@ -130,7 +130,9 @@ def hold(ticks: int, phase: int, joints: Sequence[int]) -> Fault:
         result[:, columns] = x[taken][:, columns]
         return result
 
-    return Fault("hold", tuple(joints), "", {"ticks": ticks, "phase": phase}, lambda batch: change_log(batch, action=change))
+    return Fault(
+        "hold", tuple(joints), "", {"ticks": ticks, "phase": phase}, lambda batch: change_log(batch, action=change)
+    )
 
 
 def rate(factor: float, joints: Sequence[int]) -> Fault:

@@ -117,7 +117,9 @@ def by_range(batch: Batch, plant: Plant) -> Iterator[Spread]:
     for name, unit in UNITS.items():
         for zero in (0.0, 2048.0) if name == "ticks/4096" else (0.0,):
             small, large = unit * (least - zero), unit * (most - zero)
-            fits = (small > lower - 0.5) & (large < upper + 0.5) & (np.maximum(np.abs(least), np.abs(most)) * unit > 0.01)
+            fits = (
+                (small > lower - 0.5) & (large < upper + 0.5) & (np.maximum(np.abs(least), np.abs(most)) * unit > 0.01)
+            )
             if fits.any() and unit < 1.0:
                 offset = np.full(len(lower), -unit * zero)
                 yield Spread("scale", BOTH, np.where(fits, unit, np.nan), offset, {"unit": name, "zero": zero})

@@ -212,6 +212,8 @@ def _solve(slopes: np.ndarray, z: np.ndarray, x: np.ndarray, widths: np.ndarray,
         matrix, right = matrix + np.diag(prior), right - prior * x[:, k] / scale[:, 0]
         size = float(np.trace(matrix))
         if size > 0.0 and np.isfinite(size):
-            matrix += RIDGE * (np.diag(np.diag(matrix)) + size / len(matrix) * np.eye(len(matrix))) + 1e-9 * np.eye(len(matrix))
+            matrix += RIDGE * (np.diag(np.diag(matrix)) + size / len(matrix) * np.eye(len(matrix))) + 1e-9 * np.eye(
+                len(matrix)
+            )
             steps[:, k] = np.linalg.solve(matrix, right) * scale[:, 0]
     return steps

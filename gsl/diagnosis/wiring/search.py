@@ -14,12 +14,14 @@ from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.settings import FloorSettings, LogSettings, SearchSettings
 from gsl.diagnosis.wiring.fault import BOTH, Fault, gains, permute, rescale
 from gsl.diagnosis.wiring.options import Spread, by_range, by_relation, find_beyond, gain_grid, permutations, timings
-from gsl.diagnosis.wiring.physics import DELAY, KD, KP, Contest, Fit
+from gsl.diagnosis.wiring.physics import DELAY, KD, KP, Contest, Fit, documented
 from gsl.errors import GslError
 
 NOISE_COST = SearchSettings.noise_cost
 WINDOWS = LogSettings(  # short ones: a log whose rate is five times too high has no longer ones
-    warm_up=0.3, scored=0.4, floor=FloorSettings(rests=10**9, unsteady=np.inf)  # every joint has its own floor
+    warm_up=0.3,
+    scored=0.4,
+    floor=FloorSettings(rests=10**9, unsteady=np.inf),  # every joint has its own floor
 )
 EXPLAINED = 1.1  # factor on the cost of noise up to which nothing is left
 NEEDED = 1.5  # factor on that by which a log is off without physics beyond what one make differs by
@@ -132,9 +134,18 @@ class Search:
         for tier in (self._relations, self._others):  # what does not move as commanded spoils the rest
             leads = sorted(tier(bad, base), key=lambda lead: -lead[0])[:LEADS]
             tried = [(fault, self._contest(fault).fit()) for _, fault in leads]
-            if standing := [(fault, after) for fault, after in tried if _stands(fault, fit, after)]:
+            standing = [(fault, after) for fault, after in tried if _stands(fault, fit, after)]
+            if standing := [pair for pair in standing if not self._is_physics(*pair)]:
                 return _best(standing, fit)
         return None
+
+    def _is_physics(self, fault: Fault, after: Fit) -> bool:
+        """Whether gains are such as the documented range of their effect holds."""
+        if fault.kind != "gains":
+            return False
+        low, high = (bound[[KP, KD]] for bound in documented(self.plant))
+        own = np.log([fault.value["kp"], fault.value["kd"]]) + after.parameters[[KP, KD]][:, list(fault.joints)]
+        return bool(((own >= low) & (own <= high)).all(axis=0).mean() >= HALF)
 
     def _without_physics(self, fit: Fit) -> Stand | None:
         """Return the fault that explains everything with no physics at all, where physics explains nearly as much.
@@ -152,6 +163,8 @@ class Search:
             fault = self._refined(lead)
             after = self._contest(fault).fit(make=True)
             gain = float((fit.cost - after.cost).mean())
+            if self._is_physics(fault, after):
+                continue
             if after.cost.mean() < EXPLAINED * NOISE_COST and gain > max(BETTER * fit.cost.mean(), MUCH / count):
                 return Stand(fault, fit, after)
         return None
@@ -174,7 +187,9 @@ class Search:
         spreads += [([k for k in bad if k in beyond], one) for one in by_range(self.batch, self.plant) if beyond]
         yield from self._spreads(spreads, base)
 
-    def _spreads(self, spreads: Sequence[tuple[Sequence[int], Spread]], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
+    def _spreads(
+        self, spreads: Sequence[tuple[Sequence[int], Spread]], base: np.ndarray
+    ) -> Iterator[tuple[float, Fault]]:
         for joints, spread in spreads:
             fault = spread.fault(joints)
             if fault and (promising := self._promising(fault, joints, base)):
@@ -215,6 +230,13 @@ class Search:
         costs = np.array([cost for _, cost in grid])
         best = costs.argmin(axis=0)
         better = [k for k in bad if costs[best[k], k] < PROMISING * base[k]]
+        together = [(float((base - cost)[bad].sum()), fault) for fault, cost in grid]
+        drop, common = max(together, key=lambda pair: pair[0])
+        if drop > 0.0:
+            everyone = range(len(base))
+            place_of = int(list(bad)[0])
+            kp, kd = (float(common.value[name][list(bad).index(place_of)]) for name in ("kp", "kd"))
+            yield drop, gains([kp] * len(base), [kd] * len(base), everyone)
         if better:
             place = {k: list(bad).index(k) for k in better}
             kp, kd = ([grid[best[k]][0].value[name][place[k]] for k in better] for name in ("kp", "kd"))

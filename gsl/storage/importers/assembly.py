@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ from gsl.storage.importers.labels import fill
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.reading import Raw, Series
 from gsl.storage.importers.signal import COMMANDS, FLAGS
+from gsl.storage.signals.check import join_turns
+from gsl.storage.signals.glitches import find_glitches, mend
 
 ARRAYS = (*COMMANDS, "position", "velocity")
 
@@ -63,7 +65,7 @@ def episodes(raw: Raw, mapping: LogMapping) -> list[Episode]:
     found = []
     for number, cut in enumerate(cuts):
         part = {"part": number + 1} if len(cuts) > 1 else {}
-        trajectory = _trajectory(raw, own[cut], mapping)
+        trajectory = _mend(_trajectory(raw, own[cut], mapping), mapping)
         dropped = raw.dropped + (late if number == 0 else 0)
         derived = "velocity" not in raw.signals
         found.append(Episode(trajectory, {**label, **part}, raw.joints, np.diff(own[cut]), dropped, derived))
@@ -91,6 +93,16 @@ def _trajectory(raw: Raw, stamps: np.ndarray, mapping: LogMapping) -> Trajectory
     velocity = values["velocity"] if "velocity" in values else np.gradient(values["position"], time, axis=0)
     grounded = values["grounded_action"][:-1] if "grounded_action" in values else None
     return Trajectory(time, values["action"][:-1], values["position"], velocity, grounded, sensors=columns)
+
+
+def _mend(one: Trajectory, mapping: LogMapping) -> Trajectory:
+    """Return a trajectory without wraps and glitches, if the mapping says so."""
+    if mapping.unwrap:
+        (one,) = join_turns([one])
+    if mapping.glitches == "mend" and len(find_glitches([one], [str(k) for k in range(one.position.shape[1])])):
+        position = mend(one.position)
+        one = replace(one, position=position, velocity=np.gradient(position, one.time, axis=0))
+    return one
 
 
 def _at(name: str, series: Series, at: np.ndarray) -> np.ndarray:

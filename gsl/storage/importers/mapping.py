@@ -87,6 +87,10 @@ class Mapping:
     longest_gap: Annotated[float, setting("periods without a row, above which an episode is cut in two", gt=1)] = 10.0
     duplicates: Annotated[Literal["refuse", "drop"], setting("what to do with a stamp that comes twice")] = "refuse"
     blanks: Annotated[Literal["refuse", "skip"], setting("whether an empty cell is a mistake, or no news")] = "refuse"
+    unwrap: Annotated[bool, setting("join angles that jump by a turn, or by the range of their encoder")] = False
+    glitches: Annotated[
+        Literal["keep", "mend"], setting("what to do with positions that jump for one sample: mend interpolates")
+    ] = "keep"
     angles: Annotated[
         Literal["deg", "rad", "percent"] | None,
         setting("LeRobot: what angles are in, percent being -100 to 100 of a joint's range; seen in the data if null"),

@@ -10,6 +10,7 @@ import numpy as np
 from gsl.core.series import Lag, lag, likeness
 from gsl.core.trajectory import Trajectory
 from gsl.storage.importers.assembly import Episode
+from gsl.storage.signals.check import check_signals
 
 MOVES = 0.02  # range of a command below which it tells nothing of what follows it [rad]
 ALIKE = 0.8  # correlation above which a signal is taken to follow a command
@@ -26,6 +27,7 @@ MOSTLY = 0.75  # share of the contrast that has to be of negative lags before co
 FOLLOWS, UNLIKE = 0.9, 0.5  # correlations above and below which a position follows a command, or does not
 AS_FAR = 0.33  # of the command that it follows: a joint that is dragged along moves less
 AGAINST = 3  # times as many episodes that say so as say the contrary
+SENSELESS = ("wrap",)  # signals after which nothing sensible can follow: velocities, filters, replays
 NONE = Lag(0.0, 0.0, 0.0)
 
 
@@ -51,7 +53,10 @@ def suspicions(
     told = [*_time(found), *_order(found, lags), *_suspect_exchange(found)]
     for index, joint in enumerate(joints):
         told += _joint(joint, index, found, endless=joint in turning)
-    return told
+    seen = {one.column for one in told}
+    signals = check_signals([one.trajectory for one in found], joints)
+    said = [one for one in signals if not (len(one.columns) == 1 and one.columns[0] in seen)]
+    return [*told, *(Suspicion(one.where, f"{one.problem}; {one.remedy}", one.kind in SENSELESS) for one in said)]
 
 
 def lags_of(episode: Episode) -> list[Lag]:
@@ -131,7 +136,9 @@ def find_exchanges(found: Sequence[Trajectory]) -> dict[int, int]:
         unlike = [one for one, alike in zip(found, own, strict=True) if alike < UNLIKE]
         votes = np.zeros(found[0].action.shape[1], dtype=int)
         for other in set(range(len(votes))) - {joint}:
-            votes[other] = sum(_likeness(one, other, joint) > FOLLOWS for one in unlike)
+            votes[other] = sum(
+                _likeness(one, other, joint) > FOLLOWS and _likeness(one, other, other) < FOLLOWS for one in unlike
+            )  # where the other joint follows its own command as well, two commands are nearly equal, or one is a copy
         best = int(np.argmax(votes))
         like = [one for one, alike in zip(found, own, strict=True) if alike > FOLLOWS] if votes[best] else []
         contrary = sum(_likeness(one, best, joint) < UNLIKE for one in like)

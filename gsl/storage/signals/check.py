@@ -38,10 +38,14 @@ def join_turns(episodes: Sequence[Trajectory]) -> list[Trajectory]:
     for one in episodes:
         position, action, velocity = one.position.copy(), one.action.copy(), one.velocity.copy()
         for (signal, k), turn in turns.items():
-            values = position if signal == "position" else action
-            values[:, k] = join(values[:, k], turn)
+            if signal == "action":
+                action[:, k] = join(action[:, k], turn)
+        for (signal, k), turn in turns.items():
             if signal == "position":
+                position[:, k] = join(position[:, k], turn)
                 velocity[:, k] = np.gradient(position[:, k], one.time)
+                apart = action[:, k] - position[: len(one), k]
+                action[:, k] -= turn * np.round(apart / turn)  # a command means the nearest of all turns
         made.append(replace(one, position=position, action=action, velocity=velocity))
     return made
 

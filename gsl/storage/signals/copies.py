@@ -23,7 +23,9 @@ def find_copies(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[F
         rows = [row for row in ROWS if _same(_pairs(episodes, k, row))]
         if rows:
             row = min(rows, key=abs)
-            of = {0: "this row", 1: "the next row", -1: "the row before"}.get(row, f"{abs(row)} rows {'on' if row > 0 else 'before'}")
+            of = {0: "this row", 1: "the next row", -1: "the row before"}.get(
+                row, f"{abs(row)} rows {'on' if row > 0 else 'before'}"
+            )
             problem = f"is a copy of the measured position of {of}: no servo follows so well, and nothing was commanded"
             remedy = "log what was sent to the servos"
             found.append(Finding("copy", (f"action.{joint}",), (joint,), problem, remedy))

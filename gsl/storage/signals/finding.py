@@ -36,7 +36,9 @@ class Finding(NamedTuple):
     @property
     def where(self) -> str:
         """Columns and the first place, in words."""
-        shown = ", ".join(self.columns[:LISTED]) + (f" and {more} more" if (more := len(self.columns) - LISTED) > 0 else "")
+        shown = ", ".join(self.columns[:LISTED]) + (
+            f" and {more} more" if (more := len(self.columns) - LISTED) > 0 else ""
+        )
         return shown if self.row is None else f"{shown}, episode {self.episode}, row {self.row}"
 
     @property
@@ -80,7 +82,9 @@ def together(findings: Sequence[Finding], joints: Sequence[str]) -> list[Finding
     for group in alike.values():
         if len(group) == len(joints) > 1:
             columns = tuple(column for one in group for column in one.columns)
-            joined.append(group[0]._replace(columns=columns, joints=tuple(joints), times=sum(one.times for one in group)))
+            joined.append(
+                group[0]._replace(columns=columns, joints=tuple(joints), times=sum(one.times for one in group))
+            )
         else:
             joined += group
     return joined

@@ -12,7 +12,7 @@ from gsl.storage.signals.finding import Finding, Place, count, per_joint
 FAR = 0.02  # least size [rad]: below, noise of coarse encoders comes to as much
 BEYOND = 15.0  # times the usual distance from what the neighbours say, and
 AROUND = 6.0  # times the largest one nearby
-BESIDE = 3.0  # times the way from one neighbour to the other
+BESIDE = 3.0  # times the longest step of its neighbours
 NEAR = 10  # rows on either side that are nearby
 RARE = 0.02  # share of the rows above which it is how the channel is, and no glitch
 
@@ -41,7 +41,8 @@ def find_rows(values: np.ndarray) -> list[int]:
         return []
     a, b, c, d, e = (values[k : len(values) - 4 + k] for k in range(5))
     off = np.abs(c - (-a + 4.0 * b + 4.0 * d - e) / 6.0)  # a cubic through two neighbours on either side
-    beside = np.abs(d - b)
+    beside = np.maximum(np.abs(d - b), np.maximum(np.abs(b - a), np.abs(e - d)))
+    off = np.minimum(off, np.minimum(np.abs(c - b), np.abs(c - d)))  # a top that is reached and left in steps is none
     usual = 1.5 * float(np.median(off))
     rows = np.flatnonzero((off > np.maximum(FAR, BEYOND * usual)) & (off > BESIDE * beside))
     chosen = [int(row) for row in rows if _stands_out(off, int(row))]

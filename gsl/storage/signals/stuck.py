@@ -51,10 +51,10 @@ def _frozen_from(episode: Trajectory, k: int, works: np.ndarray) -> int | None:
         low, high = position.min() + END * np.ptp(position), position.max() - END * np.ptp(position)
     else:
         low, high = -np.inf, np.inf
-    for first, last in zip(changes[:-1], changes[1:], strict=True):
-        rows = slice(first, last)
-        long = last - first >= LONG and episode.time[last - 1] - episode.time[first] >= SECONDS
-        if not long or not works[rows].all() or not low <= position[first] <= high:
+    for place in np.flatnonzero(np.diff(changes) >= LONG):
+        first, last = changes[place], changes[place + 1]
+        rows, lasts = slice(first, last), episode.time[last - 1] - episode.time[first]
+        if lasts < SECONDS or not works[rows].all() or not low <= position[first] <= high:
             continue
         if np.ptp(command[first : max(first + 1, last - late)]) > max(LEAST_ASKED, ASKED * np.ptp(command)):
             return int(first)

@@ -39,7 +39,9 @@ def join(values: np.ndarray, turn: float) -> np.ndarray:
 
 def wrapped(episodes: Sequence[Trajectory]) -> dict[tuple[str, int], float]:
     """Return by how much channels wrap [rad], by signal and joint."""
-    return {(signal, place.joint): turn for signal in ("position", "action") for place, turn in _wraps(episodes, signal)}
+    return {
+        (signal, place.joint): turn for signal in ("position", "action") for place, turn in _wraps(episodes, signal)
+    }
 
 
 def _wraps(episodes: Sequence[Trajectory], signal: str) -> Iterator[tuple[Place, float]]:

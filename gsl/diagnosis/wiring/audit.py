@@ -1,0 +1,217 @@
+"""The audit of a log: its signals, then its wiring against a simulator; physics is never named."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gsl.core.body import lump
+from gsl.core.plant import Plant
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.diagnosis.log.files import on_ground
+from gsl.diagnosis.log.log import spread
+from gsl.diagnosis.wiring.fault import Fault
+from gsl.diagnosis.wiring.options import by_relation, permutations
+from gsl.diagnosis.wiring.physics import Fit
+from gsl.diagnosis.wiring.search import Search, Wiring, cut_motions
+from gsl.diagnosis.wiring.words import describe, remedy
+from gsl.errors import GslError
+from gsl.storage.signals.check import check_signals, mend_signals
+from gsl.storage.signals.finding import Finding
+
+CLEAN, WIRING, UNCLEAR = "clean", "wiring", "unclear"
+SPOILED = ("copy", "frozen", "stale")  # signals of a joint that no replay can be compared with
+ENOUGH, FEWEST = 90.0, 4  # of a log that is replayed [s], and its episodes
+BESIDE = ("velocity",)  # signals that no replay reads
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What an audit found.
+
+    Attributes:
+        joints: Names of the log's joints.
+        period: Control period of the log [s].
+        signals: What is wrong with the signals, seen without a simulator.
+        wiring: What a search against the simulator found, None if there was none to make.
+        seen: Faults that are seen without a replay, where the robot is on the ground.
+        remarks: What else is to be said.
+        seconds: That it took.
+    """
+
+    joints: tuple[str, ...]
+    period: float
+    signals: tuple[Finding, ...]
+    wiring: Wiring | None
+    seen: tuple[Fault, ...]
+    remarks: tuple[str, ...]
+    seconds: float
+
+    @property
+    def verdict(self) -> str:
+        """`wiring` if something is wrong, `unclear` if physics would look the same, else `clean`."""
+        stands = self.wiring.stands if self.wiring else ()
+        if self.signals or stands or self.seen:
+            return WIRING
+        return UNCLEAR if self.wiring and self.wiring.late else CLEAN
+
+    @property
+    def spoils(self) -> bool:
+        """Whether a diagnosis would take for physics what is none."""
+        replayed = [one for one in self.signals if one.kind not in BESIDE]
+        return bool(replayed or self.seen or (self.wiring and self.wiring.stands))
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What a diagnosis of the log has to say beside its own: what spoils no replay, and what looks like physics."""
+        return (*(f"Wiring: {one.sentence}." for one in self.signals), *self.remarks)
+
+    @property
+    def summary(self) -> str:
+        """The result in a sentence."""
+        if self.verdict == WIRING:
+            first = self.document()["findings"][0]["sentence"]
+            more = len(self.document()["findings"]) - 1
+            return f"Wiring, before any physics: {first}{f' And {more} more.' * bool(more)}"
+        if self.verdict == UNCLEAR:
+            return self.remarks[0]
+        return "Names, signs, units, zeros, rows and rate of the log fit the simulator."
+
+    def document(self) -> dict[str, Any]:
+        """Return the audit as a document."""
+        return {
+            "verdict": self.verdict,
+            "findings": [
+                *map(_signal, self.signals),
+                *(_fault(self, one, None, None, ()) for one in self.seen),
+                *self._stands(),
+            ],
+            "remarks": list(self.remarks),
+            "before": _floors(self.wiring.before) if self.wiring else None,
+            "after": _floors(self.wiring.after) if self.wiring else None,
+            "seconds": self.seconds,
+        }
+
+    def _stands(self) -> list[dict[str, Any]]:
+        stands = self.wiring.stands if self.wiring else ()
+        return [_fault(self, one.fault, one.before, one.after, one.rivals) for one in stands]
+
+
+def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> Audit:
+    """Audit a log.
+
+    Args:
+        batch: Of the plant's robot.
+        plant: The simulator.
+        step: Its physics period [s].
+        tick: Called after every replay.
+    """
+    begin, robot = time.perf_counter(), lump(plant.robot)
+    batch = _in_order(batch, robot.controlled)
+    signals = check_signals(batch.episodes, batch.joints)
+    mended = replace(batch, episodes=tuple(mend_signals(batch.episodes)))
+    spoiled = {joint for one in signals if one.kind in SPOILED for joint in one.joints}
+    excluded = frozenset(k for k, joint in enumerate(batch.joints) if joint in spoiled)
+    wiring, seen, remarks = None, list[Fault](), list[str]()
+    if on_ground(batch):
+        seen = _seen(mended, replace(plant, robot=robot))
+        remarks.append("On the ground nothing is replayed: what only a replay shows was not looked for.")
+    elif len(excluded) == len(batch.joints):
+        remarks.append("No joint is left to compare with the simulator.")
+    else:
+        try:
+            plant = replace(plant, robot=robot)
+            floor = cut_motions(mended, plant).noise.sd
+            wiring = Search(take_part(mended), plant, step, floor, excluded, tick).run()
+        except GslError as error:
+            remarks.append(f"Nothing was replayed: {error}.")
+    if wiring and wiring.late:
+        rows = f"{wiring.late} row{'s' * (wiring.late > 1)}"
+        remarks.insert(0, f"Commands act exactly {rows} later: columns that are {rows} apart look like this, and so does a "
+                       f"latency of {1e3 * wiring.late * batch.control_period:.4g} ms.")  # fmt: skip
+    return Audit(
+        batch.joints, batch.control_period, tuple(signals), wiring, tuple(seen), tuple(remarks),
+        time.perf_counter() - begin,
+    )  # fmt: skip
+
+
+def take_part(batch: Batch) -> Batch:
+    """Return so many of a log's episodes, spread over it, that a replay of all takes no time: faults are in every one."""
+    most, rows = round(ENOUGH / batch.control_period), [len(one) for one in batch.episodes]
+    count = max(FEWEST, int(len(rows) * most / max(sum(rows), 1)))
+    chosen = [batch.episodes[k] for k in spread(np.arange(len(rows)), count)]
+    return replace(batch, episodes=tuple(_begin(one, most // 2) for one in chosen), metadata={})
+
+
+def _begin(one: Trajectory, rows: int) -> Trajectory:
+    """Return the first rows of an episode."""
+    if len(one) <= rows:
+        return one
+    states = slice(rows + 1)
+    sensors = {key: values[states] for key, values in one.sensors.items()}
+    return Trajectory(one.time[states], one.action[:rows], one.position[states], one.velocity[states], sensors=sensors)
+
+
+def _in_order(batch: Batch, joints: Sequence[str]) -> Batch:
+    return batch if batch.joints == tuple(joints) else batch.only(joints)
+
+
+def _seen(batch: Batch, plant: Plant) -> list[Fault]:
+    """Return exchanged joints, signs and units that are seen in how positions follow commands."""
+    for fault in permutations(batch):
+        return [fault]
+    found = {}
+    for spread in by_relation(batch, plant):
+        named = spread.kind == "sign" or "unit" in spread.value
+        if named and spread.kind not in found and (fault := spread.fault(range(len(batch.joints)))):
+            found[spread.kind] = fault
+    return list(found.values())
+
+
+def _floors(fit: Fit) -> float:
+    return float(np.sqrt((fit.rms**2).mean()))
+
+
+def _signal(one: Finding) -> dict[str, Any]:
+    return {
+        "kind": one.kind,
+        "joints": list(one.joints),
+        "columns": list(one.columns),
+        "side": "",
+        "value": {},
+        "episode": one.episode,
+        "row": one.row,
+        "times": one.times,
+        "sentence": f"{one.where}: {one.problem}.",
+        "remedy": f"{one.remedy[0].upper()}{one.remedy[1:]}.",
+        "before": None,
+        "after": None,
+        "or": [],
+    }
+
+
+def _fault(
+    about: Audit, fault: Fault, before: Fit | None, after: Fit | None, rivals: Sequence[Fault]
+) -> dict[str, Any]:
+    own = list(fault.joints)
+    names = [about.joints[k] for k in own]
+    columns = [f"{side}.{name}" for side in ("action", "position") if fault.side in (side, "both") for name in names]
+    return {
+        "kind": fault.kind,
+        "joints": names,
+        "columns": columns,
+        "side": fault.side,
+        "value": {key: value for key, value in fault.value.items()},
+        "episode": None,
+        "row": None,
+        "times": 1,
+        "sentence": describe(fault, about.joints, about.period),
+        "remedy": remedy(fault),
+        "before": None if before is None else float(np.sqrt((before.rms[own] ** 2).mean())),
+        "after": None if after is None else float(np.sqrt((after.rms[own] ** 2).mean())),
+        "or": [describe(one, about.joints, about.period) for one in rivals],
+    }
