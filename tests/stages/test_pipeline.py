@@ -156,6 +156,20 @@ def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[
     assert "../iteration_01/evaluate" in said and "gsl iterate" in said
 
 
+def test_open_names_the_page_where_there_is_no_display_and_says_what_has_none(
+    whole: tuple[Path, Said], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert done("open", "whole", folder=whole[0]).out == "runs/whole/iterate/report.html\n"
+    assert (
+        done("open", "whole/iteration_01/evaluate", folder=whole[0]).out
+        == "runs/whole/iteration_01/evaluate/report.html\n"
+    )
+    said = gsl("open", "whole/iteration_01/optimize", folder=whole[0])
+    assert said.code == 2 and "has no page: optimize writes none" in said.err
+
+
 def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr(whole: tuple[Path, Said]) -> None:
     folder, said = whole
     table = said.out[said.out.index("grounded simulation learning [cm/s]") :]
@@ -171,8 +185,8 @@ def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr
         in table
     )
     assert metrics["verdict"] in table
-    assert "plots: runs/whole/iterate/ (joint_trace.png, learning_curve.png, walk.png)\n" in table
-    assert "page: runs/whole/iterate/report.html\n" in table
+    plots = "plots: runs/whole/iterate/ (joint_trace.png, learning_curve.png, walk.png)"
+    assert f"{plots}\npage: runs/whole/iterate/report.html\n" in table
     assert table.splitlines()[-1] == "runs/whole/iterate"
     grown = [line for line in said.lines if line.startswith("  ")]
     assert grown[0].split()[:2] == ["iteration", "policy"]
