@@ -23,7 +23,8 @@ demo: $(INSTALLED) ## Improve a walk for a "real" robot that the optimiser never
 	@echo "what there is to look at:"
 	@find runs/demo -type f \( -name '*.png' -o -name '*.md' -o -name '*.parquet' -o -name 'policies.json' -o -name 'report.html' \) | sort
 
-# Two workers have two cores: threads of matrix products would only be in their way.
+# Two workers have two cores: threads of matrix products would only be in their way. Each begins with one half of the
+# files and steals at the end, so that what a file makes for all of its tests is made once.
 test: $(INSTALLED) ## Check the style, run the tests.
 	$(VENV)/bin/ruff check
 	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n 2 --dist worksteal

@@ -67,6 +67,7 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     left_out += ["~worlds.nao_harsh", "~worlds.nao_drawn_b"] if what == "worlds" else []
     left_out += ["rank=false"] if what in ("worlds", "motion") else []  # table 2 ranks
     left_out += ["iterate.iterations=1"] if what == "table3" else []
+    left_out += ["recipe.forward=linear"] if what in ("table3", "table4", "worlds") else []  # no choice of a family
     left_out += ["iterate.aggregate=true"] if what == "table4" else []
     said = done("reproduce", what, *FEW, *SHORT, *left_out, folder=tmp_path)
     assert " for all of its results; a study that was stopped goes on where it was" in said.err

@@ -21,7 +21,8 @@ from gsl.worlds.external import ExternalRobot
 
 pytestmark = pytest.mark.slow
 
-STEADY = (*SMALL, "accept=true", "recipe.spread=0.02", "optimizer.generations=1")  # no neighbour falls
+FEW = ("recipe.forward=linear", "optimizer.generations=1")
+STEADY = (*SMALL, *FEW, "accept=true", "recipe.spread=0.02")  # no neighbour falls
 LOOP = ("iterate", *STEADY, "grounding=gat", "real=robot")
 FIRST = "runs/loop/iteration_01"
 

@@ -12,6 +12,7 @@ from page_reader import Page, check_alone, words
 pytestmark = pytest.mark.slow
 
 NAMED = (*SMALL, "name=chain")
+WHOLE = ("iterate", *SMALL, "recipe.forward=linear", "grounding=gat", "name=whole", "accept=true", "beside=true")
 STAGES = ("collect_real", "collect_sim", "train_forward", "train_inverse", "optimize", "evaluate")
 
 
@@ -116,8 +117,7 @@ def test_a_grounding_that_fails_its_check_is_refused_with_the_reason(chain: Path
 def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Said]:
     """One iteration as a process."""
     folder = tmp_path_factory.mktemp("whole")
-    line = ("iterate", *SMALL, "grounding=gat", "name=whole", "accept=true", "beside=true")
-    with started(*line, folder=folder) as process:
+    with started(*WHOLE, folder=folder) as process:
         out, err = process.communicate(timeout=200)
     assert process.returncode == 0, err
     return folder, Said(0, out, err)
@@ -197,7 +197,7 @@ def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr
 
 def test_an_unchanged_iteration_shows_its_table_again(whole: tuple[Path, Said]) -> None:
     folder, said = whole
-    again = done("iterate", *SMALL, "grounding=gat", "name=whole", "accept=true", "beside=true", folder=folder)
+    again = done(*WHOLE, folder=folder)
     start = said.out.index("grounded simulation learning [cm/s]")
     assert again.out == said.out[start:].replace("runs/whole/iterate\n", "runs/whole/iterate (unchanged)\n")
 
