@@ -11,11 +11,12 @@ The same code moves one robot and robots side by side (`lanes`).
 
 from __future__ import annotations
 
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.body import lump
+from gsl.core.body import Robot, lump
 from gsl.core.compiled import compile_kernel
 from gsl.core.plant import Plant
 from gsl.core.sine import sine_cosine
@@ -65,6 +66,9 @@ class Pushed(NamedTuple):
     force: np.ndarray
 
 
+_latest: deque[tuple[Robot, Chain]] = deque(maxlen=8)  # by the robot itself, which is frozen; welding takes long
+
+
 def chain(plant: Plant, armature: np.ndarray) -> Chain:
     """Return the tree of a plant.
 
@@ -72,21 +76,32 @@ def chain(plant: Plant, armature: np.ndarray) -> Chain:
         plant: Its robot may have fixed joints.
         armature: Rotor inertia that moves with the output [kg·m²], shape (n_motors,).
     """
-    robot = lump(plant.robot)
-    joints = [robot.joint(name) for name in robot.motors]
-    links = [robot.links[joint.child] for joint in joints]
-    above = {joint.child: robot.motors.index(joint.name) for joint in joints}
-    return Chain(
+    links = _links(plant.robot)
+    return links._replace(armature=np.asarray(armature, dtype=float), gravity=plant.gravity)
+
+
+def _links(robot: Robot) -> Chain:
+    """Return the tree of a robot without rotors and gravity; a replay with other servos has the same one."""
+    for other, tree in tuple(_latest):
+        if other is robot:
+            return tree
+    welded = lump(robot)
+    joints = [welded.joint(name) for name in welded.motors]
+    links = [welded.links[joint.child] for joint in joints]
+    above = {joint.child: welded.motors.index(joint.name) for joint in joints}
+    tree = Chain(
         parent=np.array([above.get(joint.parent, -1) for joint in joints]),
-        order=np.array([robot.motors.index(joint.name) for joint in robot.joints]),
+        order=np.array([welded.motors.index(joint.name) for joint in welded.joints]),
         axis=np.array([joint.axis for joint in joints], dtype=float),
         origin=np.array([joint.origin for joint in joints], dtype=float),
         mass=np.array([link.mass for link in links]),
         com=np.array([link.com for link in links], dtype=float),
         inertia=np.array([link.inertia for link in links], dtype=float),
-        armature=np.asarray(armature, dtype=float),
-        gravity=plant.gravity,
+        armature=np.zeros(len(joints)),
+        gravity=np.zeros(3),
     )
+    _latest.append((robot, tree))
+    return tree
 
 
 @compile_kernel
