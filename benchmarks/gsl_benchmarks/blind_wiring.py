@@ -176,8 +176,6 @@ def _table(cases: Sequence[Mapping[str, Any]]) -> str:
         lines.append(f"| {kind} | {len(own)} | {sum(one['verdict'] == 'wiring' for one in own)} |")
     sums = _figures(cases)
     bounds = wilson(sums["right_kind_and_joints"], sums["faults"])
-    lines += [
-        "",
-        f"Kind and joints right: {bounds.lower:.2f} to {bounds.upper:.2f} (Wilson, 95 %). Median CPU of an audit: {sums['cpu']:.1f} s.",
-    ]
+    share = f"{sums['right_kind_and_joints'] / sums['faults']:.2f} ({bounds.lower:.2f} to {bounds.upper:.2f})"
+    lines += ["", f"Kind and joints right: {share}, Wilson, 95 %. Median CPU of an audit: {sums['cpu']:.1f} s."]
     return "\n".join([_headline(cases), "", *lines, ""])

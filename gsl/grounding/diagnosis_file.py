@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gsl.grounding.draws import UncertainCause
 from gsl.errors import ArtifactError
+from gsl.grounding.draws import UncertainCause
 from gsl.storage.diagnosis_report import DIGITS, report_of
 from gsl.storage.references import load
 

@@ -27,9 +27,9 @@ from gsl.diagnosis.verdict.limits import limits
 from gsl.errors import InputError
 from gsl.report.diagnosis import report_html
 from gsl.rollout.parallel import Workers, threads
+from gsl.stages.audit import audit_log, write_wiring
 from gsl.storage import documents
 from gsl.storage.diagnosis_report import REPORT, SIMULATOR, WORLD, report_of
-from gsl.stages.audit import audit_log, write_wiring
 from gsl.storage.hashing import PAGE
 from gsl.validation.policy_gap import Effort, policy_gap
 from gsl.validation.real_returns import RealReturns, list_parents, real_returns

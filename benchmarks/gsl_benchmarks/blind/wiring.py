@@ -9,7 +9,7 @@ import numpy as np
 
 from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant
-from gsl.core.trajectory import Batch, Trajectory
+from gsl.core.trajectory import Batch
 from gsl.diagnosis.log.records import slope
 
 Arrays = Callable[[np.ndarray], np.ndarray]

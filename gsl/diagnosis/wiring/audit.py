@@ -131,8 +131,9 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
             remarks.append(f"Nothing was replayed: {error}.")
     if wiring and wiring.late:
         rows = f"{wiring.late} row{'s' * (wiring.late > 1)}"
-        remarks.insert(0, f"Commands act exactly {rows} later: columns that are {rows} apart look like this, and so does a "
-                       f"latency of {1e3 * wiring.late * batch.control_period:.4g} ms.")  # fmt: skip
+        delay = f"{1e3 * wiring.late * batch.control_period:.4g} ms"
+        alike = f"columns that are {rows} apart look like this, and so does a latency of {delay}"
+        remarks.insert(0, f"Commands act exactly {rows} later: {alike}.")
     return Audit(
         batch.joints, batch.control_period, tuple(signals), wiring, tuple(seen), tuple(remarks),
         time.perf_counter() - begin,
@@ -140,7 +141,7 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
 
 
 def take_part(batch: Batch) -> Batch:
-    """Return so many of a log's episodes, spread over it, that a replay of all takes no time: faults are in every one."""
+    """Return episodes spread over a log, so few that a replay takes no time: wiring is the same in all of them."""
     most, rows = round(ENOUGH / batch.control_period), [len(one) for one in batch.episodes]
     count = max(FEWEST, int(len(rows) * most / max(sum(rows), 1)))
     chosen = [batch.episodes[k] for k in spread(np.arange(len(rows)), count)]
@@ -165,10 +166,10 @@ def _seen(batch: Batch, plant: Plant) -> list[Fault]:
     for fault in permutations(batch):
         return [fault]
     found = {}
-    for spread in by_relation(batch, plant):
-        named = spread.kind == "sign" or "unit" in spread.value
-        if named and spread.kind not in found and (fault := spread.fault(range(len(batch.joints)))):
-            found[spread.kind] = fault
+    for option in by_relation(batch, plant):
+        named = option.kind == "sign" or "unit" in option.value
+        if named and option.kind not in found and (seen := option.fault(range(len(batch.joints)))):
+            found[option.kind] = seen
     return list(found.values())
 
 

@@ -67,7 +67,8 @@ def rescale(
         kind: `sign`, `scale` or `offset`.
         joints: Indices.
         side: What is changed.
-        gain, offset: Of all joints, those of others play no part, shape (n_joints,).
+        gain: Of all joints, those of others play no part, shape (n_joints,).
+        offset: The same.
         value: What is said of it.
     """
     own = np.isin(np.arange(len(gain)), list(joints))

@@ -121,14 +121,14 @@ def by_range(batch: Batch, plant: Plant) -> Iterator[Spread]:
                 (small > lower - 0.5) & (large < upper + 0.5) & (np.maximum(np.abs(least), np.abs(most)) * unit > 0.01)
             )
             if fits.any() and unit < 1.0:
-                offset = np.full(len(lower), -unit * zero)
-                yield Spread("scale", BOTH, np.where(fits, unit, np.nan), offset, {"unit": name, "zero": zero})
+                shifted = np.full(len(lower), -unit * zero)
+                yield Spread("scale", BOTH, np.where(fits, unit, np.nan), shifted, {"unit": name, "zero": zero})
     for name, (low, high) in RANGES.items():
-        unit, offset = _spread_out(lower, upper, low, high)
+        size, offset = _spread_out(lower, upper, low, high)
         width = high - low
         fits = (least >= low - (OVER - 1.0) * width) & (most <= high + (OVER - 1.0) * width)
         if fits.any():
-            yield Spread("scale", BOTH, np.where(fits, unit, np.nan), offset, {"range": name})
+            yield Spread("scale", BOTH, np.where(fits, size, np.nan), offset, {"range": name})
     pose = np.array([plant.robot.stance.get(name, 0.0) for name in plant.robot.controlled])
     if np.abs(pose).max() > documented(plant)[1][ZERO, 0]:
         moved = np.abs(pose) > 0.0

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -120,7 +121,8 @@ class Contest:
         self.tick()
         period, joints = self.log.period, pieces.real.shape[2]
         held = Held.of(plant, fitting_step(self.step, period), period)
-        replay = held.replay(pieces.windows)[..., :joints]  # type: ignore[arg-type]  in the air
+        windows: Any = pieces.windows  # in the air
+        replay = held.replay(windows)[..., :joints]
         z = (replay - pieces.real)[:, pieces.warm_up :] / self.floor
         return np.clip(np.nan_to_num(z, nan=WORST), -WORST, WORST)
 
@@ -189,7 +191,7 @@ class Contest:
         return probe
 
     def _slopes(self, x: np.ndarray, z: np.ndarray, probe: np.ndarray, high: np.ndarray, pieces: Pieces) -> np.ndarray:
-        """Return derivatives of residuals, shape (7, W, scored, n_joints): all joints at once, for each moves its own."""
+        """Return derivatives of residuals, shape (7, W, scored, n_joints), of all joints at once: each moves its own."""
         slopes = []
         for row in range(len(EFFECTS)):
             step = np.where(x[row] + probe[row] > high[row], -probe[row], probe[row])
@@ -212,8 +214,7 @@ def _solve(slopes: np.ndarray, z: np.ndarray, x: np.ndarray, widths: np.ndarray,
         matrix, right = matrix + np.diag(prior), right - prior * x[:, k] / scale[:, 0]
         size = float(np.trace(matrix))
         if size > 0.0 and np.isfinite(size):
-            matrix += RIDGE * (np.diag(np.diag(matrix)) + size / len(matrix) * np.eye(len(matrix))) + 1e-9 * np.eye(
-                len(matrix)
-            )
+            ridge = np.diag(matrix) + size / len(matrix)
+            matrix += np.diag(RIDGE * ridge + 1e-9)
             steps[:, k] = np.linalg.solve(matrix, right) * scale[:, 0]
     return steps

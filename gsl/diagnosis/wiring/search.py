@@ -1,4 +1,4 @@
-"""The search for wiring faults: screen the menu, fit the leads with physics beside them, keep what physics cannot do."""
+"""The search for wiring faults: screen the menu, fit leads with physics beside them, keep what physics cannot do."""
 
 from __future__ import annotations
 
@@ -144,7 +144,9 @@ class Search:
         if fault.kind != "gains":
             return False
         low, high = (bound[[KP, KD]] for bound in documented(self.plant))
-        own = np.log([fault.value["kp"], fault.value["kd"]]) + after.parameters[[KP, KD]][:, list(fault.joints)]
+        own = (
+            np.log(np.array([fault.value["kp"], fault.value["kd"]])) + after.parameters[[KP, KD]][:, list(fault.joints)]
+        )
         return bool(((own >= low) & (own <= high)).all(axis=0).mean() >= HALF)
 
     def _without_physics(self, fit: Fit) -> Stand | None:
@@ -225,23 +227,19 @@ class Search:
                 yield promising[0], alone
 
     def _gains(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
-        """Yield the best gains of each joint, if they are far from what they are."""
-        grid = [(fault, cost) for fault in gain_grid(bad, self.plant) if (cost := self._screen(fault)) is not None]
-        costs = np.array([cost for _, cost in grid])
-        best = costs.argmin(axis=0)
-        better = [k for k in bad if costs[best[k], k] < PROMISING * base[k]]
-        together = [(float((base - cost)[bad].sum()), fault) for fault, cost in grid]
-        drop, common = max(together, key=lambda pair: pair[0])
-        if drop > 0.0:
-            everyone = range(len(base))
-            place_of = int(list(bad)[0])
-            kp, kd = (float(common.value[name][list(bad).index(place_of)]) for name in ("kp", "kd"))
-            yield drop, gains([kp] * len(base), [kd] * len(base), everyone)
+        """Yield the best gains of all joints together, and of each one, if they are far from what they are."""
+        everyone = range(len(base))
+        grid = [(fault, cost) for fault in gain_grid(everyone, self.plant) if (cost := self._screen(fault)) is not None]
+        costs = np.array([cost for _, cost in grid])[:, list(bad)]
+        drops = (base[list(bad)] - costs).sum(axis=1)
+        if drops.max() > 0.0:
+            yield float(drops.max()), grid[int(drops.argmax())][0]
+        best = {k: int(costs[:, place].argmin()) for place, k in enumerate(bad)}
+        better = [k for place, k in enumerate(bad) if costs[best[k], place] < PROMISING * base[k]]
         if better:
-            place = {k: list(bad).index(k) for k in better}
-            kp, kd = ([grid[best[k]][0].value[name][place[k]] for k in better] for name in ("kp", "kd"))
-            fault = gains(kp, kd, better)
-            yield float(sum(base[k] - costs[best[k], k] for k in better)), fault
+            kp, kd = ([float(grid[best[k]][0].value[name][k]) for k in better] for name in ("kp", "kd"))
+            drop = sum(float(base[k] - grid[best[k]][1][k]) for k in better)
+            yield drop, gains(kp, kd, better)
 
     def _both(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
         """Yield axes that point the other way, and joints that have each other's names, in commands and positions."""
