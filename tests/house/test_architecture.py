@@ -39,6 +39,7 @@ ONLY = {
         "policies/torchscript.py",
         "storage/importers/tensor_arrays.py",
         "policies/sb3.py",
+        "export/servo_network.py",
     ),
     "sb3_contrib": ("optimizers/trpo.py",),
     "stable_baselines3": ("optimizers/trpo.py", "optimizers/sb3.py"),

@@ -191,7 +191,7 @@ class Contest:
         return probe
 
     def _slopes(self, x: np.ndarray, z: np.ndarray, probe: np.ndarray, high: np.ndarray, pieces: Pieces) -> np.ndarray:
-        """Return derivatives of residuals, shape (7, W, scored, n_joints), of all joints at once: each moves its own."""
+        """Return derivatives of residuals, shape (7, W, scored, n_joints), of all joints at once."""
         slopes = []
         for row in range(len(EFFECTS)):
             step = np.where(x[row] + probe[row] > high[row], -probe[row], probe[row])
