@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from gsl.api.components import make_grounding, make_policy, make_task, make_worl
 from gsl.core.described import rebuilt
 from gsl.core.interfaces import SIM, Grounding, Policy, PolicyRun, Task, World
 from gsl.core.layout import Layout
+from gsl.core.validation import make
 from gsl.errors import ArtifactError, ConfigError
 from gsl.grounding.diagnosis_file import read_diagnosis
 from gsl.grounding.effects import switch_on
@@ -21,7 +22,7 @@ from gsl.policies.outside import Outside
 from gsl.policies.policy import size
 from gsl.policies.sb3 import Sb3Policy
 from gsl.policies.wired import Spaces, WiredEnv
-from gsl.policies.wiring import Wiring
+from gsl.policies.wiring import Wiring, check_joints
 from gsl.rollout.rl_env import GroundedSimulator
 from gsl.rollout.rollout import Scenario
 from gsl.storage.artifact import Artifact
@@ -39,6 +40,7 @@ def grounded_env(
     task: Task | str | None = None,
     policy: Policy | str | None = None,
     grounding: Grounding | str | None = None,
+    wiring: Wiring | Mapping[str, Any] | None = None,
     envs: int | None = None,
     trust: str | Collection[str] = (),
 ) -> Any:
@@ -53,6 +55,7 @@ def grounded_env(
         task: What is rewarded; that of the run, or the environment's own reward.
         policy: Whose wiring says what is observed and done, and where a robot starts.
         grounding: In place of the run's.
+        wiring: Of a policy that is still to be trained, as in its yaml file.
         envs: How many side by side, as a `gymnasium.vector.VectorEnv`; none for a single environment.
         trust: Modules whose code the run's files may name.
 
@@ -61,11 +64,13 @@ def grounded_env(
         ArtifactError: There is no such run.
     """
     trusted = (trust,) if isinstance(trust, str) else tuple(trust)
-    simulator, wiring, spaces = _simulator(run, world, task, policy, grounding, trusted)
+    wired = make(Wiring, wiring, where="wiring") if isinstance(wiring, Mapping) else wiring
+    actor = policy if wired is None else _Untrained(wired)
+    simulator, own, spaces = _simulator(run, world, task, actor, grounding, trusted)
 
     def env() -> gymnasium.Env:
         plain = simulator.env()
-        return plain if wiring is None else WiredEnv(plain, wiring, simulator.layout, spaces)
+        return plain if own is None else WiredEnv(plain, own, simulator.layout, spaces)
 
     return env() if envs is None else gymnasium.vector.SyncVectorEnv(envs * [env])
 
@@ -81,7 +86,7 @@ def _simulator(
     made, settled = _of_run(run, trust)
     world = make_world(world) if isinstance(world, str) else world or made.get("world")
     task = make_task(task) if isinstance(task, str) else task or made.get("task")
-    policy = make_policy(policy) if isinstance(policy, str) else policy or made.get("policy") or _Nobody()
+    policy = make_policy(policy) if isinstance(policy, str) else policy or made.get("policy") or _Untrained()
     grounding = make_grounding(grounding) if isinstance(grounding, str) else grounding or made.get("grounding")
     if world is None:
         raise ConfigError("world", "is missing; name a run, or give a world of gsl.make_world")
@@ -90,8 +95,10 @@ def _simulator(
     policy = size(policy, world)
     scenario = Scenario(world, task or OwnReward(), policy, SIM, grounding or NoGrounding()).prepare(settled)
     simulator = GroundedSimulator(scenario, policy.initial)
-    if isinstance(policy, Outside):
-        return simulator, policy.wiring, _spaces(policy, world)
+    own = policy.wiring if isinstance(policy, Outside | _Untrained) else None
+    if own is not None:
+        check_joints(own, simulator.layout)
+        return simulator, own, _spaces(policy, world)
     return (simulator, Wiring(), _spaces(policy, world)) if simulator.layout.states else (simulator, None, None)
 
 
@@ -131,7 +138,7 @@ def _spaces(policy: Policy, world: World) -> Spaces | None:
     if isinstance(policy, Sb3Policy):
         model = policy.network().model
         return model.observation_space, model.action_space
-    if isinstance(policy, Outside) and policy.wiring != Wiring():
+    if isinstance(policy, Outside | _Untrained) and policy.wiring not in (None, Wiring()):
         return None
     if isinstance(world, GymnasiumWorld):
         inside = world.make().unwrapped_env
@@ -141,16 +148,17 @@ def _spaces(policy: Policy, world: World) -> Spaces | None:
 
 
 @dataclass(frozen=True)
-class _Nobody:
-    """A policy that says where a robot starts, all joints at 0, and nothing else."""
+class _Untrained:
+    """A policy that does not exist yet: it says where a robot starts, its pose, and nothing else."""
 
+    wiring: Wiring | None = None
     names = ()
     initial = np.zeros(0)
     scale = np.zeros(0)
 
     def posture(self, parameters: np.ndarray, layout: Layout) -> np.ndarray:
-        """Return zeros [rad], shape (n_joints,)."""
-        return np.zeros(0 if layout.states else len(layout.joints))
+        """Return the pose [rad], shape (n_joints,)."""
+        return np.zeros(0) if layout.states else (self.wiring or Wiring()).stance(layout)
 
     def start(self, parameters: np.ndarray, layout: Layout) -> PolicyRun:
         """Refuse to act."""
