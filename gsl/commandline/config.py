@@ -13,7 +13,8 @@ from pydantic import AfterValidator, BeforeValidator
 
 from gsl.commandline.composer import Composition
 from gsl.commandline.config_errors import missing, resolution_error
-from gsl.commandline.known_settings import read_declared
+from gsl.commandline.expansion import check_expansion
+from gsl.commandline.known_settings import plain, read_declared
 from gsl.commandline.overrides import COMMAND_KEYS, file_of
 from gsl.commandline.own_word import modules_of
 from gsl.core.budget import within
@@ -144,7 +145,9 @@ def resolve(composition: Composition) -> dict[str, Any]:
 
     Raises:
         ConfigError: A value refers to something that does not exist.
+        InputError: References multiply.
     """
+    check_expansion(plain(composition.config))
     try:
         with within("putting the settings together"):
             container = OmegaConf.to_container(composition.config, resolve=True)

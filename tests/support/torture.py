@@ -1,206 +1,122 @@
-"""Kills, faults and rubbish: python tests/support/torture.py [kills=60 flips=2000 inputs=3000 disks=10 seed=1].
+"""Kills, faults and rubbish: python tests/support/torture.py [kills=240 inputs=10000 flips=2000 disks=20 faults=1].
 
 Whatever happens, a command ends in one line and an exit code of its own, and the next start comes to the payload of an
-undisturbed run. Every case is drawn from the seed.
+undisturbed run. Cases are drawn from `seed=1`. They run in slices, each in a process of its own and two at a time. What
+a slice has shown is kept in `at=build/torture`, so that a campaign that was stopped goes on.
 """
 
 from __future__ import annotations
 
+import contextlib
+import json
+import os
 import resource
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
+import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
-from commands import ENVIRONMENT, SMALL, Said, done, gsl, started
+from commands import SMALL, done
+from torture_faults import FAULTS, fault, fill, flip
+from torture_inputs import feed
+from torture_kills import kill, killed
 
-from gsl.storage import manifest
+from gsl.storage.hashing import sources_hash
 
-KILLED = {
-    "optimize": ("name=k", *SMALL, "grounding=none"),
-    "collect": ("name=k", "role=real", *SMALL),
-    "train-forward": ("name=k", "data=chain/collect_real", "model=linear"),
-    "train-inverse": ("name=k", "data=chain/collect_sim"),
-    "evaluate": ("name=k", "policies=chain/optimize", *SMALL),
-    "iterate": ("name=k", *SMALL, "grounding=gat", "accept=true", "forward_model=linear"),
+SIZES = {"kills": 240, "faults": 1, "inputs": 10_000, "flips": 2000, "disks": 20}
+SLICE = {"inputs": 200, "flips": 500, "disks": 10}  # cases
+LANES = 2
+MOST = 2e9  # [bytes] of a process
+
+
+class Slice(NamedTuple):
+    """Cases of a part: of a command or fault, where these are apart, from `start` on."""
+
+    part: str
+    name: str
+    start: int
+    count: int
+
+
+PARTS: Mapping[str, Callable[[Path, Slice, int, Counter[str]], None]] = {
+    "kills": lambda folder, of, seed, counts: kill(folder, of.name, of.count, drawn(seed, of), counts),
+    "faults": lambda folder, of, seed, counts: fault(folder, of.name, drawn(seed, of), counts),
+    "inputs": lambda folder, of, seed, counts: feed(folder, of.count, seed + of.start, counts),
+    "flips": lambda folder, of, seed, counts: flip(folder, of.count, drawn(seed, of), counts),
+    "disks": lambda folder, of, seed, counts: fill(folder, of.count, drawn(seed, of), counts),
 }
-SLOWEST = 30.0  # [s] after which an input counts as a hang
-BYTES = (
-    *(b"\x00", b"\xff", b"-1", b"1e999", b"nan", b"null", b"{", b"]", b"\n", b",", b"../"),
-    *(b"${oc.env:HOME}", b"9" * 40),
-)
-WORDS = (
-    *("", "-1", "0", "1e999", "nan", "null", "true", "[]", "{}", "[", "{a: 1", "'", "../x", "/", ".", "*", "a b"),
-    *("9" * 400, "${name}", "${nothing}", "{_target_: os.system}", "???", "1,2", "a=b", "\x00", "\n", "x" * 5000),
-    "\u202e",
-)
-KEYS = (
-    *("name", "out", "force", "trust", "seed", "workers", "world", "task", "policy", "preset", "recipe", "episodes"),
-    *("world.effects.backlash.width", "world.effects", "world.period", "task.duration", "spread", "initial", "role"),
-    *("a.b", "_target_", "hydra.run.dir", "world._target_", "effects", "++x", "~world", "policy.file", "experiment"),
-)
 
 
-def campaign(place: Path, *, kills: int, flips: int, inputs: int, disks: int, seed: int) -> Counter[str]:
+def drawn(seed: int, of: Slice) -> np.random.Generator:
+    """Return the randomness of a slice."""
+    return np.random.default_rng([seed, zlib.crc32(f"{of.part} {of.name}".encode()), of.start])
+
+
+def slices(sizes: Mapping[str, int]) -> Iterator[Slice]:
+    """Yield all slices of a campaign, those that take long first."""
+    names = killed()
+    for index, name in enumerate(names):
+        if count := sizes["kills"] // len(names) + (index < sizes["kills"] % len(names)):
+            yield Slice("kills", name, 0, count)
+    yield from (Slice("faults", name, number, 1) for name in FAULTS for number in range(sizes["faults"]))
+    for part, most in SLICE.items():
+        yield from (Slice(part, "", at, min(most, sizes[part] - at)) for at in range(0, sizes[part], most))
+
+
+def run(place: Path, of: Slice, seed: int) -> Counter[str]:
     """Return how often what was tried, and how often what must not happen did: its name begins with a !.
 
     Args:
-        place: Folder in which the chain of all stages has run as runs/chain; what is tried happens in copies of it.
-        kills: Commands killed at a random moment and started again.
-        flips: Bits flipped in files of artifacts.
-        inputs: Command lines and files of rubbish.
-        disks: Commands on a disk that gets full.
+        place: Folder in which every stage has run as runs/chain; what is tried happens in a copy of it.
+        of: What to try.
         seed: Of all randomness.
     """
-    rng, counts = np.random.default_rng(seed), Counter[str]()
-    for part, number in ((kill, kills), (flip, flips), (feed, inputs), (fill, disks)):
-        with tempfile.TemporaryDirectory(prefix="torture-") as home:
-            folder = Path(home)
-            shutil.copytree(place / "runs/chain", folder / "runs/chain")
-            if number:
-                part(folder, number, rng, counts)
+    counts = Counter[str]()
+    with tempfile.TemporaryDirectory(prefix="torture-") as home:
+        folder = Path(home)
+        shutil.copytree(place / "runs", folder / "runs")
+        PARTS[of.part](folder, of, seed, counts)
     return counts
 
 
-def kill(folder: Path, number: int, rng: np.random.Generator, counts: Counter[str]) -> None:
-    """Kill commands at random moments; started again they have to come to the payload of an undisturbed run."""
-    whole: dict[str, tuple[float, dict[str, str]]] = {}
-    for index in range(number):
-        name = list(KILLED)[index % len(KILLED)]
-        command, run = (name, *KILLED[name]), folder / "runs/k"
-        if name not in whole:
-            begin = time.monotonic()
-            with started(*command, folder=folder) as process:
-                process.communicate()
-            whole[name] = time.monotonic() - begin, payloads(run)
-            shutil.rmtree(run)
-        seconds, wanted = whole[name]
-        with started(*command, folder=folder) as process:
-            try:
-                process.communicate(timeout=seconds * rng.uniform(0.3, 1.0))  # before that there is nothing but imports
-                counts["kills that came too late"] += 1
-            except subprocess.TimeoutExpired:
-                counts["kills"] += 1
-        counts["! damaged after a kill"] += bool(run.exists() and [*run.rglob("manifest.json")]) and (
-            gsl("verify", "k", folder=folder).code != 0
-        )
-        said = gsl(*command, folder=folder)
-        counts["! restart refused"] += said.code != 0
-        counts["! another payload"] += payloads(run) != wanted
-        counts["! left behind"] += any(path.name.startswith(".") for path in run.rglob("*"))
-        shutil.rmtree(run)
+def campaign(place: Path, seed: int, sizes: Mapping[str, int]) -> Iterator[dict[str, Any]]:
+    """Yield what each slice has shown: those that are there already, and the others as they end."""
+    results = place / f"{sources_hash()[:12]}_{seed}.jsonl"
+    lines = results.read_text().splitlines() if results.exists() else []
+    there = {Slice(*row["slice"]): row for row in map(json.loads, lines)}
+    wanted = list(slices(sizes))
+    yield from (there[of] for of in wanted if of in there)
+    with ThreadPoolExecutor(LANES) as lanes, results.open("a") as file:
+        for row in lanes.map(lambda of: _apart(place, of, seed), [of for of in wanted if of not in there]):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            yield row
 
 
-def flip(folder: Path, number: int, rng: np.random.Generator, counts: Counter[str]) -> None:
-    """Flip bits in files of artifacts; `gsl verify` has to name the file."""
-    files = sorted(path for path in (folder / "runs/chain").rglob("*") if path.is_file() and path.stat().st_size)
-    for _ in range(number):
-        path = files[rng.integers(len(files))]
-        whole = path.read_bytes()
-        damaged = bytearray(whole)
-        damaged[rng.integers(len(whole))] ^= 1 << int(rng.integers(8))
-        path.write_bytes(damaged)
-        said = gsl("verify", "chain", folder=folder)
-        counts["flips"] += 1
-        counts["! flip not seen"] += said.code != 1 or path.name not in said.err
-        path.write_bytes(whole)
+def _apart(place: Path, of: Slice, seed: int) -> dict[str, Any]:
+    begin = time.monotonic()
+    words = [sys.executable, __file__, "slice", json.dumps(of), f"seed={seed}", f"at={place}"]
+    process = subprocess.run(words, stdout=subprocess.PIPE, text=True)
+    try:
+        row = json.loads(process.stdout.splitlines()[-1])  # before that, what processes of a launcher say
+    except (ValueError, IndexError):
+        row = {"counts": {"! slice without a result": 1}, "bytes": 0}
+        sys.stderr.write(f"! {of}: ended with {process.returncode}\n")
+    return {"slice": of, "seconds": round(time.monotonic() - begin), **row}
 
 
-def feed(folder: Path, number: int, rng: np.random.Generator, counts: Counter[str]) -> None:
-    """Give commands what makes no sense: settings, and files with bytes put in, taken away or exchanged."""
-    before = {path: path.stat().st_size for path in folder.rglob("*") if path.is_file()}
-    for arguments in rubbish(folder, number, rng):
-        begin = time.monotonic()
-        said = gsl(*arguments, folder=folder)
-        counts["inputs"] += 1
-        counts[f"inputs, exit code {said.code}"] += 1
-        counts["! hang"] += time.monotonic() - begin > SLOWEST
-        _judge(said, arguments, counts)
-        for name in ("fuzz", "unnamed", "chain_rerun"):
-            shutil.rmtree(folder / "runs" / name, ignore_errors=True)
-        for path in (folder / "fuzz").glob("*"):
-            path.unlink()
-    after = {path: path.stat().st_size for path in folder.rglob("*") if path.is_file()}
-    counts["! written elsewhere"] += after != before
-
-
-def rubbish(folder: Path, number: int, rng: np.random.Generator) -> Iterator[tuple[str, ...]]:
-    """Yield command lines that hold rubbish or name files of it."""
-    runs, mine = folder / "runs/chain", folder / "fuzz"
-    mine.mkdir(exist_ok=True)
-    made: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
-        ("optimize/policies.json", ("evaluate", "policies="), SMALL),
-        ("collect_real/trajectories.parquet", ("train-forward", "data="), ("model=linear",)),
-        ("collect_sim/trajectories.parquet", ("train-inverse", "data="), ()),
-        ("evaluate/policies.json", ("collect", "initial="), SMALL),
-        ("optimize/best_in_simulation.json", ("import", "source="), ("mapping=xl330_pendulum", "--check")),
-    )
-    for index in range(number):
-        if index % 2:
-            source, (command, setting), more = made[index // 2 % len(made)]
-            path = mine / Path(source).name
-            path.write_bytes(mangled((runs / source).read_bytes(), rng))
-            yield (command, f"{setting}{path}", "name=fuzz", *more)
-        else:
-            drawn = [f"{rng.choice(KEYS)}={rng.choice(WORDS)}" for _ in range(rng.integers(1, 4))]
-            yield (str(rng.choice(["collect", "optimize", "evaluate", "diagnose", "iterate"])), "--cfg", "job", *drawn)
-
-
-def mangled(contents: bytes, rng: np.random.Generator) -> bytes:
-    """Return bytes with some of them exchanged, put in or taken away."""
-    made = bytearray(contents)
-    for _ in range(rng.integers(1, 4)):
-        at, length = int(rng.integers(len(made) + 1)), int(rng.integers(1, 40))
-        match int(rng.integers(4)):
-            case 0:
-                made[at : at + 1] = BYTES[rng.integers(len(BYTES))]
-            case 1:
-                del made[at : at + length]
-            case 2:
-                made[at : at + length] = rng.bytes(length)
-            case _:
-                del made[at:]
-    return bytes(made)
-
-
-def fill(folder: Path, number: int, rng: np.random.Generator, counts: Counter[str]) -> None:
-    """Let no file get longer than a random size, as on a full disk: one line, exit code 1, and no artifact."""
-    for index in range(number):
-        name = list(KILLED)[1 + index % (len(KILLED) - 2)]
-        most = int(rng.integers(1, 3000))
-        process = subprocess.run(
-            [sys.executable, "-m", "gsl", name, *KILLED[name]],
-            cwd=folder,
-            env=ENVIRONMENT,
-            capture_output=True,
-            text=True,
-            preexec_fn=lambda most=most: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
-        )
-        said = Said(process.returncode, process.stdout, process.stderr)
-        counts["full disks"] += 1
-        counts["! full disk not said"] += said.code == 0 or "cannot be written" not in said.err
-        counts["! half an artifact"] += (folder / "runs/k").exists()
-        _judge(said, (name, f"{most} bytes"), counts)
-        shutil.rmtree(folder / "runs/k", ignore_errors=True)
-
-
-def _judge(said: Said, arguments: tuple[str, ...], counts: Counter[str]) -> None:
-    bad = {"! internal error": "internal error" in said.err, "! traceback": "Traceback" in said.err}
-    bad["! exit code"] = said.code not in (0, 1, 2)
-    for name in (name for name, holds in bad.items() if holds):
-        counts[name] += 1
-        sys.stderr.write(f"{name}: {[word[:80] for word in arguments]}: {said.lines[-1:]}\n")
-
-
-def payloads(run: Path) -> dict[str, str]:
-    """Return the hash of the contents of each artifact of a run."""
-    folders = (path.parent for path in run.rglob("manifest.json"))
-    return {folder.relative_to(run).as_posix(): manifest.read(folder).contents for folder in folders}
+def peak() -> float:
+    """Return the most memory that this process or one it waited for had [bytes]."""
+    whose = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return 1024.0 * max(resource.getrusage(one).ru_maxrss for one in whose)
 
 
 def chain(place: Path) -> Path:
@@ -214,11 +130,53 @@ def chain(place: Path) -> Path:
     return place
 
 
+def air(place: Path) -> Path:
+    """Record a few motions in the air."""
+    motions = ("policy.motions=[steps_large,triangle_slow]", "policy.duration=1.5", "workers=1")
+    done("collect", "role=real", "name=air", "task=excite", "world=nao_worn", *motions, folder=place)
+    return place
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Return what was tried and what went wrong, as a table of a page."""
+    counts = sum((Counter(row["counts"]) for row in rows), Counter[str]())
+    lines = ["| what | how often |", "|---|---|"]
+    lines += [f"| {what} | {count:,} |" for what, count in sorted(counts.items()) if what[0] != "!"]
+    lines += [f"| **{what[2:]}** | {count:,} |" for what, count in sorted(counts.items()) if what[0] == "!"]
+    lines += [f"| most memory of a process | {max(row['bytes'] for row in rows) / 1e9:.2f} GB |"]
+    lines += [f"| time on {LANES} lanes | {sum(row['seconds'] for row in rows) / 60 / LANES:.0f} min |"]
+    return "\n".join(lines)
+
+
+def main(words: list[str]) -> int:
+    """Run the campaign, or one slice of it, and return the exit code."""
+    settings = dict(word.split("=", 1) for word in words if "=" in word and not word.startswith("["))
+    place, seed = Path(settings.pop("at", "build/torture")).absolute(), int(settings.pop("seed", 1))
+    if words[:1] == ["slice"]:
+        with contextlib.redirect_stdout(sys.stderr):
+            counts = run(place, Slice(*json.loads(words[1])), seed)
+        sys.stdout.write("\n" + json.dumps({"counts": counts, "bytes": peak()}))
+        return 0
+    if unknown := settings.keys() - SIZES.keys():
+        sys.stderr.write(f"no part of the campaign: {', '.join(unknown)}; there is {', '.join(SIZES)}\n")
+        return 2
+    sizes = SIZES | {name: int(value) for name, value in settings.items()}
+    made = place / "runs/.complete"
+    if not made.exists() or made.read_text() != sources_hash():
+        shutil.rmtree(place / "runs", ignore_errors=True)
+        place.mkdir(parents=True, exist_ok=True)
+        air(chain(place))
+        made.write_text(sources_hash())
+    rows = []
+    for row in campaign(place, seed, sizes):
+        rows.append(row)
+        wrong = {what: count for what, count in row["counts"].items() if what[0] == "!" and count}
+        sys.stderr.write(f"{Slice(*row['slice'])}: {row['seconds']} s {wrong or ''}\n")
+    sys.stdout.write(table(rows) + "\n")
+    bad = any(count for row in rows for what, count in row["counts"].items() if what[0] == "!")
+    return int(bad or max(row["bytes"] for row in rows) > MOST)
+
+
 if __name__ == "__main__":
-    settings = {"kills": 60, "flips": 2000, "inputs": 3000, "disks": 10, "seed": 1}
-    settings |= {name: int(value) for name, value in (word.split("=") for word in sys.argv[1:])}
-    with tempfile.TemporaryDirectory(prefix="torture-") as home:
-        result = campaign(chain(Path(home)), **settings)
-    for what, count in sorted(result.items()):
-        sys.stdout.write(f"{count:6d}  {what}\n")
-    sys.exit(any(count for what, count in result.items() if what.startswith("!")))
+    os.environ["PYTHONUNBUFFERED"] = "1"
+    sys.exit(main(sys.argv[1:]))

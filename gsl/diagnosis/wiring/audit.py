@@ -16,8 +16,9 @@ from gsl.diagnosis.log.files import on_ground
 from gsl.diagnosis.log.log import spread
 from gsl.diagnosis.wiring.fault import Fault
 from gsl.diagnosis.wiring.options import by_relation, permutations
+from gsl.diagnosis.wiring.outcome import Wiring
 from gsl.diagnosis.wiring.physics import Fit
-from gsl.diagnosis.wiring.search import Search, Wiring, cut_motions
+from gsl.diagnosis.wiring.search import Search, cut_motions
 from gsl.diagnosis.wiring.words import describe, remedy
 from gsl.errors import GslError
 from gsl.storage.signals.check import check_signals, mend_signals

@@ -14,6 +14,7 @@ from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.settings import FloorSettings, LogSettings, SearchSettings
 from gsl.diagnosis.wiring.fault import BOTH, Fault, gains, permute, rescale
 from gsl.diagnosis.wiring.options import Spread, by_range, by_relation, find_beyond, gain_grid, permutations, timings
+from gsl.diagnosis.wiring.outcome import Stand, Wiring
 from gsl.diagnosis.wiring.physics import DELAY, KD, KP, Contest, Fit, documented
 from gsl.errors import GslError
 
@@ -37,38 +38,6 @@ ROUNDS = 6
 EVEN = 1.1  # factor on the cost of what is left within which another kind of fault does as well
 WHOLE = 0.04  # of a row, by which a delay may be off a whole number of rows
 AGREE = 0.1  # of a row, by which delays of the joints may differ then
-
-
-@dataclass(frozen=True)
-class Stand:
-    """A fault that stands.
-
-    Attributes:
-        fault: What.
-        before, after: Physics alone, and physics beside the fault.
-        rivals: Other faults that do about as well.
-    """
-
-    fault: Fault
-    before: Fit
-    after: Fit
-    rivals: tuple[Fault, ...] = ()
-
-
-@dataclass(frozen=True)
-class Wiring:
-    """What a search found.
-
-    Attributes:
-        stands: Faults, in the order in which they were found.
-        before, after: The best physics of the log as it is, and of the mended log.
-        late: By how many whole rows all commands act later, 0 if by none: a shift, or a latency.
-    """
-
-    stands: tuple[Stand, ...]
-    before: Fit
-    after: Fit
-    late: int
 
 
 def cut_motions(batch: Batch, plant: Plant) -> Log:

@@ -1,0 +1,136 @@
+"""Kills at random moments and before writes: started again, a command comes to the payload of an undisturbed run."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from commands import ENVIRONMENT, SMALL, eventually, gsl, session
+
+from gsl.effects.effect import names
+from gsl.storage import manifest
+
+FEW = {"command_latency", "servo_gain", "coulomb_friction"}  # effects that a diagnosis tries
+AIR = ("real=air", "sim=nao_ideal", f"without=[{','.join(sorted({*names()} - FEW))}]", "workers=1")
+PAIR = ("preset=toy", "task.duration=1.6", "workers=2")
+METHODS = ("ane_01", "ane_02", "gat_005", "gat", "effects", "effects_gat")
+LEFT_OUT = ("~worlds.nao_weak", *(f"~methods.{name}" for name in METHODS))
+KILLED = {
+    "collect": ("role=real", *SMALL),
+    "collect with two workers": ("role=real", *PAIR),
+    "collect executor=dask": ("role=real", *PAIR),
+    "collect --multirun": ("role=real", *SMALL, "seed=1,2"),
+    "collect --multirun hydra/launcher=joblib": ("role=real", *SMALL, "seed=1,2"),
+    "train-forward": ("data=chain/collect_real", "model=linear"),
+    "train-inverse": ("data=chain/collect_sim",),
+    "train-servo": ("real=air", "sim=nao_ideal", "workers=1"),
+    "optimize": (*SMALL, "grounding=none"),
+    "evaluate": ("policies=chain/optimize", *SMALL),
+    "iterate": (*SMALL, "grounding=gat", "accept=true", "forward_model=linear"),
+    "diagnose": (*AIR, "most=1", "duels=0", "nulls=0", "limits=false"),
+    "identify": AIR,
+    "survey": SMALL,
+    "compare": ("preset=toy", "iterate.task.duration=1.6", "iterate.workers=1", "trials=1", *LEFT_OUT),
+}  # fmt: skip
+NEEDS = {"executor=dask": "distributed", "hydra/launcher=joblib": "hydra_plugins.hydra_joblib_launcher"}
+LONGEST = 600.0  # [s] that a command may take on a busy machine
+GONE = 20.0  # [s] in which what a killed command started has to end
+
+
+def killed() -> list[str]:
+    """Return the names of what is killed, without what needs a package that is not there."""
+    missing = [word for word, package in NEEDS.items() if not _is_there(package)]
+    return [name for name in KILLED if not any(name.endswith(word) for word in missing)]
+
+
+def _is_there(package: str) -> bool:
+    try:
+        return importlib.util.find_spec(package) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def kill(folder: Path, name: str, number: int, rng: np.random.Generator, counts: Counter[str]) -> None:
+    """Kill a command so many times, by turns at a random moment and before a write."""
+    words, run = _words(name), folder / "runs/k"
+    begin = time.monotonic()
+    with _started(words, 0, folder) as process:
+        process.communicate()
+    if process.returncode != 0:
+        counts[f"! {name} fails"] += 1
+        return
+    seconds, writes, wanted = time.monotonic() - begin, int((folder / "writes").read_text()), payloads(run)
+    shutil.rmtree(run)
+    for tried in range(2 * number):
+        if counts[f"kills of {name}"] == number:
+            break
+        at = int(rng.integers(1, writes + 1)) if tried % 2 else 0
+        with _started(words, at, folder) as process:
+            # Before a fifth of the time there is nothing but imports.
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.communicate(timeout=LONGEST if at else seconds * rng.uniform(0.2, 1.0))
+            process.kill()
+            process.communicate()
+            counts[f"kills of {name}" if process.returncode == -9 else "kills that came too late"] += 1
+            counts["! left running"] += not eventually(lambda: not session(process.pid), seconds=GONE)  # noqa: B023
+        again(folder, words, wanted, counts)
+    counts["kills"] += counts[f"kills of {name}"]
+
+
+def again(folder: Path, words: tuple[str, ...], wanted: dict[str, str], counts: Counter[str]) -> None:
+    """Start a command again, look at all that it has to come to, and take it away."""
+    run = folder / "runs/k"
+    if run.exists() and [*run.rglob("manifest.json")]:
+        damaged = gsl("verify", "k", folder=folder)
+        counts["! damaged after a kill"] += _bad(damaged.code != 0, words, damaged.err)
+    said = gsl(*words, folder=folder)
+    counts["! restart refused"] += _bad(said.code != 0, words, said.err)
+    counts["! another payload"] += _bad(payloads(run) != wanted, words, said.err)
+    left = [path for path in (folder / "runs").rglob("*") if path.name.startswith(".") and path.name != ".complete"]
+    counts["! left behind"] += _bad(bool(left), words, f"{left}")
+    shutil.rmtree(run, ignore_errors=True)
+    for path in left:
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def _bad(wrong: bool, words: tuple[str, ...], told: str) -> bool:
+    if wrong:
+        sys.stderr.write(f"! {' '.join(words)[:200]}: {told[-400:]}\n")
+    return wrong
+
+
+def payloads(run: Path) -> dict[str, str]:
+    """Return the hash of the contents of each artifact of a run."""
+    folders = (path.parent for path in run.rglob("manifest.json"))
+    return {folder.relative_to(run).as_posix(): manifest.read(folder).contents for folder in folders}
+
+
+def _words(name: str) -> tuple[str, ...]:
+    command, *more = name.replace(" with two workers", "").split()
+    return (command, "name=k", *more, *KILLED[name])
+
+
+@contextlib.contextmanager
+def _started(words: tuple[str, ...], at: int, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """Start a command in a session of its own, to be killed before write number `at` if that is not 0."""
+    killer = str(Path(__file__).with_name("torture_killer.py"))
+    process = subprocess.Popen(
+        [sys.executable, killer, str(at), str(folder / "writes"), *words], cwd=folder, env=ENVIRONMENT, text=True,
+        start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        yield process
+    finally:
+        for number in session(process.pid):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(number, 9)
+        process.communicate()
