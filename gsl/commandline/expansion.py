@@ -1,4 +1,4 @@
-"""How large settings get with what they refer to written out: a few lines of references that double would take hours."""
+"""How large settings get with what they refer to written out: references that double would take hours."""
 
 from __future__ import annotations
 
