@@ -78,12 +78,10 @@ class Cluster:
     def _connect(self, workers: int) -> Any:
         if self._client is not None:
             return self._client
-        import dask
         from distributed import Client, LocalCluster
 
         for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in LOUD]:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-        dask.config.set({"distributed.comm.timeouts.connect": f"{CONNECT:g}s"})
         with processes_starting():
             if self._address is None:
                 self._local = LocalCluster(

@@ -15,7 +15,6 @@ SHORT = (
     Slice("flips", "", 0, 40),
     Slice("inputs", "", 0, 60),
     Slice("disks", "", 0, 1),
-    Slice("faults", "clocks that jump", 0, 1),
 )
 
 
