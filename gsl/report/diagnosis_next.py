@@ -32,7 +32,7 @@ def steps(document: Document) -> list[Step]:
     if given:
         return [Step(str(one.get("why") or ""), str(one.get("command") or "")) for one in given]
     if verdict(document) == "wiring":
-        return [*_mending(document), Step("Then audit again, and diagnose.", f"gsl audit real={_source(document)}")]
+        return [*_mending(document), Step("Import again, and let gsl audit look once more.")]
     first = {"no_gap": _as_it_is, "causes": _advise_correction, "inseparable": _either, "unknown": _advise_learning}[
         verdict(document)
     ]
@@ -45,10 +45,6 @@ def steps(document: Document) -> list[Step]:
 def _mending(document: Document) -> list[Step]:
     remedies = dict.fromkeys(read_word(one, "remedy") for one in entries(document, "wiring"))
     return [Step(remedy) for remedy in remedies if remedy]
-
-
-def _source(document: Document) -> str:
-    return shlex.quote(str(part(document, "data").get("source") or "LOG"))
 
 
 def _as_it_is(document: Document) -> Step:

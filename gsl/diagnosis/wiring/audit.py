@@ -212,7 +212,7 @@ def _fault(
         "row": None,
         "times": 1,
         "sentence": describe(fault, about.joints, about.period),
-        "remedy": remedy(fault),
+        "remedy": remedy(fault, about.joints),
         "before": None if before is None else float(np.sqrt((before.rms[own] ** 2).mean())),
         "after": None if after is None else float(np.sqrt((after.rms[own] ** 2).mean())),
         "or": [describe(one, about.joints, about.period) for one in rivals],

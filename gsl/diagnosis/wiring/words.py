@@ -28,13 +28,21 @@ def describe(fault: Fault, joints: Sequence[str], period: float) -> str:
     return f"{sentence[0].upper()}{sentence[1:]}."
 
 
-def remedy(fault: Fault) -> str:
-    """Return what to do."""
+def remedy(fault: Fault, joints: Sequence[str]) -> str:
+    """Return what to do, with the words of a mapping where it has some.
+
+    Args:
+        fault: To mend.
+        joints: Names of the log's joints.
+    """
+    names = [joints[k] for k in fault.joints]
+    signs = ", ".join(f"{name}: -1" for name in names)
+    unit = f"Say unit: {fault.value['unit']}" if "unit" in fault.value else "Say factor and offset"
     signal = "action" if fault.side == ACTION else "position" if fault.side == POSITION else "action and position"
     return {
         "permuted": "Name the columns of these joints anew in the mapping.",
-        "sign": f"Say sign: -1 of these joints for {signal} in the mapping.",
-        "scale": f"Say the unit, or factor and zero, of {signal} in the mapping.",
+        "sign": f"Say sign: {{{signs}}} for {signal} in the mapping.",
+        "scale": f"{unit} for {signal} in the mapping.",
         "offset": f"Say the offset of these joints for {signal} in the mapping.",
         "gains": "Give the simulator the robot's gains (world.effects.servo_gain), and look at their units.",
         "rate": "Say the true rate: the unit of time, or its period, in the mapping.",
