@@ -228,17 +228,20 @@ def test_help_says_what_a_preset_means_and_what_two_share_once(capsys: pytest.Ca
     assert len(text.splitlines()) < 220
 
 
-OF_ENVIRONMENTS = {  # what is for gymnasium environments, and goes with no robot
-    "policy": ("mlp", "action_table"),
-    "optimizer": ("policy_iteration", "trpo", "trpo_pendulum", "trpo_long"),
+OF_ENVIRONMENTS = {  # what is for gymnasium environments, or for files that somebody brings
+    "policy": ("mlp", "action_table", "onnx", "python", "sb3", "torch"),
+    "optimizer": ("policy_iteration", "sb3", "trpo", "trpo_pendulum", "trpo_long"),
     "grounding": ("random_choice",),
     "trial": ("gymnasium",),
 }
 HELD = ("go2_in_air", "so101", "so101_menagerie", "urdf", "xl330_pendulum")  # robots without feet
 EXAMPLE = Path(__file__).parents[2] / "examples/arm.urdf"
-REPLAYING = ("train_servo", "diagnose", "identify", "cross_validate", "blind_make")  # logs, with servos
+# logs, with servos
+REPLAYING = ("audit", "train_servo", "diagnose", "identify", "cross_validate", "blind_make", "blind_wiring")
 NEEDED = {  # what has no default
+    "audit": ("real=logs",),
     "diagnose": ("real=logs",),
+    "export": ("format=json",),
     "identify": ("real=logs",),
     "train_servo": ("real=logs",),
     "cross_validate": ("real=logs", "by=kp"),
@@ -308,6 +311,8 @@ def _typed(group: str, conf: Path, command: str) -> list[str]:
         return [f"{folder}={name}" for name in ("toy", "study")] if folder == "preset" else []
     if command in REPLAYING:
         found = (name for name in found if not name.startswith("nao_motors"))
+    if command == "wiring":
+        found = (name for name in found if name != "excitation")  # which lasts as long as a task
     mine = (name for name in found if name not in OF_ENVIRONMENTS.get(folder, ()))
     robots = (name for name in mine if folder != "world" or name.startswith("nao"))
     return [f"{role or folder}={name}" for name in robots if name != "excite" or command == "collect"]
