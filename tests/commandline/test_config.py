@@ -311,8 +311,8 @@ def _typed(group: str, conf: Path, command: str) -> list[str]:
         return [f"{folder}={name}" for name in ("toy", "study")] if folder == "preset" else []
     if command in REPLAYING:
         found = (name for name in found if not name.startswith("nao_motors"))
-    if command == "wiring":
-        found = (name for name in found if name != "excitation")  # which lasts as long as a task
+    if command == "wiring" and folder == "policy":  # others last as long as a task
+        return ["policy=walk_engine"]
     mine = (name for name in found if name not in OF_ENVIRONMENTS.get(folder, ()))
     robots = (name for name in mine if folder != "world" or name.startswith("nao"))
     return [f"{role or folder}={name}" for name in robots if name != "excite" or command == "collect"]
