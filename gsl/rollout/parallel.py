@@ -63,7 +63,7 @@ class Episode(NamedTuple):
 
 def trajectories(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Progress) -> list[Trajectory]:
     """Return the trajectories of all jobs, in their order."""
-    return in_parallel(_trajectory, scenario, jobs, workers, progress)
+    return in_parallel(play_trajectory, scenario, jobs, workers, progress)
 
 
 def episodes(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Progress) -> list[Episode]:
@@ -146,7 +146,8 @@ def _run_numbered(function: Any, frozen: bytes, job: Any, index: int) -> tuple[i
         return index, function(frozen, job)
 
 
-def _trajectory(frozen: bytes, job: Job) -> Trajectory:
+def play_trajectory(frozen: bytes, job: Job) -> Trajectory:
+    """Return the trajectory of a job, in a worker that holds the scenario ready."""
     scenario, env = _standing_by(frozen)
     return rollout(scenario, env, job.parameters, job.seed)
 

@@ -254,6 +254,8 @@ def _choices() -> Iterator[tuple[str, ...]]:
     """Commands with choices as they are typed: each command once, and each option wherever a group is chosen."""
     conf, seen = configuration_folder(), set[str]()
     for command in sorted(path for folder in (conf, *folders()) for path in folder.glob("*.yaml")):
+        if command.stem == "wiring":  # of policies that somebody brings
+            continue
         defaults = yaml.safe_load(command.read_text()).get("defaults", [])
         groups = [
             next(iter(entry)).lstrip("/")
@@ -311,8 +313,6 @@ def _typed(group: str, conf: Path, command: str) -> list[str]:
         return [f"{folder}={name}" for name in ("toy", "study")] if folder == "preset" else []
     if command in REPLAYING:
         found = (name for name in found if not name.startswith("nao_motors"))
-    if command == "wiring" and folder == "policy":  # others last as long as a task
-        return ["policy=walk_engine"]
     mine = (name for name in found if name not in OF_ENVIRONMENTS.get(folder, ()))
     robots = (name for name in mine if folder != "world" or name.startswith("nao"))
     return [f"{role or folder}={name}" for name in robots if name != "excite" or command == "collect"]

@@ -59,7 +59,7 @@ def scheduler(folder: Path, port: int) -> Iterator[tuple[str, subprocess.Popen[b
             process.wait()
 
 
-def played(cluster: Cluster | None, function: Callable[[bytes, Job], Any] = parallel._trajectory) -> list[bytes]:
+def played(cluster: Cluster | None, function: Callable[[bytes, Job], Any] = parallel.play_trajectory) -> list[bytes]:
     """Return all bytes of six rollouts."""
     scenario, rng = walk(), np.random.default_rng(0)
     start, scale = scenario.policy.initial, scenario.policy.scale
@@ -73,7 +73,7 @@ def _dies_once(marker: Path, frozen: bytes, job: Job) -> Any:
     if job.seed == 12 and not marker.exists():
         marker.touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    return parallel._trajectory(frozen, job)
+    return parallel.play_trajectory(frozen, job)
 
 
 def _dies(frozen: bytes, job: Job) -> Any:
