@@ -19,7 +19,7 @@ from gsl.diagnosis.wiring.physics import DELAY, KD, KP, Contest, Fit, documented
 from gsl.errors import GslError
 
 NOISE_COST = SearchSettings.noise_cost
-WINDOWS = LogSettings(  # short ones: a log whose rate is five times too high has no longer ones
+WINDOWS = LogSettings(  # short ones: a log whose rate is four times too high has no longer ones
     warm_up=0.3,
     scored=0.4,
     floor=FloorSettings(rests=10**9, unsteady=np.inf),  # every joint has its own floor
