@@ -260,10 +260,12 @@ class Search:
 
 
 def _best(standing: Sequence[tuple[Fault, Fit]], before: Fit) -> Stand:
-    """Return the fault that leaves least, with those of other kinds that leave hardly more."""
+    """Return the fault that leaves least, with those of other kinds or sides that leave hardly more."""
     best, after = min(standing, key=lambda pair: float(pair[1].cost.sum()))
     rivals = tuple(
-        fault for fault, other in standing if fault.kind != best.kind and other.cost.sum() < EVEN * after.cost.sum()
+        fault
+        for fault, other in standing
+        if (fault.kind, fault.side) != (best.kind, best.side) and other.cost.sum() < EVEN * after.cost.sum()
     )
     return Stand(best, before, after, rivals)
 
