@@ -76,7 +76,8 @@ def _moving(batch: Batch) -> np.ndarray:
 
 
 def _some(batch: Batch, rng: np.random.Generator, count: int) -> list[int]:
-    return [int(k) for k in rng.choice(_moving(batch), size=count, replace=False)]
+    moving = _moving(batch)
+    return [int(k) for k in rng.choice(moving, size=min(count, len(moving)), replace=False)]
 
 
 def _columns(columns: Sequence[int], how: Arrays) -> Arrays:

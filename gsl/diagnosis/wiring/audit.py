@@ -134,7 +134,7 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
         rows = f"{wiring.late} row{'s' * (wiring.late > 1)}"
         delay = f"{1e3 * wiring.late * batch.control_period:.4g} ms"
         alike = f"columns that are {rows} apart look like this, and so does a latency of {delay}"
-        remarks.insert(0, f"Commands act exactly {rows} later: {alike}.")
+        remarks.insert(0, f"Commands act {rows} later: {alike}.")
     return Audit(
         batch.joints, batch.control_period, tuple(signals), wiring, tuple(seen), tuple(remarks),
         time.perf_counter() - begin,

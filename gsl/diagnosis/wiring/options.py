@@ -22,7 +22,7 @@ USUAL = (0.55, 1.8)  # factors from command to position that physics explains
 OVER = 1.02  # share of a normalised range that values may reach
 EARLY = (1, 2, 3)  # rows by which commands may act before the row that they are written in
 HELD = (2, 3, 4, 5)  # ticks for which a robot may hold a command
-RATES = (0.2, 0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 0.8, 1.25, 1.5, 2.0, 3.0, 4.0, 5.0)
+RATES = (0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 0.8, 1.25, 1.5, 2.0, 3.0, 4.0)
 FACTORS = (1.0 / 57.3, 0.1, 0.2, 5.0, 10.0, 57.3)  # of gains: per degree, and orders of magnitude
 
 

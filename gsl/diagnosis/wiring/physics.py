@@ -127,8 +127,10 @@ class Contest:
         return np.clip(np.nan_to_num(z, nan=WORST), -WORST, WORST)
 
     def screen(self) -> np.ndarray:
-        """Return the cost of the simulator as it is on the windows for fitting, shape (n_joints,)."""
-        return loss(self.residual(self.plant, self.train)).mean(axis=(0, 1))
+        """Return the cost of the simulator with zeros of its own on the windows for fitting, shape (n_joints,)."""
+        z = self.residual(self.plant, self.train)
+        most = documented(self.plant)[1][ZERO, 0] / self.floor
+        return loss(z - np.clip(np.median(z, axis=(0, 1)), -most, most)).mean(axis=(0, 1))
 
     @property
     def count(self) -> int:
@@ -136,11 +138,12 @@ class Contest:
         pieces = self.held_out
         return len(pieces) * pieces.scored * pieces.real.shape[2]
 
-    def fit(self, *, make: bool = False) -> Fit:
+    def fit(self, *, make: bool = False, late: bool = False) -> Fit:
         """Fit the physics joint by joint, and return how well it does on the windows for checking.
 
         Args:
-            make: Only as far as servos of one make differ, which costs as it does in the diagnosis.
+            make: Only as far as servos of one make differ, which costs as it does in the diagnosis,
+            late: but with any delay.
         """
         joints = self.log.pieces.real.shape[2]
         low, high = documented(self.plant)
@@ -148,6 +151,7 @@ class Contest:
         x = np.clip(np.zeros((len(EFFECTS), joints)), low, high)
         pieces, probe = self.train, self._probe(high, joints)
         tight = self._make(high) if make else np.full((len(EFFECTS), 1), np.inf)
+        tight[DELAY] = np.inf if late else tight[DELAY]
 
         def total(x: np.ndarray, z: np.ndarray) -> np.ndarray:
             return loss(z).sum(axis=(0, 1)) + ((x / tight) ** 2).sum(axis=0)

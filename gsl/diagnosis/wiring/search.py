@@ -19,7 +19,7 @@ from gsl.diagnosis.wiring.physics import DELAY, KD, KP, Contest, Fit, documented
 from gsl.errors import GslError
 
 NOISE_COST = SearchSettings.noise_cost
-WINDOWS = LogSettings(  # short ones: a log whose rate is five times too high has no longer ones
+WINDOWS = LogSettings(  # short ones: a log whose rate is four times too high has no longer ones
     warm_up=0.3,
     scored=0.4,
     floor=FloorSettings(rests=10**9, unsteady=np.inf),  # every joint has its own floor
@@ -36,7 +36,8 @@ ALL = 0.7  # share of the joints in question, from which on a fault of timing is
 LEADS = 3  # that are fitted in a round
 ROUNDS = 6
 EVEN = 1.1  # factor on the cost of what is left within which another kind of fault does as well
-WHOLE = 0.04  # of a row, by which a delay may be off a whole number of rows
+LATE = 0.3  # of a row, from which on a delay may be that of a whole row
+WHOLE = 0.07  # of a row, by which a delay may be off a whole number of rows: gains of one make shift it by as much
 AGREE = 0.1  # of a row, by which delays of the joints may differ then
 
 
@@ -75,7 +76,7 @@ class Search:
                 break
             stands.append(stand)
             search, fit = search._mended(stand.fault), stand.after
-        return Wiring(tuple(stands), first, fit, _rows_late(fit, search.batch.control_period))
+        return Wiring(tuple(stands), first, fit, search._rows_late(fit))
 
     def _mended(self, fault: Fault) -> Search:
         batch, plant, floor = fault.mend(self.batch), fault.change(self.plant), fault.refloor(self.floor)
@@ -107,6 +108,20 @@ class Search:
             if standing := [pair for pair in standing if not self._is_physics(*pair)]:
                 return _best(standing, fit)
         return None
+
+    def _rows_late(self, fit: Fit) -> int:
+        """Return by how many whole rows all joints' commands act later, 0 if by none or by no whole number."""
+        period = self.batch.control_period
+        if np.median(fit.parameters[DELAY]) < LATE * period:
+            return 0
+        precise = self._contest().fit(make=True, late=True)
+        delays, clear = precise.parameters[DELAY] / period, precise.rms < BAD
+        if clear.sum() < max(1, HALF * len(delays)):
+            return 0
+        middle = float(np.median(delays[clear]))
+        apart = float(np.median(np.abs(delays[clear] - middle)))
+        rows = round(middle)
+        return rows if rows >= 1 and abs(middle - rows) < WHOLE and apart < AGREE else 0
 
     def _is_physics(self, fault: Fault, after: Fit) -> bool:
         """Whether gains are such as the documented range of their effect holds."""
@@ -245,10 +260,12 @@ class Search:
 
 
 def _best(standing: Sequence[tuple[Fault, Fit]], before: Fit) -> Stand:
-    """Return the fault that leaves least, with those of other kinds that leave hardly more."""
+    """Return the fault that leaves least, with those of other kinds or sides that leave hardly more."""
     best, after = min(standing, key=lambda pair: float(pair[1].cost.sum()))
     rivals = tuple(
-        fault for fault, other in standing if fault.kind != best.kind and other.cost.sum() < EVEN * after.cost.sum()
+        fault
+        for fault, other in standing
+        if (fault.kind, fault.side) != (best.kind, best.side) and other.cost.sum() < EVEN * after.cost.sum()
     )
     return Stand(best, before, after, rivals)
 
@@ -260,15 +277,3 @@ def _stands(fault: Fault, before: Fit, after: Fit) -> bool:
     excess = float((before.cost[own] - NOISE_COST).sum())
     gone = float((before.cost[own] - after.cost[own]).sum()) / excess if excess > 0.0 else 0.0
     return left <= HALF and gone >= SHARE
-
-
-def _rows_late(fit: Fit, period: float) -> int:
-    """Return by how many whole rows all joints' commands act later, 0 if by none or by no whole number."""
-    delays = fit.parameters[DELAY] / period
-    clear = fit.rms < BAD
-    if clear.sum() < max(1, 0.5 * len(delays)):
-        return 0
-    middle = float(np.median(delays[clear]))
-    apart = float(np.median(np.abs(delays[clear] - middle)))
-    rows = round(middle)
-    return rows if rows >= 1 and abs(middle - rows) < WHOLE and apart < AGREE else 0

@@ -12,7 +12,7 @@ from gsl.storage.signals.finding import Finding, Place, count, per_joint
 FAR = 0.02  # least size [rad]: below, noise of coarse encoders comes to as much
 BEYOND = 15.0  # times the usual distance from what the neighbours say, and
 AROUND = 6.0  # times the largest one nearby
-BESIDE = 3.0  # times the longest step of its neighbours
+BESIDE = 2.0  # times the longest step of its neighbours
 NEAR = 10  # rows on either side that are nearby
 RARE = 0.02  # share of the rows above which it is how the channel is, and no glitch
 

@@ -1,0 +1,100 @@
+"""The audit of wiring: each kind of fault is named with its joints, and physics is never taken for one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from blind_arm import arm
+
+from gsl.core.plant import Plant, nominal
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.diagnosis.log.records import slope
+from gsl.diagnosis.wiring.audit import Audit, audit
+from gsl.diagnosis.wiring.relation import relate
+from gsl.policies.excitation import Excitation
+from gsl_benchmarks.blind.jitter import jittered
+from gsl_benchmarks.blind.programmes import drawn_programmes
+from gsl_benchmarks.blind.same import play_same
+from gsl_benchmarks.blind.wiring import KINDS, change, wired
+
+pytestmark = pytest.mark.slow
+
+PERIOD, STEP = 0.02, 0.002
+MOTIONS = ("steps_small", "steps_large", "triangle_medium", "triangle_fast", "chirp")
+PLAN = drawn_programmes(
+    Excitation(robot="blind_arm.arm", motions=MOTIONS, repeats=2, duration=3.5), 1, PERIOD, np.random.default_rng(0)
+)[0]  # fmt: skip
+
+
+def logged(commands: Sequence[np.ndarray] = PLAN.commands, effects: Mapping[str, Any] | None = None) -> Batch:
+    """What one robot of the arm's make logs."""
+    rng = np.random.default_rng(5)
+    robot = jittered(nominal(arm()), rng)
+    episodes = []
+    played = play_same(robot, effects or {}, None, commands, [one[0] for one in commands], PERIOD)
+    for asked, told in zip(commands, played, strict=True):
+        position = told + 1.5e-3 * rng.standard_normal(told.shape)
+        episodes.append(Trajectory(PERIOD * np.arange(len(told)), asked, position, slope(position, PERIOD)))
+    names = [{"policy": name} for name in PLAN.names]
+    return Batch(tuple(episodes), robot.robot.controlled, PERIOD, {"episodes": names})
+
+
+def audited(log: Batch, plant: Plant | None = None) -> Audit:
+    return audit(log, plant or nominal(arm()), STEP, lambda: None)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_fault_is_named_with_its_joints(kind: str) -> None:
+    case = wired(kind, PLAN.commands, logged, nominal(arm()), np.random.default_rng(3))
+    found = audited(case.log, case.plant)
+    assert found.verdict == "wiring" and found.spoils
+    named = {joint for one in found.document()["findings"] if one["kind"] == kind for joint in one["joints"]}
+    assert named == set(case.joints)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {}, {"zero_offset": {"offset": np.deg2rad(1.0), "joints": "elbow"}}, {"servo_gain": {"kp": 0.5}},
+        {"servo_gain": {"kp": 0.35, "joints": "shoulder"}}, {"command_latency": {"delay": 0.013}},
+        {"target_smoothing": {"time_constant": 0.04}}, {"deadband": {"width": 0.03}}, {"torque_limit": {"factor": 0.3}},
+        {"coulomb_friction": {"torque": 0.3}}, {"viscous_friction": {"coefficient": 0.8}},
+        {"armature": {"inertia": 0.03}},
+        {"joint_limit": {"reduction": 0.17, "side": "both"}}, {"gravity_tilt": {"roll": 0.15}},
+        {"quantisation": {"step": 0.01}},
+    ],
+    ids=lambda effects: "_".join(effects) or "nothing",
+)  # fmt: skip
+def test_physics_is_no_wiring(effects: Mapping[str, Any]) -> None:
+    found = audited(logged(effects=effects))
+    assert (found.verdict, found.document()["findings"]) == ("clean", [])
+
+
+def test_commands_that_are_nearly_equal_are_no_exchange() -> None:
+    alike = [np.column_stack([one[:, 0], one[:, 0] + 0.01]) for one in PLAN.commands]
+    log = logged(alike)
+    assert (relate(log.episodes, PERIOD).source == [0, 1]).all()
+    assert audited(log).verdict == "clean"
+
+
+def test_a_row_late_is_as_well_a_latency_and_is_said_to_be() -> None:
+    log = logged(effects={"command_latency": {"delay": PERIOD}})
+    late = change(logged(), action=lambda x: np.vstack([x[1:], x[-1:]]))
+    for one in (log, late):
+        found = audited(one)
+        assert found.verdict == "unclear" and not found.spoils
+        assert "latency of 20 ms" in found.summary
+
+
+def test_two_faults_are_both_named() -> None:
+    log = change(logged(), position=lambda x: x * [1.0, -1.0], action=lambda x: np.vstack([x[:1], x[:-1]]))
+    assert {one["kind"] for one in audited(log).document()["findings"]} == {"sign", "shift"}
+
+
+def test_the_order_of_the_joints_in_the_log_changes_nothing() -> None:
+    log = change(logged(), position=lambda x: x * [1.0, -1.0])
+    turned = log.only(tuple(reversed(log.joints)))
+    assert [one["joints"] for one in audited(turned).document()["findings"]] == [["elbow"]]
