@@ -16,7 +16,8 @@ pytestmark = pytest.mark.slow
 
 SIM = ("sim.robot=blind_arm.arm", "sim.floating=false")
 PLAYED = (
-    "world=nao_ideal", "world.robot=blind_arm.arm", "world.floating=false", "task=excite", "policy.duration=3.5", "workers=1",
+    "world=nao_ideal", "world.robot=blind_arm.arm", "world.floating=false",
+    "task=excite", "policy.duration=3.5", "workers=1",
     "policy.motions=[steps_large,triangle_fast,chirp]",
 )  # fmt: skip
 
