@@ -63,7 +63,7 @@ class Audit:
     @property
     def spoils(self) -> bool:
         """Whether a diagnosis would take for physics what is none."""
-        replayed = [one for one in self.signals if one.kind not in BESIDE]
+        replayed = [one for one in self.signals if one.kind not in BESIDE and not _of_velocity(one)]
         return bool(replayed or self.seen or (self.wiring and self.wiring.stands))
 
     @property
@@ -115,7 +115,7 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
     batch = _in_order(batch, robot.controlled)
     signals = check_signals(batch.episodes, batch.joints)
     mended = replace(batch, episodes=tuple(mend_signals(batch.episodes)))
-    spoiled = {joint for one in signals if one.kind in SPOILED for joint in one.joints}
+    spoiled = {joint for one in signals if one.kind in SPOILED and not _of_velocity(one) for joint in one.joints}
     excluded = frozenset(k for k, joint in enumerate(batch.joints) if joint in spoiled)
     wiring, seen, remarks = None, list[Fault](), list[str]()
     if on_ground(batch):
@@ -139,6 +139,11 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
         batch.joints, batch.control_period, tuple(signals), wiring, tuple(seen), tuple(remarks),
         time.perf_counter() - begin,
     )  # fmt: skip
+
+
+def _of_velocity(finding: Finding) -> bool:
+    """Whether velocities alone are wrong: positions are compared, and a replay settles before."""
+    return bool(finding.columns) and all(column.startswith("velocity.") for column in finding.columns)
 
 
 def take_part(batch: Batch) -> Batch:
