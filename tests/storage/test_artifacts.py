@@ -223,7 +223,7 @@ def test_a_full_or_read_only_folder_is_one_line(out: Path, number: int) -> None:
 
 def test_a_folder_below_a_file_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(GslError, match="cannot be written"):
+    with pytest.raises(GslError, match="there can be no folder here"):
         built(Doubling(), tmp_path / "file" / "runs" / "doubling")
 
 
