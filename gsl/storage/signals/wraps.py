@@ -50,6 +50,8 @@ def _wraps(episodes: Sequence[Trajectory], signal: str) -> Iterator[tuple[Place,
             values = getattr(episode, signal)[:, k]
             other = episode.action[:, k] if signal == "position" else episode.position[:, k]
             turn, rows = _jumps(values)
+            if signal == "action" and turn != TURN:  # a command may jump from one end of its motion to the other
+                continue
             for row in rows:
                 if not _asked_for(values, other, row, turn):
                     yield Place(k, number, row + 1), turn
