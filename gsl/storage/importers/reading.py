@@ -97,20 +97,12 @@ def _episodes(place: Place, mapping: LogMapping, tables: Mapping[str, Table]) ->
         name = place.name if key is None else f"{place.name}/{key}"
         signals, dropped = {}, 0
         for signal, one in named.items():
-            if signal == "velocity" and _is_empty(found[signal], values[one.file], rows[one.file]):
-                continue
             reading = _Reading(signal, one, found[signal], tables[one.file], rows[one.file], mapping)
             if one.optional and reading.is_empty(values[one.file]):
                 continue
             series, twice = reading.series(values[one.file], tuple(joints))
             signals[signal], dropped = series, max(dropped, twice)
         yield Raw(name, tuple(joints), signals, own, dropped)
-
-
-def _is_empty(found: Sequence[Reference], values: Mapping[str, np.ndarray], rows: np.ndarray) -> bool:
-    """Whether a signal has no value in any row: velocities are then derived, as if there were no such column."""
-    columns = [values[one.column][rows] for one in found]
-    return all(one.dtype.kind == "f" and bool(np.isnan(one).all()) for one in columns)
 
 
 def _tables(place: Place, mapping: LogMapping, memory: float) -> dict[str, Table]:
