@@ -28,7 +28,7 @@ from gsl_benchmarks.blind.jitter import NOISE, jittered
 from gsl_benchmarks.blind.make import START
 from gsl_benchmarks.blind.programmes import Programme, drawn_programmes
 from gsl_benchmarks.blind.same import play_same
-from gsl_benchmarks.blind.wiring import KINDS, wired
+from gsl_benchmarks.blind.wiring import KINDS, wire
 
 CLEAN, PHYSICS = "clean", "physics"
 SHARES = (0.1, 1.0)  # of its documented range that an effect has
@@ -81,7 +81,7 @@ def _case(frozen: bytes, slot: _Slot) -> dict[str, Any]:
     """Make a case, audit it, and return truth and answer."""
     plant, step, period, programme, seed = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
     rng = np.random.default_rng([seed, slot.number])
-    effects = _drawn_effect(plant, rng) if slot.beside else {}
+    effects = _draw_effect(plant, rng) if slot.beside else {}
     robot, noise, start_rng = (
         jittered(plant, rng),
         float(rng.uniform(*NOISE)),
@@ -89,10 +89,10 @@ def _case(frozen: bytes, slot: _Slot) -> dict[str, Any]:
     )
 
     def play(commands: Sequence[np.ndarray]) -> Batch:
-        return _logged(robot, effects, programme, commands, period, noise, start_rng)
+        return _record(robot, effects, programme, commands, period, noise, start_rng)
 
     if slot.kind in KINDS:
-        case = wired(slot.kind, programme.commands, play, plant, rng)
+        case = wire(slot.kind, programme.commands, play, plant, rng)
         log, against, kind, joints = case.log, case.plant, case.kind, case.joints
     else:
         log, against, kind, joints = play(programme.commands), plant, "", ()
@@ -111,12 +111,12 @@ def _case(frozen: bytes, slot: _Slot) -> dict[str, Any]:
     }
 
 
-def _drawn_effect(plant: Plant, rng: np.random.Generator) -> dict[str, Any]:
+def _draw_effect(plant: Plant, rng: np.random.Generator) -> dict[str, Any]:
     dial = drawn(str(rng.choice(visible())), plant.robot, rng)
     return {dial.effect: dial.entry(float(rng.uniform(*SHARES)))}
 
 
-def _logged(
+def _record(
     robot: Plant, effects: Mapping[str, Any], programme: Programme, commands: Sequence[np.ndarray], period: float,
     noise: float, rng: np.random.Generator,
 ) -> Batch:  # fmt: skip

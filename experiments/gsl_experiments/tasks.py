@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 
 from gsl.core.console import Console, Silent
 from gsl.errors import GslError
-from gsl.rollout.cluster import chosen_cluster
+from gsl.rollout.cluster import find_cluster
 from gsl.rollout.parallel import Workers, arriving
 from gsl.stages.iterate import Iterate
 from gsl.storage.artifact import Artifact, collect_links, note
@@ -39,7 +39,7 @@ def in_order(
     study: Study, folder: Path, trials: Mapping[int, Sequence[Any]], console: Console
 ) -> Iterator[tuple[Any, list[Any]]]:
     """Yield each part of all trials with its results: one after the other, or on a cluster trials side by side."""
-    if chosen_cluster() is not None:
+    if find_cluster() is not None:
         yield from side_by_side(study, folder, trials, -1, console)
         return
     for item in (item for items in trials.values() for item in items):

@@ -17,7 +17,7 @@ from gsl.core.interruption import hold_interrupts
 from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
-from gsl.policies.sb3 import Sb3Policy, action_weights, flat_weights, load, put_weights, told_algorithm
+from gsl.policies.sb3 import Sb3Policy, action_weights, flat_weights, load, put_weights, read_algorithm
 from gsl.policies.wired import WiredEnv
 
 
@@ -66,10 +66,10 @@ class Sb3:
         spaces = trained.observation_space, trained.action_space
         layout = simulator.layout
 
-        def wired() -> gymnasium.Env:
+        def make_env() -> gymnasium.Env:
             return WiredEnv(simulator.env(), policy.wiring, layout, spaces)
 
-        env: Any = DummyVecEnv(self.envs * [wired])
+        env: Any = DummyVecEnv(self.envs * [make_env])
         if policy.normalise:
             env = VecNormalize.load(policy.normalise, env)
             env.training = False
@@ -84,7 +84,7 @@ class Sb3:
 
         try:
             model = load(
-                Path(policy.file), policy.algorithm or told_algorithm(Path(policy.file)), env=env, **self.settings
+                Path(policy.file), policy.algorithm or read_algorithm(Path(policy.file)), env=env, **self.settings
             )
             model.set_logger(Logger(None, []))  # the library's own would leave a folder behind
             model.set_random_seed(seed)

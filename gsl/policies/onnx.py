@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,13 +10,13 @@ import numpy as np
 
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.policies.outside import File, Joints, Network, Outside, Ports, files_of, read_once
+from gsl.policies.outside import File, Joints, Network, OutsideFile, Ports, read_once
 from gsl.policies.wired import Answer
 from gsl.policies.wiring import Wiring
 
 
 @component
-class OnnxPolicy(Outside):
+class OnnxPolicy(OutsideFile):
     """A graph whose first input is the observation, shape (1, n_inputs), and whose first output are the outputs.
 
     Further inputs are a memory: each is zero at first, and then what the further output in its place was.
@@ -26,16 +25,6 @@ class OnnxPolicy(Outside):
     file: File
     wiring: Annotated[Wiring, setting("what it observes, and what its outputs do")] = field(default_factory=Wiring)
     joints: Joints = ()
-
-    @property
-    def name(self) -> str:
-        """What errors call the network."""
-        return self.file
-
-    @property
-    def read_files(self) -> Mapping[str, Path]:
-        """What it is read from."""
-        return files_of(file=self.file)
 
     def network(self) -> Network:
         """Read the graph, once a process."""

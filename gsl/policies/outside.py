@@ -8,6 +8,7 @@ actions are choices there are none. A format whose weights can be changed has th
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
@@ -48,24 +49,24 @@ class Network(Protocol):
         """Return it at the beginning of an episode: a memory is empty."""
 
 
-class Outside:
+class Outside(ABC):
     """What policies of all formats have in common."""
 
     wiring: Wiring
     joints: tuple[str, ...]
 
     @property
+    @abstractmethod
     def name(self) -> str:
         """What errors call the network."""
-        raise NotImplementedError
 
+    @abstractmethod
     def network(self) -> Network:
         """Read the network, once a process.
 
         Raises:
             ConfigError: It is not there, or cannot be read.
         """
-        raise NotImplementedError
 
     def sized(self, layout: Layout) -> Self:
         """Return the policy for a world, its wiring audited.
@@ -102,6 +103,22 @@ class Outside:
         return WiredRun(self.wiring, layout, self.network().begin(), offset if offset.any() else None, self.name)
 
 
+class OutsideFile(Outside):
+    """What policies have in common that are read from a file."""
+
+    file: str
+
+    @property
+    def name(self) -> str:
+        """What errors call the network."""
+        return self.file
+
+    @property
+    def read_files(self) -> Mapping[str, Path]:
+        """What it is read from, by the setting that names each."""
+        return {"file": Path(self.file)}
+
+
 def policy_file(name: str) -> Path:
     """Return the file of a network.
 
@@ -123,8 +140,3 @@ def read_once(reader: Any, name: str) -> Any:
 @lru_cache(maxsize=4)
 def _read(reader: Any, path: Path, changed: int) -> Any:
     return reader(path)
-
-
-def files_of(**names: str | None) -> Mapping[str, Path]:
-    """Return the files that a policy is read from, by the setting that names each."""
-    return {key: Path(name) for key, name in names.items() if name is not None}

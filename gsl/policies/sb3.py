@@ -19,7 +19,7 @@ import numpy as np
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.policies.outside import File, Joints, Outside, Ports, files_of, read_once
+from gsl.policies.outside import File, Joints, OutsideFile, Ports, read_once
 from gsl.policies.wired import Answer, WiredRun
 from gsl.policies.wiring import Wiring
 
@@ -34,7 +34,7 @@ _TELLING: Mapping[str, Algorithm] = {
 
 
 @component
-class Sb3Policy(Outside):
+class Sb3Policy(OutsideFile):
     """Acts deterministically, as `predict(observation, deterministic=True)` does."""
 
     file: File
@@ -44,14 +44,9 @@ class Sb3Policy(Outside):
     joints: Joints = ()
 
     @property
-    def name(self) -> str:
-        """What errors call the network."""
-        return self.file
-
-    @property
     def read_files(self) -> Mapping[str, Path]:
         """What it is read from."""
-        return files_of(file=self.file, normalise=self.normalise)
+        return {**super().read_files, **({"normalise": Path(self.normalise)} if self.normalise else {})}
 
     def network(self) -> Sb3Network:
         """Read the zip, once a process."""
@@ -94,7 +89,7 @@ class _Reader:
     normalise: str | None
 
     def __call__(self, path: Path) -> Sb3Network:
-        algorithm = self.algorithm or told_algorithm(path)
+        algorithm = self.algorithm or read_algorithm(path)
         return Sb3Network(load(path, algorithm), Path(self.normalise) if self.normalise else None)
 
 
@@ -158,7 +153,7 @@ class Sb3Network:
         return np.atleast_1d(np.asarray(action, dtype=float))
 
 
-def told_algorithm(path: Path) -> str:
+def read_algorithm(path: Path) -> str:
     """Return the algorithm that wrote a file, without running what is in it.
 
     Raises:

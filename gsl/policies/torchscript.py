@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,13 +11,13 @@ import numpy as np
 
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
-from gsl.policies.outside import File, Joints, Network, Outside, Ports, files_of, read_once
+from gsl.policies.outside import File, Joints, Network, OutsideFile, Ports, read_once
 from gsl.policies.wired import Answer
 from gsl.policies.wiring import Wiring
 
 
 @component
-class TorchScriptPolicy(Outside):
+class TorchScriptPolicy(OutsideFile):
     """A module that maps observations, shape (1, n_inputs), to outputs, shape (1, n_outputs), in single precision.
 
     One with a memory has a method `reset`, which is called at the beginning of an episode.
@@ -27,16 +26,6 @@ class TorchScriptPolicy(Outside):
     file: File
     wiring: Annotated[Wiring, setting("what it observes, and what its outputs do")] = field(default_factory=Wiring)
     joints: Joints = ()
-
-    @property
-    def name(self) -> str:
-        """What errors call the network."""
-        return self.file
-
-    @property
-    def read_files(self) -> Mapping[str, Path]:
-        """What it is read from."""
-        return files_of(file=self.file)
 
     def network(self) -> Network:
         """Read the module, once a process."""

@@ -105,7 +105,7 @@ def command(lines: str) -> Markup | None:
     return _fill("command", lines.splitlines()) if lines else None
 
 
-def folded(title: str, *parts: Part) -> Markup:
+def fold(title: str, *parts: Part) -> Markup:
     """Return parts that are shown when their title is chosen."""
     return _fill("folded", title, join(*parts))
 

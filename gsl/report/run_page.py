@@ -13,7 +13,7 @@ from gsl.report.footfalls import Walk, footfall_figure
 from gsl.report.joint_trace import Traces, joint_trace_figure
 from gsl.report.learning_curve import Search, learning_curve_figure
 from gsl.report.page import page
-from gsl.report.parts import Part, choice, command, element, facts, folded, prose, section, table
+from gsl.report.parts import Part, choice, command, element, facts, fold, prose, section, table
 from gsl.report.svg import WIDTH, svg
 from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.origin import Origin, origin
@@ -104,7 +104,7 @@ def describe_origin(how: Origin | None) -> list[Part]:
     rows += [(f"built {one.role}", one.path, one.hash[:SHORT]) for one in how.links]
     typed = not how.command.endswith(")") or how.command.startswith("gsl.")
     again = command(how.command) if typed else element("p", f"A part of {how.command.partition(' (')[0]}.")
-    settings = folded("all settings", element("pre", element("code", how.settings)))
+    settings = fold("all settings", element("pre", element("code", how.settings)))
     return [
         section(
             "Lineage",
@@ -116,7 +116,7 @@ def describe_origin(how: Origin | None) -> list[Part]:
 
 
 def _fold_long(shown: Markup, rows: int) -> Markup:
-    return shown if rows <= LONG else folded(f"all {rows}", shown)
+    return shown if rows <= LONG else fold(f"all {rows}", shown)
 
 
 def curves(searches: Sequence[Search], unit: str) -> Markup | None:

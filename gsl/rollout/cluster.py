@@ -162,7 +162,7 @@ def executing(cluster: Cluster | None) -> Iterator[None]:
             cluster.close()
 
 
-def chosen_cluster() -> Cluster | None:
+def find_cluster() -> Cluster | None:
     """Return the cluster that jobs go to, if there is one."""
     return _chosen.get()
 

@@ -21,7 +21,7 @@ from gsl.core.own_code import name_failures
 from gsl.core.setting import setting
 from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
-from gsl.rollout.cluster import chosen_cluster
+from gsl.rollout.cluster import find_cluster
 from gsl.rollout.rollout import Scenario, rollout
 
 TRIES = 3
@@ -83,7 +83,7 @@ def arriving(
     """Yield (index of job, `function(pickled shared, job)`) of all jobs, as they end."""
     if not jobs:
         return
-    cluster = chosen_cluster()
+    cluster = find_cluster()
     frozen = _pickle(shared, alone=workers == 1 and cluster is None)
     if cluster is not None:
         for index, result in cluster.arriving(function, frozen, jobs, threads(workers)):

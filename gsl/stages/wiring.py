@@ -43,7 +43,7 @@ class WiringAudit:
         assert isinstance(policy, Outside), "checked before"
         findings = [*audit(policy.wiring, policy.network().ports, layout)]
         if not any(finding.refused for finding in findings):
-            findings += _tried(self.world, policy)
+            findings += _try_out(self.world, policy)
         console.table("what the network sees", *_observation(policy.wiring, layout))
         console.table("what its outputs do", *_action(policy.wiring, layout))
         rows = [(one.verdict, one.what, f"{one.setting}: {one.line}".removeprefix(": ")) for one in findings]
@@ -80,7 +80,7 @@ def _few(values: np.ndarray) -> str:
     return f"{values[0]:g}" if np.ptp(values) == 0.0 else ", ".join(f"{value:g}" for value in values)
 
 
-def _tried(world: World, policy: Outside) -> Iterator[Finding]:
+def _try_out(world: World, policy: Outside) -> Iterator[Finding]:
     """Yield what is seen at the beginning of an episode: ranges of the pose, of what is seen, and of what is done."""
     layout, env = world.layout, world.make()
     try:

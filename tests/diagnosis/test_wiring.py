@@ -18,7 +18,7 @@ from gsl.policies.excitation import Excitation
 from gsl_benchmarks.blind.jitter import jittered
 from gsl_benchmarks.blind.programmes import drawn_programmes
 from gsl_benchmarks.blind.same import play_same
-from gsl_benchmarks.blind.wiring import KINDS, change, wired
+from gsl_benchmarks.blind.wiring import KINDS, change, wire
 
 pytestmark = pytest.mark.slow
 
@@ -48,7 +48,7 @@ def audited(log: Batch, plant: Plant | None = None) -> Audit:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fault_is_named_with_its_joints(kind: str) -> None:
-    case = wired(kind, PLAN.commands, logged, nominal(arm()), np.random.default_rng(3))
+    case = wire(kind, PLAN.commands, logged, nominal(arm()), np.random.default_rng(3))
     found = audited(case.log, case.plant)
     assert found.verdict == "wiring" and found.spoils
     named = {joint for one in found.document()["findings"] if one["kind"] == kind for joint in one["joints"]}

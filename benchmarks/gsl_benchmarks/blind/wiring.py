@@ -41,7 +41,7 @@ Play = Callable[[Sequence[np.ndarray]], Batch]
 """What a robot logs when its servos get these commands, each of shape (T, n_joints)."""
 
 
-def wired(kind: str, commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.random.Generator) -> Wired:
+def wire(kind: str, commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.random.Generator) -> Wired:
     """Return a log with a fault.
 
     Args:
@@ -81,18 +81,18 @@ def _some(batch: Batch, rng: np.random.Generator, count: int) -> list[int]:
 
 
 def _columns(columns: Sequence[int], how: Arrays) -> Arrays:
-    def changed(x: np.ndarray) -> np.ndarray:
+    def alter(x: np.ndarray) -> np.ndarray:
         x[:, list(columns)] = how(x[:, list(columns)])
         return x
 
-    return changed
+    return alter
 
 
 def _on_a_side(batch: Batch, how: Arrays, rng: np.random.Generator) -> Batch:
     return change(batch, action=how) if rng.random() < 0.5 else change(batch, position=how)
 
 
-def _permuted(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.random.Generator) -> Wired:
+def _permute(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.random.Generator) -> Wired:
     log = play(commands)
     chosen = _some(log, rng, int(rng.choice([2, 3])))
     order = np.arange(len(log.joints))
@@ -218,7 +218,7 @@ def _copy(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.rand
 
 
 KINDS: Mapping[str, Callable[[Sequence[np.ndarray], Play, Plant, np.random.Generator], Wired]] = {
-    "permuted": _permuted, "sign": _sign, "scale": _scale, "offset": _offset, "gains": _gains, "rate": _rate,
+    "permuted": _permute, "sign": _sign, "scale": _scale, "offset": _offset, "gains": _gains, "rate": _rate,
     "hold": _hold, "shift": _shift, "wrap": _wrap, "glitch": _glitch, "frozen": _frozen, "stale": _stale,
     "copy": _copy,
 }  # fmt: skip

@@ -119,7 +119,7 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
     excluded = frozenset(k for k, joint in enumerate(batch.joints) if joint in spoiled)
     wiring, seen, remarks = None, list[Fault](), list[str]()
     if on_ground(batch):
-        seen = _seen(mended, replace(plant, robot=robot))
+        seen = _find_seen(mended, replace(plant, robot=robot))
         remarks.append("On the ground nothing is replayed: what only a replay shows was not looked for.")
     elif len(excluded) == len(batch.joints):
         remarks.append("No joint is left to compare with the simulator.")
@@ -167,7 +167,7 @@ def _in_order(batch: Batch, joints: Sequence[str]) -> Batch:
     return batch if batch.joints == tuple(joints) else batch.only(joints)
 
 
-def _seen(batch: Batch, plant: Plant) -> list[Fault]:
+def _find_seen(batch: Batch, plant: Plant) -> list[Fault]:
     """Return exchanged joints, signs and units that are seen in how positions follow commands."""
     for fault in permutations(batch):
         return [fault]

@@ -51,11 +51,11 @@ class Fault:
 def change_log(batch: Batch, *, action: Change | None = None, position: Change | None = None) -> Batch:
     """Return a log with other commands and positions, each a function of arrays of shape (T, n_joints)."""
 
-    def changed(one: Trajectory) -> Trajectory:
+    def alter(one: Trajectory) -> Trajectory:
         commands = action(one.action) if action else one.action
         return replace(one, action=commands, position=position(one.position) if position else one.position)
 
-    return replace(batch, episodes=tuple(changed(one) for one in batch.episodes))
+    return replace(batch, episodes=tuple(alter(one) for one in batch.episodes))
 
 
 def rescale(

@@ -15,7 +15,7 @@ from gsl.diagnosis.settings import FloorSettings, LogSettings, SearchSettings
 from gsl.diagnosis.wiring.fault import BOTH, Fault, gains, permute, rescale
 from gsl.diagnosis.wiring.options import Spread, by_range, by_relation, find_beyond, gain_grid, permutations, timings
 from gsl.diagnosis.wiring.outcome import Stand, Wiring
-from gsl.diagnosis.wiring.physics import DELAY, KD, KP, Contest, Fit, documented
+from gsl.diagnosis.wiring.physics import DELAY, KD, KP, Contest, Fit, find_documented
 from gsl.errors import GslError
 
 NOISE_COST = SearchSettings.noise_cost
@@ -75,15 +75,15 @@ class Search:
             if stand is None:
                 break
             stands.append(stand)
-            search, fit = search._mended(stand.fault), stand.after
+            search, fit = search._mend(stand.fault), stand.after
         return Wiring(tuple(stands), first, fit, search._rows_late(fit))
 
-    def _mended(self, fault: Fault) -> Search:
+    def _mend(self, fault: Fault) -> Search:
         batch, plant, floor = fault.mend(self.batch), fault.change(self.plant), fault.refloor(self.floor)
         return replace(self, batch=batch, plant=plant, floor=floor)
 
     def _contest(self, fault: Fault | None = None) -> Contest:
-        mended = self._mended(fault) if fault else self
+        mended = self._mend(fault) if fault else self
         log = cut_motions(mended.batch, mended.plant)
         if not len(log.train) or not len(log.held_out):
             raise GslError("too short for a window to fit and one to check")
@@ -127,7 +127,7 @@ class Search:
         """Whether gains are such as the documented range of their effect holds."""
         if fault.kind != "gains":
             return False
-        low, high = (bound[[KP, KD]] for bound in documented(self.plant))
+        low, high = (bound[[KP, KD]] for bound in find_documented(self.plant))
         own = (
             np.log(np.array([fault.value["kp"], fault.value["kd"]])) + after.parameters[[KP, KD]][:, list(fault.joints)]
         )
@@ -235,9 +235,9 @@ class Search:
             drop = sum(float(base[k] - cost[k]) for k in better if (cost := turned[k]) is not None)
             yield drop, rescale("sign", better, BOTH, minus, nothing, {})
         if len(bad) > 1:
-            yield from self._exchanged(list(bad), base)
+            yield from self._propose_exchange(list(bad), base)
 
-    def _exchanged(self, bad: list[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
+    def _propose_exchange(self, bad: list[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
         """Yield the exchange of joints in question that fits best, from how well each joint replays each channel."""
         matrix = np.diag(base[bad] * PROMISING)
         for turn in range(1, len(bad)):

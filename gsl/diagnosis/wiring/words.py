@@ -22,7 +22,7 @@ def describe(fault: Fault, joints: Sequence[str], period: float) -> str:
         period: Control period of the log [s].
     """
     sentence: str = {
-        "permuted": _permuted, "sign": _sign, "scale": _scale, "offset": _offset, "gains": _gains, "rate": _rate,
+        "permuted": _say_permutation, "sign": _sign, "scale": _scale, "offset": _offset, "gains": _gains, "rate": _rate,
         "hold": _hold, "shift": _shift,
     }[fault.kind](fault, joints, period)  # fmt: skip
     return f"{sentence[0].upper()}{sentence[1:]}."
@@ -62,7 +62,7 @@ def list_joints(fault: Fault, joints: Sequence[str]) -> str:
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def _permuted(fault: Fault, joints: Sequence[str], period: float) -> str:
+def _say_permutation(fault: Fault, joints: Sequence[str], period: float) -> str:
     order = fault.value["order"]
     places = [f"{joints[order[k]]} holds {joints[k]}" for k in fault.joints[:LISTED]]
     more = f" and {len(fault.joints) - LISTED} more" if len(fault.joints) > LISTED else ""

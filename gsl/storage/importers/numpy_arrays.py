@@ -52,7 +52,7 @@ class NpyFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.fields: Mapping[str, Any] = {}
-        self.shapes: Shapes = {file.name.removesuffix(END): _declared(file) for file in npy_files(path)}
+        self.shapes: Shapes = {file.name.removesuffix(END): _read_shape(file) for file in npy_files(path)}
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return arrays by name."""
@@ -65,7 +65,7 @@ class NpyColumns:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.fields: Mapping[str, Any] = {}
-        shape, kind = _declared(path)
+        shape, kind = _read_shape(path)
         names = list(kind.names or ())
         if not names and (len(shape) != 2 or shape[1] > COLUMNS):
             raise TrajectoryError(path, f"has the shape {shape}; one npy file is a table of rows and columns")
@@ -83,7 +83,7 @@ def npy_files(folder: Path) -> list[Path]:
     return sorted(file for file in folder.glob(f"*{END}") if file.is_file() and not file.name.startswith("."))
 
 
-def _declared(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
+def _read_shape(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
     try:
         with path.open("rb") as file:
             return _read_header(file)
