@@ -31,3 +31,10 @@ def several(count: int, what: str) -> str:
 def falls(count: int) -> str:
     """Return how often the robot fell."""
     return f"{count or 'no'} fall{'s' * (count != 1)}"
+
+
+def duration(seconds: float) -> str:
+    """Return a time [s] as a person says it."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from gsl.core.setting import component, setting
+from gsl.optimizers.race import Error
 
 Bounds = tuple[np.ndarray, np.ndarray] | None
 
@@ -20,6 +21,7 @@ class CmaEs:
     candidates: Annotated[int, setting("candidates of a generation", ge=4)]
     generations: Annotated[int, setting("generations", ge=1)]
     sigma: Annotated[float, setting("first step size, in units of a parameter's scale", gt=0)] = 0.08
+    race: Error = 0.0
 
     def start(self, parameters: np.ndarray, scale: np.ndarray, seed: int, bounds: Bounds = None) -> CmaEsRun:
         """Return the search at its beginning; bounds, if there are some, are the least and the greatest parameters."""

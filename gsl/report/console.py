@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from gsl.core.console import LiveTable, Progress
 from gsl.core.interruption import checkpoint
 from gsl.core.visible import visible
+from gsl.core.words import duration
 from gsl.report.tables import LineTable, RichLiveTable, draw_table, fitting, total
 
 if TYPE_CHECKING:
@@ -197,14 +198,7 @@ class _Lines:
         if time.monotonic() - self.said >= self.seconds:
             self.said = time.monotonic()
             left = (self.total - self.done) * (self.said - self.begun) / self.done if self.done else 0.0
-            self.say(f"{self.description}: {self.done} of {self.total}, {_duration(left)} left")
-
-
-def _duration(seconds: float) -> str:
-    """Return a time as a person says it."""
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+            self.say(f"{self.description}: {self.done} of {self.total}, {duration(left)} left")
 
 
 def _visible_cells(cells: Sequence[object]) -> list[object]:

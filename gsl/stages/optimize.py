@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from gsl.core.console import Console, Progress
-from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, World
+from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Racing, Search, Task, World
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
@@ -18,7 +18,9 @@ from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.preparation import parents_of, without_margins
 from gsl.optimizers.candidates import check_candidates
 from gsl.optimizers.objective import CVAR, Objective, Quantile, check_objective, objective_values
+from gsl.optimizers.race import Race
 from gsl.policies.policy import size
+from gsl.rollout.estimate import estimate
 from gsl.rollout.parallel import Job, Workers, episodes
 from gsl.rollout.rl_env import GroundedSimulator
 from gsl.rollout.rollout import Scenario
@@ -46,6 +48,8 @@ class Winner(NamedTuple):
 @component
 class Optimize:
     """Candidates are judged by the mean value of `rollouts` episodes each; a killed search goes on where it was.
+
+    With optimizer.race a candidate plays fewer of them once its rank is settled, see gsl/optimizers/race.py.
 
     With objective=cvar they are judged by the mean of their worst episodes (`quantile`). What is reported as a value in
     simulation is the mean of all episodes in any case, so that searches can be compared.
@@ -117,17 +121,20 @@ class Optimize:
         """Yield the best candidate of each generation of a search."""
         search = optimizer.start(first, self.policy.scale, derive_seed(self.seed, self.kind))
         total = optimizer.generations * optimizer.candidates * self.rollouts
+        if log.read(0) is None and (line := estimate(scenario, first, total, self.workers)):
+            console.status(line)
+        error = optimizer.race if isinstance(optimizer, Racing) else 0.0
         with console.progress(total, "optimising in simulation") as progress:
             for index in range(optimizer.generations):
                 candidates = check_candidates(search.ask(), len(first))
                 generation = log.read(index)
                 if generation is None:
-                    generation = self._evaluate(scenario, candidates, index, progress)
+                    generation = self._evaluate(scenario, candidates, index, progress, error)
                     log.append(generation)
                 else:
                     progress.advance(len(candidates) * self.rollouts)
                 search.tell(generation.values)
-                best = int(np.argmax(generation.values))
+                best = generation.winner
                 means = generation.means or generation.values
                 yield Winner(self._record(index, candidates[best], means[best]), generation.values[best])
 
@@ -172,20 +179,28 @@ class Optimize:
         return {"drift": shares}
 
     def _evaluate(
-        self, scenario: Scenario, candidates: Sequence[np.ndarray], index: int, progress: Progress
+        self,
+        scenario: Scenario,
+        candidates: Sequence[np.ndarray],
+        index: int,
+        progress: Progress,
+        error: float = 0.0,
     ) -> Generation:
-        jobs = [
-            Job(candidate, derive_seed(self.seed, self.kind, index, number, rollout))
-            for number, candidate in enumerate(candidates)
-            for rollout in range(self.rollouts)
-        ]
-        done = episodes(scenario, jobs, workers=self.workers, progress=progress)
-        shape = (len(candidates), self.rollouts)
-        values = np.array([episode.value for episode in done]).reshape(shape)
-        falls = np.array([episode.fell for episode in done]).reshape(shape).sum(axis=1)
-        means = values.mean(axis=1).tolist() if self.objective == CVAR else None
-        judged = objective_values(values, self.objective, self.quantile)
-        return Generation(index, judged.tolist(), falls.tolist(), means)
+        rng = np.random.default_rng(derive_seed(self.seed, self.kind, "race", index))
+        race = Race(len(candidates), self.rollouts, error, self._judge, rng)
+        falls = np.zeros(len(candidates), dtype=int)
+        while pairs := race.pairs():
+            jobs = [Job(candidates[n], derive_seed(self.seed, self.kind, index, n, rollout)) for n, rollout in pairs]
+            done = episodes(scenario, jobs, workers=self.workers, progress=progress)
+            np.add.at(falls, [n for n, _ in pairs], [episode.fell for episode in done])
+            race.take([episode.value for episode in done])
+        progress.advance(race.values.size - int(race.played.sum()))
+        means = np.nanmean(race.values, axis=1).tolist() if self.objective == CVAR else None
+        played = race.played.tolist() if error else None
+        return Generation(index, race.worths.tolist(), falls.tolist(), means, played)
+
+    def _judge(self, values: np.ndarray) -> np.ndarray:
+        return objective_values(values, self.objective, self.quantile)
 
     def _record(self, index: int, parameters: np.ndarray, value: float) -> PolicyRecord:
         return record(self.policy, f"generation_{index + 1:02d}", parameters, generation=index + 1, value_sim=value)

@@ -19,12 +19,20 @@ class Generation(NamedTuple):
         values: What the search maximises.
         falls: How often each fell.
         means: Mean values of the episodes, where the search maximises something else.
+        played: Episodes of each, where some stopped early.
     """
 
     number: int
     values: list[float]
     falls: list[int]
     means: list[float] | None = None
+    played: list[int] | None = None
+
+    @property
+    def winner(self) -> int:
+        """Index of the best candidate, which has played all episodes."""
+        whole = [count == max(self.played) for count in self.played] if self.played else [True] * len(self.values)
+        return max((n for n, all_of_them in enumerate(whole) if all_of_them), key=lambda n: self.values[n])
 
 
 class GenerationLog:

@@ -1,0 +1,140 @@
+"""A race: a candidate whose rank among all rollouts is settled plays no more of them.
+
+The idea is Heidrich-Meisner's and Igel's (Hoeffding and Bernstein races in CMA-ES, ICML 2009). Their bounds hold for
+any returns within a range. Twenty walks settle nothing by them: a fall costs fifty times the noise of a walk.
+Here the chance is computed instead. The rollouts that a candidate has not played are drawn from Pólya's urn (Blackwell
+and MacQueen 1973): each is one that it has played, or by a chance of c / (played + c) one of any candidate. So a
+candidate that has not fallen yet may still fall, as often as others did. Bühlmann's credibility (1967) gives c: the
+variance of a candidate's values over that between candidates; the urn's own ball, which stands for the unseen, adds 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Annotated
+
+import numpy as np
+
+from gsl.core.setting import setting
+
+FIRST = 2  # rollouts before the first look: the fewest that show how much a candidate varies
+MOST = 1e6  # share of noise that stands for noise alone
+DRAWS = 1000  # ways in which a generation may end; a chance below their inverse counts as none
+
+Error = Annotated[
+    float,
+    setting("chance that a generation has another winner because candidates stop early; 0: none stops", ge=0, lt=1),
+]
+
+
+class Race:
+    """The rollouts of a generation, in rounds that double what each candidate has played.
+
+    After a round a candidate stops if both hold: it crosses the border of the better half with a chance of at most
+    `error`, and the chances of all that have stopped to be the winner add up to at most this round's share of `error`.
+
+    Args:
+        candidates: How many there are, n.
+        rollouts: How many each plays that does not stop, k.
+        error: Chance of another winner than all rollouts would have; 0 plays all of them in one round.
+        judge: Returns what the search maximises, shape (m,), of episodes' values, shape (m, k).
+        rng: Draws how a generation may end.
+
+    Attributes:
+        values: Of the rollouts, NaN where none was played, shape (n, k).
+    """
+
+    def __init__(
+        self,
+        candidates: int,
+        rollouts: int,
+        error: float,
+        judge: Callable[[np.ndarray], np.ndarray],
+        rng: np.random.Generator,
+    ) -> None:
+        self.values = np.full((candidates, rollouts), np.nan)
+        self._error, self._judge, self._rng = error, judge, rng
+        self._ends = _double(rollouts) if error else [rollouts]
+        self._round, self._chance = 0, 0.0
+        self._racing = np.ones(candidates, dtype=bool)
+
+    @property
+    def played(self) -> np.ndarray:
+        """Rollouts of each candidate so far, shape (n,)."""
+        return np.isfinite(self.values).sum(axis=1)
+
+    @property
+    def worths(self) -> np.ndarray:
+        """What the search maximises, by the rollouts that each candidate has played, shape (n,)."""
+        pairs = zip(self.values, self.played, strict=True)
+        return np.array([float(self._judge(row[None, :count])[0]) for row, count in pairs])
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Return (candidate, rollout) of the next round; none where the race is over."""
+        if self._round == len(self._ends):
+            return []
+        begin = self._ends[self._round - 1] if self._round else 0
+        numbers = range(begin, self._ends[self._round])
+        return [(int(candidate), number) for candidate in np.flatnonzero(self._racing) for number in numbers]
+
+    def take(self, values: Sequence[float]) -> None:
+        """Take the values of the round, in the order of `pairs`."""
+        rows, columns = zip(*self.pairs(), strict=True)
+        self.values[rows, columns] = values
+        self._round += 1
+        if self._round < len(self._ends):
+            self._stop()
+
+    def _stop(self) -> None:
+        ends = draw_ends(self.values, DRAWS, self._rng)
+        worths = self._judge(ends.reshape(-1, ends.shape[2])).reshape(ends.shape[:2])
+        wins = np.bincount(worths.argmax(axis=1), minlength=len(self.values)) / DRAWS
+        ranks = np.argsort(np.argsort(-worths, axis=1, kind="stable"), axis=1)
+        better = (ranks < len(self.values) // 2).mean(axis=0)
+        settled = np.minimum(better, 1.0 - better) <= self._error
+        allowed = self._error * self._round / (len(self._ends) - 1)
+        for candidate in np.argsort(wins, kind="stable"):
+            if self._racing[candidate] and settled[candidate] and self._chance + wins[candidate] <= allowed:
+                self._racing[candidate] = False
+                self._chance += wins[candidate]
+
+
+def draw_ends(values: np.ndarray, draws: int, rng: np.random.Generator) -> np.ndarray:
+    """Return ways in which rollouts may go on, by Pólya's urn, shape (draws, n, k).
+
+    Args:
+        values: Of what was played, NaN for the rest of a row, shape (n, k).
+        draws: How many ways.
+        rng: Draws them.
+    """
+    played = np.isfinite(values).sum(axis=1)
+    every, strange = values[np.isfinite(values)], 1.0 + noise_share(values)
+    ends = np.repeat(values[None], draws, axis=0)
+    for column in range(values.shape[1]):
+        rows = np.flatnonzero(played <= column)
+        shape = (draws, len(rows))
+        others = every[rng.integers(len(every), size=shape)]
+        own = ends[np.arange(draws)[:, None], rows, rng.integers(column, size=shape)]
+        ends[:, rows, column] = np.where(rng.random(shape) * (column + strange) < strange, others, own)
+    return ends
+
+
+def noise_share(values: np.ndarray) -> float:
+    """Return the variance of a candidate's values over that of candidates' means without noise; large if there is none.
+
+    Args:
+        values: NaN where nothing was played, two in a row at least, shape (n, k).
+    """
+    played = np.isfinite(values).sum(axis=1)
+    means = np.nanmean(values, axis=1)
+    within = float(np.nansum((values - means[:, None]) ** 2) / (played - 1).sum())
+    between = float(means.var(ddof=1) - within * np.mean(1.0 / played)) if len(means) > 1 else 0.0
+    return min(within / between, MOST) if between > 0.0 else MOST if within else 0.0
+
+
+def _double(rollouts: int) -> list[int]:
+    """Return after how many rollouts a round ends."""
+    ends = [FIRST]
+    while ends[-1] < rollouts:
+        ends.append(2 * ends[-1])
+    return [*ends[:-1], rollouts]
