@@ -50,7 +50,7 @@ def walks(rng: np.random.Generator, noise: float, falls: float) -> np.ndarray:
 @pytest.mark.parametrize(("noise", "falls"), [(0.1, 0.0), (3.0, 0.0), (0.1, 0.2), (1.0, 0.05)])
 def test_another_winner_is_no_more_frequent_than_the_stated_error(noise: float, falls: float, objective: str) -> None:
     judge = partial(objective_values, objective=objective, quantile=0.25)
-    trials, wrong, played = 60, 0, []
+    trials, wrong, played = 40, 0, []
     for seed in range(trials):
         returns = walks(np.random.default_rng(seed), noise, falls)
         race = run_race(returns, ERROR, seed, judge)

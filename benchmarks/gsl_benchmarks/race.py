@@ -1,0 +1,117 @@
+"""A study of racing: what it saves of a search in which every candidate plays all rollouts, and who wins.
+
+`python -m gsl_benchmarks.race` plays the search once. Each generation is then raced on the values that were played, so
+that both have the same seeds. It prints the table of docs/results/speed.md (hours; `--candidates`, `--generations`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from gsl.core.console import Progress
+from gsl.core.interfaces import SIM
+from gsl.core.seeds import derive_seed
+from gsl.grounding.torque_noise import TorqueNoise
+from gsl.optimizers.cma_es import CmaEs
+from gsl.optimizers.race import Race
+from gsl.policies.walk_engine import WalkEngine
+from gsl.report.console import Console
+from gsl.rollout.parallel import Job, episodes
+from gsl.rollout.rollout import Scenario, rollout
+from gsl.tasks.walk import Walk
+from gsl.worlds.bullet import BulletWorld
+
+RACES = 10  # of each generation, with other draws
+COARSE, PAIRS = 0.004, 9  # [s] of the coarser physics, and walks of which both costs are compared
+COLUMNS = ("generation", "best [cm/s]", "falls", "races with another winner", "rollouts played", "physics steps played")
+
+
+class Played(NamedTuple):
+    """A generation that played all rollouts: values, falls and control steps, shape (n, k)."""
+
+    values: np.ndarray
+    fell: np.ndarray
+    steps: np.ndarray
+
+
+class Raced(NamedTuple):
+    """What races on it come to: shares of races, rollouts and physics steps."""
+
+    another: float
+    rollouts: float
+    steps: float
+
+
+def play(scenario: Scenario, candidates: Sequence[np.ndarray], seeds: np.ndarray, progress: Progress) -> Played:
+    """Play all rollouts of a generation; seeds have the shape (n, k)."""
+    jobs = [Job(theta, int(seed)) for theta, row in zip(candidates, seeds, strict=True) for seed in row]
+    done = episodes(scenario, jobs, workers=-1, progress=progress)
+    columns = zip(*((episode.value, episode.fell, episode.steps) for episode in done), strict=True)
+    return Played(*(np.array(column).reshape(seeds.shape) for column in columns))
+
+
+def race_again(played: Played, error: float, races: int = RACES) -> Raced:
+    """Race on a generation that has played everything."""
+    whole, found = played.values.mean(axis=1), []
+    for number in range(races):
+        race = Race(*played.values.shape, error, lambda rows: rows.mean(axis=1), np.random.default_rng(number))
+        while pairs := race.pairs():
+            race.take([played.values[pair] for pair in pairs])
+        there = np.isfinite(race.values)
+        winner = np.argmax(np.where(there.all(axis=1), whole, -np.inf))
+        another = float(winner != np.argmax(whole))
+        found.append((another, there.mean(), played.steps[there].sum() / played.steps.sum()))
+    return Raced(*(float(share) for share in np.mean(found, axis=0)))
+
+
+def cost_of_coarse(scenario: Scenario, world: BulletWorld) -> float:
+    """Return CPU time at the coarse physics period / at the world's own, median of pairs of walks."""
+    fine, coarse = scenario.prepare({}), replace(scenario, world=replace(world, step=COARSE)).prepare({})
+    envs, theta = [fine.make(), coarse.make()], fine.policy.initial
+    taken = np.zeros((PAIRS + 1, 2))
+    for seed in range(PAIRS + 1):  # the first one compiles
+        for n, (one, env) in enumerate(zip((fine, coarse), envs, strict=True)):
+            begin = time.process_time()
+            rollout(one, env, theta, seed)
+            taken[seed, n] = time.process_time() - begin
+    return float(np.median(taken[1:, 1] / taken[1:, 0]))
+
+
+def main() -> None:
+    """Play, race again, and print."""
+    parser = argparse.ArgumentParser(description="What racing saves of a search in which all rollouts are played.")
+    for name, default in (("candidates", 150), ("generations", 10), ("rollouts", 20), ("seed", 1)):
+        parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--error", type=float, default=0.05)
+    given, console, rows, found = parser.parse_args(), Console(), [], []
+    world, policy = BulletWorld(robot="nao", effects={}, start_noise=0.02), WalkEngine()
+    plain = Scenario(world, Walk(), policy, SIM, TorqueNoise())
+    scenario = plain.prepare({})
+    seed = derive_seed(given.seed, "optimize")
+    search = CmaEs(given.candidates, given.generations).start(policy.initial, policy.scale, seed)
+    with console.progress(given.candidates * given.generations * given.rollouts, "playing all") as progress:
+        for index in range(given.generations):
+            places = np.ndindex(given.candidates, given.rollouts)
+            seeds = np.array([derive_seed(given.seed, "optimize", index, *place) for place in places])
+            played = play(scenario, search.ask(), seeds.reshape(given.candidates, given.rollouts), progress)
+            search.tell(played.values.mean(axis=1).tolist())
+            raced = race_again(played, given.error)
+            found.append(raced)
+            best = f"{100.0 * played.values.mean(axis=1).max():.1f}"
+            rows.append((index + 1, best, f"{played.fell.mean():.3f}", *(f"{share:.3f}" for share in raced)))
+            console.status("\t".join(map(str, rows[-1])))
+    rows.append(("mean", "", "", *(f"{share:.3f}" for share in np.mean(found, axis=0))))
+    console.table(f"optimizer.race={given.error:g}", COLUMNS, rows)
+    console.status(f"a walk at {1000 * COARSE:g} ms costs {cost_of_coarse(plain, world):.2f} of one at 2 ms")
+
+
+if __name__ == "__main__":
+    from gsl_benchmarks import race  # workers import what they run
+
+    race.main()
