@@ -258,15 +258,6 @@ class Search(Protocol):
         """
 
 
-@runtime_checkable
-class Racing(Protocol):
-    """A search that ranks candidates by half: one whose rank is settled needs no more episodes."""
-
-    @property
-    def race(self) -> float:
-        """Chance of another winner of a generation than all episodes would have; 0 for all episodes."""
-
-
 class Simulator(Protocol):
     """The simulator, grounded, as a learner sees it."""
 

@@ -11,7 +11,7 @@ variance of a candidate's values over that between candidates; the urn's own bal
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Annotated
+from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -25,6 +25,15 @@ Error = Annotated[
     float,
     setting("chance that a generation has another winner because candidates stop early; 0: none stops", ge=0, lt=1),
 ]
+
+
+@runtime_checkable
+class Racing(Protocol):
+    """A search that ranks candidates by half: one whose rank is settled needs no more episodes."""
+
+    @property
+    def race(self) -> float:
+        """Chance of another winner of a generation than all episodes would have; 0 for all episodes."""
 
 
 class Race:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 
 from gsl.core.console import Console, Progress
-from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Racing, Search, Task, World
+from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, World
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.grounding.effects import innermost
@@ -18,7 +18,7 @@ from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.preparation import parents_of, without_margins
 from gsl.optimizers.candidates import check_candidates
 from gsl.optimizers.objective import CVAR, Objective, Quantile, check_objective, objective_values
-from gsl.optimizers.race import Race
+from gsl.optimizers.race import Race, Racing
 from gsl.policies.policy import size
 from gsl.rollout.estimate import estimate
 from gsl.rollout.parallel import Job, Workers, episodes

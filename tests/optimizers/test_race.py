@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from scenarios import AIR, QUIET, REACH
 
-from gsl.core.interfaces import Racing
 from gsl.core.statistics import wilson
 from gsl.grounding.ane import ActionNoise
 from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.objective import objective_values
-from gsl.optimizers.race import Race, draw_ends, noise_share
+from gsl.optimizers.race import Race, Racing, draw_ends, noise_share
 from gsl.stages.optimize import Optimize
 from gsl.storage.policies import read_policies
 from gsl.tasks.arm import Arm
