@@ -58,9 +58,9 @@ def play(scenario: Scenario, candidates: Sequence[np.ndarray], seeds: np.ndarray
 
 def race_again(played: Played, error: float, races: int = RACES) -> Raced:
     """Race on a generation that has played everything."""
-    whole, found = played.values.mean(axis=1), []
+    whole, found, (candidates, rollouts) = played.values.mean(axis=1), [], played.values.shape
     for number in range(races):
-        race = Race(*played.values.shape, error, lambda rows: rows.mean(axis=1), np.random.default_rng(number))
+        race = Race(candidates, rollouts, error, lambda rows: rows.mean(axis=1), np.random.default_rng(number))
         while pairs := race.pairs():
             race.take([played.values[pair] for pair in pairs])
         there = np.isfinite(race.values)
