@@ -87,7 +87,8 @@ class Servos:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Replay all, write every error and the tables."""
-        texts, document, best = [], {}, {}
+        texts, best = list[str](), dict[str, str]()
+        document: dict[str, Any] = {}
         for name, bench in self.benches.items():
             trial = Trial.of(bench, threads(self.workers))
             rows = [row for model in trial.models for row in trial.judge(model, console)]
@@ -175,7 +176,10 @@ class Trial:
                     known[gain] = self._replay(simulator, some, gain, firsts)
                 return known[gain]
 
-            best = climb(lambda gain, rest=rest, errors=errors: _loss([errors(gain)[place] for place in rest]))
+            def loss(gain: float, rest: Sequence[int] = rest, errors: Callable[[float], Any] = errors) -> float:
+                return _loss([errors(gain)[place] for place in rest])
+
+            best = climb(loss)
             zero = np.median(np.concatenate([errors(best)[place] for place in rest]), axis=0)
             plain, own = (self._replay(simulator, some, gain, held) for gain in (0.0, best))
             for way, parts in enumerate((plain, own, [error - zero for error in own])):

@@ -30,9 +30,7 @@ def _records(kp: float) -> list[Record]:
     plant = change(WORLD.plant, {"servo_gain": {"kp": kp}})
     played = play(bare, plant, [path[0] for path in paths], step=0.0005, period=PERIOD, settle=200)
     positions = [path + 0.01 for path in played]
-    return [
-        Record(one.name, one.targets, path, slope(path, PERIOD)) for one, path in zip(bare, positions, strict=True)
-    ]
+    return [Record(one.name, one.targets, path, slope(path, PERIOD)) for one, path in zip(bare, positions, strict=True)]
 
 
 def test_the_free_gain_and_the_zeros_of_a_log_are_found_on_motions_that_are_not_judged() -> None:
