@@ -14,6 +14,7 @@ STUDIES = {
     "table2-paper": "The same by the paper's recipe to the letter.",
     "worlds": "The best groundings in worlds that took no part in their choice.",
     "servo": "A learned servo against noise, effects and no grounding, in five worlds.",
+    "servos": "Published servo models of the SO-101 and the XL330 against ours, on real motions.",
     "motion": "Groundings where the real joints lag and are as stiff as the simulated ones.",
     "table3": "Three iterations with either of two simulators, beside the paper's table 3.",
     "table4": "Uneven ground, two grounding steps, beside the paper's table 4.",

@@ -13,7 +13,7 @@ from gsl.robots.robot_file import SUFFIXES, files_of, from_file
 
 _NOT_ROBOTS = (
     *("catalogue", "defaults", "frames", "hinges", "joint_limits", "mimic", "nao_legs", "nao_shapes", "robot_file"),
-    *("so101_shapes", "urdf", "urdf_remarks", "urdf_xml"),
+    *("so101_published", "so101_shapes", "urdf", "urdf_remarks", "urdf_xml", "xl330_published"),
 )
 
 

@@ -35,7 +35,11 @@ class WiringAudit:
     def __post_init__(self) -> None:
         """Refuse a policy of gsl's own, which has no wiring."""
         if not isinstance(self.policy, Outside):
-            raise ConfigError("policy", "has no wiring; this is for policy=torch, onnx, sb3 or python")
+            kind = type(self.policy).__name__
+            problem = (
+                "a policy of gsl's own has no wiring, and nothing to audit; take policy=torch, onnx, sb3 or python"
+            )
+            raise ConfigError("policy", problem, given=kind)
 
     def look(self, console: Console) -> dict[str, Any]:
         """Show what goes where and what was checked; return it with the exit code that acting would have."""

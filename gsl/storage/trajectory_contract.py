@@ -22,6 +22,8 @@ UNITS: Mapping[str, str] = {
     "position": "rad",
     "velocity": "rad/s",
     "torque": "N·m",
+    "velocity_command": "rad/s",
+    "torque_command": "N·m",
     "voltage": "V",
     "temperature": "°C",
     "gyro": "rad/s",
@@ -34,7 +36,7 @@ UNITS: Mapping[str, str] = {
 INTEGERS = ("episode", "step")
 BOOLEANS = ("enabled", "fell", "terminated")
 BLANK_AT_THE_END = ("action", "grounded_action", "reward", "next_state")
-JOINT_SENSORS = ("torque", "temperature")
+JOINT_SENSORS = ("torque", "temperature", "velocity_command", "torque_command")
 SENSORS = (
     *("voltage", "enabled", "foot_force.left", "foot_force.right"),
     *(f"{group}.{axis}" for group in ("gyro", "acceleration", "base.position", "base.velocity") for axis in "xyz"),

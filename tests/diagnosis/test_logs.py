@@ -90,3 +90,19 @@ def test_a_folder_of_files_is_one_log(tmp_path: Path) -> None:
     write(tmp_path / "c.parquet", replace(log(), control_period=0.01))
     with pytest.raises(GslError, match=r"c\.parquet.*another control period"):
         read_logs(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("group", "kind"), [("velocity_command", "desired velocity"), ("torque_command", "feed-forward torque")]
+)
+def test_commands_beside_the_positions_are_refused_unless_they_are_zero(group: str, kind: str) -> None:
+    def beside(value: float) -> Batch:
+        def with_column(episode: Trajectory) -> Trajectory:
+            column = {f"{group}.LKneePitch": np.full(len(episode.time), value)}
+            return replace(episode, sensors={**(episode.sensors or {}), **column})
+
+        return changed(log(), with_column)
+
+    check_log(beside(0.0), NAO, "log")
+    with pytest.raises(GslError, match=f"{group}.LKneePitch reaches 1.5 in episode 0; .* a {kind} beside them"):
+        check_log(beside(-1.5), NAO, "log")

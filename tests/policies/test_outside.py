@@ -283,4 +283,4 @@ def test_the_wiring_is_shown_and_a_wrong_one_exits_with_2(network: Any, tmp_path
     assert "the network takes 4 numbers: state 4" in said.out and "the wiring fits" in said.out
     wrong = gsl(*base, "world=so101", folder=tmp_path)
     assert wrong.code == 2 and "the policy would be refused" in wrong.out
-    assert "has no wiring" in refused("wiring", "policy=linear", folder=tmp_path)
+    assert "policy = Linear: a policy of gsl's own has no wiring" in refused("wiring", "policy=linear", folder=tmp_path)

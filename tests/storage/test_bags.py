@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -129,3 +131,17 @@ def test_the_first_point_of_a_trajectory_is_a_command_by_joint(tmp_path: Path, r
     batch = read(tmp_path / "runs/log/import/trajectories.parquet")
     np.testing.assert_allclose(batch.episodes[0].position, MEASURED, atol=1e-6)
     np.testing.assert_allclose(batch.episodes[0].action, GOAL[:-1], atol=1e-6)
+
+
+def test_messages_without_a_definition_are_refused_with_what_to_do(tmp_path: Path) -> None:
+    store = ros2_store()
+    state, low_state = store.types["unitree_go/msg/MotorState"], store.types["unitree_go/msg/LowState"]
+    message = low_state(np.array([254, 239], np.uint8), [state(1, 0.0, 0.1, 0.2, 30)] * 13, 0)
+    write_ros2(tmp_path / "bag", store, {"/lowstate": [message] * len(TIME)}, "SQLITE3")
+    (file,) = (tmp_path / "bag").glob("*.db3")
+    with closing(sqlite3.connect(file)) as bag, bag:
+        bag.execute("DELETE FROM message_definitions")
+    signals = {name: {"file": "/lowstate", "column": "motor_state[{joint}].q"} for name in ("action", "position")}
+    chosen = mapping(tmp_path, joints={"hip": 1, "knee": 2}, time="time", signals=signals)
+    line = refused("import", "source=bag", chosen, folder=tmp_path)
+    assert "holds messages of unitree_go/msg/LowState without their definition; write it as MCAP" in line

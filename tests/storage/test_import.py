@@ -371,3 +371,27 @@ def test_a_joint_is_at_a_stop_where_its_command_is_beyond_it(
 def test_a_torque_at_its_end_while_the_command_moves_is_saturated() -> None:
     torque = np.clip(4.0 * SWING, -1.0, 1.0)
     assert measure_saturation(torque, SWING) > STUCK > measure_saturation(2.0 * SWING, SWING)
+
+
+def test_commands_beside_the_positions_are_columns_that_hold_as_commands_do(tmp_path: Path) -> None:
+    speeds = np.gradient(ACTION, PERIOD, axis=0)
+    csv(tmp_path / "log.csv", {**plain(), **joint_columns("dq", np.rad2deg(speeds)), **joint_columns("tau", ACTION)})
+    signals = {
+        "action": "goal_{joint}",
+        "position": "q_{joint}",
+        "velocity_command": {"column": "dq_{joint}", "unit": "deg/s"},
+        "torque_command": {"column": "tau_{joint}", "unit": "Nm"},
+    }
+    done("import", f"source={tmp_path / 'log.csv'}", mapping(tmp_path / "m.yaml", signals=signals), folder=tmp_path)
+    batch = read(next((tmp_path / "runs").glob("*/import/trajectories.parquet")))
+    for k, joint in enumerate(JOINTS):
+        np.testing.assert_allclose(batch.episodes[0].sensors[f"velocity_command.{joint}"], speeds[:, k], atol=1e-6)
+        np.testing.assert_allclose(batch.episodes[0].sensors[f"torque_command.{joint}"], ACTION[:, k], atol=1e-6)
+    assert batch.metadata["units"]["velocity_command"] == "rad/s"
+
+
+def test_a_log_without_them_says_nothing_of_them(tmp_path: Path) -> None:
+    csv(tmp_path / "log.csv", plain())
+    done("import", f"source={tmp_path / 'log.csv'}", mapping(tmp_path / "m.yaml"), folder=tmp_path)
+    file = next((tmp_path / "runs").glob("*/import/trajectories.parquet"))
+    assert b"_command" not in file.read_bytes() and not read(file).episodes[0].sensors

@@ -270,4 +270,4 @@ def test_commands_of_other_kinds_are_refused_as_what_they_are(tmp_path: Path, un
     chosen = mapping(tmp_path, {"column": "des_dof_pos", "unit": unit})
     line = refused("import", "source=log.npz", chosen, folder=tmp_path)
     assert f"is a command of {kind}; servos here follow positions, others are not taken yet" in line
-    assert f"goal_{kind}" in line
+    assert {"speed": "velocity_command", "torque": "torque_command"}[kind] in line

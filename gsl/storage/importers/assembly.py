@@ -16,7 +16,7 @@ from gsl.errors import InputError
 from gsl.storage.importers.labels import fill
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.reading import Raw, Series
-from gsl.storage.importers.signal import COMMANDS, FLAGS
+from gsl.storage.importers.signal import BESIDE, COMMANDS, FLAGS
 from gsl.storage.signals.check import join_turns
 from gsl.storage.signals.glitches import find_glitches, mend
 
@@ -106,7 +106,7 @@ def _mend(one: Trajectory, mapping: LogMapping) -> Trajectory:
 
 
 def _at(name: str, series: Series, at: np.ndarray) -> np.ndarray:
-    if name in COMMANDS or name in FLAGS:
+    if name in (*COMMANDS, *BESIDE, *FLAGS):
         return hold(series.stamps, series.values, at)
     return interpolate(series.stamps, series.values, at)
 

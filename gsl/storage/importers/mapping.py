@@ -175,13 +175,13 @@ def _check_unit(name: str, signal: Signal) -> None:
 
 def _of_other_kind(unit: str) -> str:
     """Return what to say of a command that is no position, nothing if it is of no kind that a servo takes."""
-    for wanted, kind in (("rad/s", "speed"), ("N·m", "torque")):
+    for wanted, kind, name in (("rad/s", "speed", "velocity_command"), ("N·m", "torque", "torque_command")):
         try:
             factor(unit, wanted)
         except ValueError:
             continue
-        own = f"keep it as a column of your own, signals: {{goal_{kind}: ...}}"
-        return f"is a command of {kind}; servos here follow positions, others are not taken yet: {own}"
+        beside = f"beside a position it is signals: {{{name}: ...}}"
+        return f"is a command of {kind}; servos here follow positions, others are not taken yet; {beside}"
     return ""
 
 

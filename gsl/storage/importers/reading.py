@@ -14,7 +14,7 @@ from gsl.storage.importers.formats import table
 from gsl.storage.importers.labels import constant, find_label_columns
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, fields_of
-from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, FLAGS, Signal
+from gsl.storage.importers.signal import AXES, BESIDE, BY_NAME, COMMANDS, FLAGS, Signal
 from gsl.storage.importers.stamps import order_rows, seconds
 from gsl.storage.importers.table import Table, missing_column
 from gsl.storage.trajectory_contract import UNITS
@@ -197,7 +197,7 @@ class _Reading(NamedTuple):
             return Series(stamps, raw != 0.0, tuple(names)), int(np.sum(~keep))
         wanted = UNITS.get(self.name)
         gains, offsets = np.array([self.signal.scale(key, wanted) for key in self._keys(len(names), joints)]).T
-        if self.name in COMMANDS:
+        if self.name in (*COMMANDS, *BESIDE):
             stamps = stamps - self.mapping.command_offset
         return Series(stamps, self.signal.signed(raw) * gains + offsets, tuple(names)), int(np.sum(~keep))
 

@@ -14,7 +14,8 @@ from gsl.storage.importers.units import factor
 Columns = str | int | list[str | int] | dict[str, str | int]
 Values = float | dict[str, float]
 
-PER_JOINT = ("action", "grounded_action", "position", "velocity", "torque", "temperature")
+BESIDE = ("velocity_command", "torque_command")  # of a servo that takes more than a position
+PER_JOINT = ("action", "grounded_action", "position", "velocity", "torque", "temperature", *BESIDE)
 COMMANDS = ("action", "grounded_action")
 FLAGS = ("enabled",)
 AXES: Mapping[str, tuple[str, ...]] = {
