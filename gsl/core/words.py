@@ -31,3 +31,10 @@ def several(count: int, what: str) -> str:
 def falls(count: int) -> str:
     """Return how often the robot fell."""
     return f"{count or 'no'} fall{'s' * (count != 1)}"
+
+
+def size(count: int) -> str:
+    """Return a size of so many bytes."""
+    if count < 10_000:
+        return f"{count:,} B"
+    return f"{count / 1e3:,.0f} kB" if count < 10_000_000 else f"{count / 1e6:,.0f} MB"
