@@ -12,6 +12,7 @@ import typer
 
 from gsl.commandline.failure import INTERRUPTED, leave_quietly, report
 from gsl.commandline.plugins import Commands, is_group
+from gsl.commandline.run_commands import Reference, add_run_commands
 from gsl.commandline.stage_command import (
     Cfg,
     ConfigDir,
@@ -25,8 +26,6 @@ from gsl.commandline.stage_command import (
 from gsl.core.interruption import ignore, listen
 from gsl.report.console import Console
 from gsl.version import PACKAGE, __version__
-
-Reference = Annotated[str, typer.Argument(metavar="REF", help="Path, or name of a run.")]
 
 QUIET = {"--quiet", "-q"}
 
@@ -83,60 +82,7 @@ def import_logs(
     run_stage("import", arguments, multirun=multirun, cfg=cfg, config_dir=config_dir, json=json)
 
 
-_RUNS = (
-    "kind=iterate, name= (part of it, or *), world=, metric='returned.value>0.2', newer=7d, older=2h; sort= made, "
-    "took, name, kind or a metric, -NAME turns it round; limit=20"
-)
-
-
-@app.command()
-def runs(
-    settings: Annotated[list[str] | None, typer.Argument(metavar="[kind=KIND] [sort=METRIC]", help=_RUNS)] = None,
-    json: Json = False,
-) -> None:
-    """List the artifacts below runs/, oldest first, or by a metric."""
-    from gsl.commandline.listing import list_runs
-
-    list_runs(settings or [], Console(json=json))
-
-
-@app.command()
-def diff(first: Reference, second: Reference, json: Json = False) -> None:
-    """Set two artifacts side by side: what differs of settings, parents, software and metrics."""
-    from gsl.commandline.difference import compare
-
-    compare(first, second, Console(json=json))
-
-
-_CLEAN = "name= (part of a path); stale=true, orphaned=true: artifacts made from one that was built anew, or is gone"
-
-
-@app.command()
-def clean(
-    settings: Annotated[list[str] | None, typer.Argument(metavar="[stale=true] [name=NAME]", help=_CLEAN)] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Remove it.")] = False,
-    json: Json = False,
-) -> None:
-    """Say what killed commands have left below runs/ and how large it is; remove it with --yes alone."""
-    from gsl.commandline.clean import clean
-
-    raise typer.Exit(clean(settings or [], Console(json=json), yes=yes))
-
-
-@app.command()
-def show(reference: Reference, json: Json = False) -> None:
-    """Show how an artifact came about and what it holds."""
-    from gsl.commandline.listing import show_artifact
-
-    raise typer.Exit(show_artifact(reference, Console(json=json)))
-
-
-@app.command("open")
-def open_page(reference: Reference, json: Json = False) -> None:
-    """Open the page of an artifact in a browser; without a display, say where it is."""
-    from gsl.commandline.listing import open_artifact
-
-    open_artifact(reference, Console(json=json))
+add_run_commands(app)
 
 
 @app.command()

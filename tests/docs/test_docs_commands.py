@@ -36,6 +36,7 @@ AT_ONCE = ("robot", "init")  # quick enough to be run as they are printed
 LOOKING = {
     "runs": 4,
     "diff": 3,
+    "metrics": 3,
     "clean": 3,
     "bench": 1,
     "show": 2,
