@@ -14,7 +14,7 @@ Reference = Annotated[str, typer.Argument(metavar="REF", help="Path, or name of 
 
 def add_run_commands(app: typer.Typer) -> None:
     """Add them to the command line."""
-    for command in (runs, show, diff, metrics, clean):
+    for command in (runs, show, diff, metrics, view, clean):
         app.command()(command)
     app.command("open")(open_page)
 
@@ -54,6 +54,23 @@ def metrics(
     from gsl.commandline.metrics import show_metrics
 
     show_metrics(reference, settings or [], Console(json=json))
+
+
+_VIEW = (
+    "out=FILE.rrd: a recording in place of a window; policy=NAME of a search; episode=0 and beside=REF of a log; "
+    "seed= of the walk; trust=MODULE"
+)
+
+
+def view(
+    reference: Reference,
+    settings: Annotated[list[str] | None, typer.Argument(metavar="[out=FILE.rrd]", help=_VIEW)] = None,
+    json: Json = False,
+) -> None:
+    """Scrub through a log or a walk: the robot, the ghost of the simulator, the curves of every joint."""
+    from gsl.commandline.view import view
+
+    view(reference, settings or [], Console(json=json))
 
 
 _CLEAN = "name= (part of a path); stale=true, orphaned=true: artifacts made from one that was built anew, or is gone"

@@ -37,6 +37,7 @@ LOOKING = {
     "runs": 4,
     "diff": 3,
     "metrics": 3,
+    "view": 4,
     "clean": 3,
     "bench": 1,
     "show": 2,
