@@ -12,6 +12,7 @@ import typer
 
 from gsl.commandline.failure import INTERRUPTED, leave_quietly, report
 from gsl.commandline.plugins import Commands, is_group
+from gsl.commandline.run_commands import Reference, add_run_commands
 from gsl.commandline.stage_command import (
     Cfg,
     ConfigDir,
@@ -25,8 +26,6 @@ from gsl.commandline.stage_command import (
 from gsl.core.interruption import ignore, listen
 from gsl.report.console import Console
 from gsl.version import PACKAGE, __version__
-
-Reference = Annotated[str, typer.Argument(metavar="REF", help="Path, or name of a run.")]
 
 QUIET = {"--quiet", "-q"}
 
@@ -83,28 +82,7 @@ def import_logs(
     run_stage("import", arguments, multirun=multirun, cfg=cfg, config_dir=config_dir, json=json)
 
 
-@app.command()
-def runs(json: Json = False) -> None:
-    """List the artifacts below runs/, oldest first."""
-    from gsl.commandline.listing import list_runs
-
-    list_runs(Console(json=json))
-
-
-@app.command()
-def show(reference: Reference, json: Json = False) -> None:
-    """Show how an artifact came about and what it holds."""
-    from gsl.commandline.listing import show_artifact
-
-    raise typer.Exit(show_artifact(reference, Console(json=json)))
-
-
-@app.command("open")
-def open_page(reference: Reference, json: Json = False) -> None:
-    """Open the page of an artifact in a browser; without a display, say where it is."""
-    from gsl.commandline.listing import open_artifact
-
-    open_artifact(reference, Console(json=json))
+add_run_commands(app)
 
 
 @app.command()

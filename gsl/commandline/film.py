@@ -44,15 +44,21 @@ SHOWN = (*LOGS, "evaluate", "iterate", "optimize")
 
 
 @component
-class Settings:
-    """What `gsl render` takes beside the reference."""
+class Subject:
+    """What is seen, beside the reference."""
 
-    out: Annotated[str, setting("file to write: .gif or .mp4, or .png for a contact sheet")] = "film.gif"
-    slow: Annotated[float, setting("how many times slower than real time", ge=0.1, le=100)] = 1.0
     episode: Annotated[int, setting("which episode of a log, from 0", ge=0)] = 0
     policy: Annotated[str, setting("which policy of a search; empty for the one that was returned")] = ""
     beside: Annotated[str, setting("a second log, shown beside the first")] = ""
     seed: Annotated[int, setting("of the walk", ge=0)] = 1
+
+
+@component
+class Settings(Subject):
+    """What `gsl render` takes beside the reference."""
+
+    out: Annotated[str, setting("file to write: .gif or .mp4, or .png for a contact sheet")] = "film.gif"
+    slow: Annotated[float, setting("how many times slower than real time", ge=0.1, le=100)] = 1.0
 
 
 @dataclass(frozen=True)
@@ -80,17 +86,10 @@ def render(reference: str, words: Sequence[str], console: Console) -> None:
         ConfigError: A setting is wrong.
         InputError: The robot cannot be shown.
     """
-    settings = make(Settings, dict(_split(words)))
+    settings = make(Settings, dict(read_settings(words, "render")))
     path = Path(settings.out)
     check_format(path)
-    trust = find_trust([word for word in words if word.startswith("trust=")])
-    find_own_modules(trust)
-    folder = _find(reference)
-    kind = manifest.read(folder).kind
-    console.status(f"{folder.as_posix()}: {kind}")
-    cast = _play_logs(folder, settings) if kind in LOGS else _walk(folder, kind, settings, trust, console)
-    if not any(link.shapes for link in cast.robot.links.values()):
-        raise InputError(f"{cast.robot.name}: none of its links has a shape that could be shown")
+    cast = assemble(reference, settings, words, console)
     with explain_refusal(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
@@ -100,11 +99,25 @@ def render(reference: str, words: Sequence[str], console: Console) -> None:
     console.result({"film": path, "shown": [shot.title for shot in cast.shots]}, text=path.as_posix())
 
 
-def _split(words: Sequence[str]) -> Iterator[tuple[str, Any]]:
+def assemble(reference: str, subject: Subject, words: Sequence[str], console: Console) -> Cast:
+    """Return who is seen, and what they did; arguments and errors as those of `render`."""
+    trust = find_trust([word for word in words if word.startswith("trust=")])
+    find_own_modules(trust)
+    folder = _find(reference)
+    kind = manifest.read(folder).kind
+    console.status(f"{folder.as_posix()}: {kind}")
+    cast = _play_logs(folder, subject) if kind in LOGS else _walk(folder, kind, subject, trust, console)
+    if not any(link.shapes for link in cast.robot.links.values()):
+        raise InputError(f"{cast.robot.name}: none of its links has a shape that could be shown")
+    return cast
+
+
+def read_settings(words: Sequence[str], command: str) -> Iterator[tuple[str, Any]]:
+    """Yield typed settings but `trust`, by name."""
     for word in words:
         name, sign, value = word.partition("=")
         if not sign:
-            raise ConfigError(word, "is no setting; settings of gsl render are typed as name=value")
+            raise ConfigError(word, f"is no setting; settings of gsl {command} are typed as name=value")
         if name != "trust":
             yield name, value
 
@@ -118,7 +131,7 @@ def _find(reference: str) -> Path:
     return place.parent if place.is_file() else place
 
 
-def _play_logs(folder: Path, settings: Settings) -> Cast:
+def _play_logs(folder: Path, settings: Subject) -> Cast:
     """Return an episode of one log, or of two."""
     first = read(data_file(str(folder)))
     name = str(first.metadata.get("robot", ""))
@@ -141,7 +154,7 @@ def _episode(title: str, batch: Batch, number: int) -> Trajectory:
     return batch.episodes[number]
 
 
-def _walk(folder: Path, kind: str, settings: Settings, trust: Sequence[str], console: Console) -> Cast:
+def _walk(folder: Path, kind: str, settings: Subject, trust: Sequence[str], console: Console) -> Cast:
     """Return walks of a policy that a search found: on the real side, and in the simulator of the search."""
     measured = _open(_last_evaluation(folder) if kind == "iterate" else folder)
     stage, _ = rebuild(measured, trust)

@@ -6,12 +6,16 @@ import dataclasses
 import os
 import sys
 import webbrowser
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from gsl.commandline.choose_runs import Choice, Run, choose
+from gsl.commandline.words import split_words
+from gsl.core.validation import make
+from gsl.core.words import size
 from gsl.errors import ArtifactError, InputError
 from gsl.report.account import account, flat, plain
 from gsl.report.console import Console
@@ -21,31 +25,49 @@ from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.identity import content_hash
 from gsl.storage.lineage import out_of_date
 from gsl.storage.manifest import Manifest, Parent, find_damage, read
-from gsl.storage.references import RUNS, find_all, find_damaged, name_run, resolve
+from gsl.storage.references import RUNS, find_all, find_damaged, resolve
 
 
-def list_runs(console: Console) -> None:
-    """List the complete artifacts below runs/."""
-    found = find_all()
+def list_runs(words: Sequence[str], console: Console) -> None:
+    """List the complete artifacts below runs/, those that fit the settings.
+
+    Args:
+        words: Settings, as they were typed (`choose_runs.Choice`).
+        console: Where they are listed.
+
+    Raises:
+        ConfigError: A setting is wrong.
+    """
+    choice = make(Choice, split_words(words, "runs"))
     for folder in find_damaged():
         console.status(f"{folder.as_posix()}: its manifest cannot be read; gsl verify says why")
-    rows = [
-        (name_run(one.folder), one.manifest.kind, _local(one.manifest.created), _span(one.manifest), headline(one))
-        for one in found
-    ]
+    artifacts = find_all()
+    chosen, metric = choose(artifacts, choice, datetime.now(UTC))
+    columns = ["reference", "kind", "made", "took", *([metric] if metric else []), "result"]
+    rows = [(*_facts(run), *([plain(run.metrics[metric])] if metric else []), headline(run.artifact)) for run in chosen]
+    title = f"artifacts below {RUNS}/" + (f": {len(chosen)} of {len(artifacts)}" if words else "")
     if rows:
-        console.table(f"artifacts below {RUNS}/", ["reference", "kind", "made", "took", "result"], rows)
-    documents = [
-        {
-            "folder": one.folder,
-            "kind": one.manifest.kind,
-            "created": one.manifest.created,
-            "key": one.manifest.key,
-            "headline": headline(one),
-        }
-        for one in found
-    ]
-    console.result({"artifacts": documents}, text="" if rows else "no artifacts below runs/")
+        console.table(title, columns, rows)
+    empty = f"none of the {len(artifacts)} artifacts below {RUNS}/ fits" if artifacts else "no artifacts below runs/"
+    console.result({"artifacts": [_document(run, metric) for run in chosen]}, text="" if rows else empty)
+
+
+def _facts(run: Run) -> tuple[str, str, str, str]:
+    made = run.artifact.manifest
+    return run.name, made.kind, _local(made.created), _span(made)
+
+
+def _document(run: Run, metric: str | None) -> dict[str, Any]:
+    made = run.artifact.manifest
+    document = {
+        "folder": run.artifact.folder,
+        "kind": made.kind,
+        "created": made.created,
+        "duration": made.duration,
+        "key": made.key,
+        "headline": headline(run.artifact),
+    }
+    return {**document, "metric": {metric: run.metrics[metric]}} if metric else document
 
 
 def show_artifact(reference: str, console: Console) -> int:
@@ -70,7 +92,7 @@ def show_artifact(reference: str, console: Console) -> int:
             console.table(*told)
         rows = [_setting(name, value) for name, value in artifact.config.items() if not name.startswith("_")]
         console.table("settings", ["setting", "value"], rows)
-    files = [(name, _size(file.bytes), file.sha256[:SHORT]) for name, file in artifact.manifest.files.items()]
+    files = [(name, size(file.bytes), file.sha256[:SHORT]) for name, file in artifact.manifest.files.items()]
     state = f"changed since it was made: {damaged}" if damaged else "all files are as they were made"
     console.table("files", ["file", "size", "sha256"], files, state)
     if damaged is None:
@@ -146,9 +168,3 @@ def _span(manifest: Manifest) -> str:
     if seconds < 100.0:
         return f"{seconds:.1f} s"
     return f"{seconds / 60:.1f} min" if seconds < 6000.0 else f"{seconds / 3600:.1f} h"
-
-
-def _size(count: int) -> str:
-    if count < 10_000:
-        return f"{count:,} B"
-    return f"{count / 1e3:,.0f} kB" if count < 10_000_000 else f"{count / 1e6:,.0f} MB"

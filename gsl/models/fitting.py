@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from gsl.core.scaling import scaling
+from gsl.core.step_metrics import note_step
 from gsl.models.config import ModelConfig
 from gsl.models.free_run import Segments
 from gsl.models.head import POINT, Head
@@ -90,13 +91,14 @@ def _descend(
     weights, without_progress = _weights(network), 0
     with torch.no_grad():
         best = np.nan_to_num(judged().item(), nan=np.inf)
-    for _ in range(config.epochs):
+    for epoch in range(config.epochs):
         for chosen in torch.split(torch.randperm(samples), config.batch):
             adam.zero_grad()
             descended(chosen).backward()  # type: ignore[no-untyped-call]
             adam.step()
         with torch.no_grad():
             loss = judged().item()
+        note_step("network", epoch + 1, validation=loss)
         without_progress += 1
         if loss < best:
             best, weights, without_progress = loss, _weights(network), 0

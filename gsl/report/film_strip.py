@@ -51,17 +51,17 @@ class Scene:
         """Return the scene in which all trajectories are seen whole in a film of so many pixels."""
         low, high = extent(lump(robot), np.array([robot.stance.get(name, 0.0) for name in robot.motors]))
         size = high - low
-        places = np.concatenate([_places(trajectory) for trajectory in trajectories])
-        first, last = places[:, 0].min() - 0.75 * size[2], places[:, 0].max() + 0.75 * size[2]
-        floor = 0.0 if any(_walks(trajectory) for trajectory in trajectories) else HELD_AT + low[2]
+        way = np.concatenate([places(trajectory) for trajectory in trajectories])
+        first, last = way[:, 0].min() - 0.75 * size[2], way[:, 0].max() + 0.75 * size[2]
+        floor = 0.0 if any(walks(trajectory) for trajectory in trajectories) else HELD_AT + low[2]
         tall = ROOM * size[2]
         ratio = float(np.clip((last - first) / tall, 0.8, WIDEST))
         beside = ratio < FLATTEST
         wide = _even(width / 2.0) if beside else width
         distance = min(max(tall, (last - first) / ratio) / 2.0 / math.tan(math.radians(OPENING / 2.0)), FARTHEST)
-        side = float(places[:, 1].mean())
+        side = float(way[:, 1].mean())
         middle = (0.5 * float(first + last), side, float(floor) + 0.31 * tall)
-        start = float(_places(trajectories[0])[0, 0])
+        start = float(places(trajectories[0])[0, 0])
         view = View(middle, distance, yaw=90.0, pitch=-8.0, opening=OPENING)
         along = _ruler(float(first), float(last), start)
         marks = np.column_stack([along, np.full(len(along), side - 0.3 * size[2]), np.full(len(along), floor)])
@@ -85,7 +85,7 @@ class Strip:
     ) -> None:
         self._camera, self._robot, self._scene = camera, robot, scene
         self._joints, self._title, self._trajectory = joints, title, trajectory
-        self._places, self._turns = _places(trajectory), _turns(trajectory)
+        self._places, self._turns = places(trajectory), turns(trajectory)
         self._ruler = camera.project(scene.marks, scene.view, scene.width, scene.height)
         fell = trajectory.fell
         self._fall = math.inf if fell is None or not fell.any() else float(trajectory.time[int(np.argmax(fell))])
@@ -113,11 +113,11 @@ class Strip:
     def _say(self, row: int, moment: float) -> str:
         clock = f"{min(moment, float(self._trajectory.time[-1])):5.1f} s"
         way = round(self._places[row, 0] - self._scene.start, 2) + 0.0  # which makes 0 of -0
-        return f"{way:.2f} m   {clock}" if _walks(self._trajectory) else clock
+        return f"{way:.2f} m   {clock}" if walks(self._trajectory) else clock
 
     def _draw_ruler(self, draw: Any) -> None:
         """Draw marks on the floor with their distance from the start."""
-        if not _walks(self._trajectory):
+        if not walks(self._trajectory):
             return
         draw.line([tuple(point) for point in self._ruler], fill=INK, width=1)
         for (x, y), along in zip(self._ruler, self._scene.marks[:, 0] - self._scene.start, strict=True):
@@ -139,14 +139,14 @@ def see(background: np.ndarray, column: float) -> np.ndarray:
     return shown
 
 
-def _places(trajectory: Trajectory) -> np.ndarray:
+def places(trajectory: Trajectory) -> np.ndarray:
     """Return where the base is [m], shape (T + 1, 3); where nobody knows, held in the air."""
-    if not _walks(trajectory):
+    if not walks(trajectory):
         return np.tile([0.0, 0.0, HELD_AT], (len(trajectory.time), 1))
     return np.column_stack([trajectory.sensors[f"base.position.{axis}"] for axis in "xyz"])
 
 
-def _turns(trajectory: Trajectory) -> np.ndarray:
+def turns(trajectory: Trajectory) -> np.ndarray:
     """Return the base's orientation x y z w, shape (T + 1, 4)."""
     names = [f"base.orientation.{part}" for part in "xyzw"]
     if not all(name in trajectory.sensors for name in names):
@@ -154,7 +154,7 @@ def _turns(trajectory: Trajectory) -> np.ndarray:
     return np.column_stack([trajectory.sensors[name] for name in names])
 
 
-def _walks(trajectory: Trajectory) -> bool:
+def walks(trajectory: Trajectory) -> bool:
     """Whether a trajectory says that its base went anywhere."""
     names = [f"base.position.{axis}" for axis in "xyz"]
     return all(name in trajectory.sensors and np.isfinite(trajectory.sensors[name]).all() for name in names) and any(

@@ -13,6 +13,7 @@ from gsl.core.console import Console, Progress
 from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, World
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
+from gsl.core.step_metrics import note_step
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.preparation import parents_of, without_margins
@@ -136,6 +137,14 @@ class Optimize:
                 search.tell(generation.values)
                 best = generation.winner
                 means = generation.means or generation.values
+                note_step(
+                    "search",
+                    index + 1,
+                    best=generation.values[best],
+                    mean=float(np.mean(generation.values)),
+                    falls=sum(generation.falls),
+                    falls_of_best=generation.falls[best],
+                )
                 yield Winner(self._record(index, candidates[best], means[best]), generation.values[best])
 
     def _learn(self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Console) -> Iterator[Winner]:
@@ -146,7 +155,9 @@ class Optimize:
             bold = self.initial is None
             steps = optimizer.learn(simulator, self.policy, first, seed, bold=bold, advance=progress.advance)
             for index, parameters in enumerate(steps):
-                value = self._evaluate(scenario, [parameters], index, progress).values[0]
+                done = self._evaluate(scenario, [parameters], index, progress)
+                value = done.values[0]
+                note_step("learner", index + 1, value=value, falls=done.falls[0])
                 yield Winner(self._record(index, parameters, value), value)
 
     def _screen(

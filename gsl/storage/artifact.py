@@ -19,6 +19,7 @@ from gsl.core.budget import read_json, read_text
 from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
 from gsl.core.own_code import package_of
+from gsl.core.step_metrics import listen_to_steps
 from gsl.core.trust import modules_in
 from gsl.core.unit import Unit
 from gsl.core.yaml_tree import yaml_tree
@@ -30,6 +31,7 @@ from gsl.storage.lineage import broken_link, out_of_date
 from gsl.storage.manifest import Manifest, Parent
 from gsl.storage.origin import Origin, at_work, relative
 from gsl.storage.read_files import own_effects, read_files
+from gsl.storage.step_metrics import StepLog
 from gsl.storage.versions import commit, versions
 from gsl.storage.whole import explain_failures, flush_tree, remove_temporary
 from gsl.storage.workplace import KEY, complete, hold_lock, install, log_to, stoppable, workplace
@@ -207,7 +209,8 @@ def _work(
         logger.info("%s begins: %s", identity.kind, command)
         found = _sources(stage).items()
         parents = tuple(Parent(role, relative(path, folder), identity.parents[role]) for role, path in found)
-        with collect_links() as links, at_work(Origin(command, settings, parents, folder, links)) as origin:
+        listening = listen_to_steps(StepLog(folder, identity.kind).note)
+        with collect_links() as links, at_work(Origin(command, settings, parents, folder, links)) as origin, listening:
             metrics = stage.run(folder, console)
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)

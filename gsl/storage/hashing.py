@@ -11,7 +11,8 @@ PACKAGE = Path(__file__).parents[1]
 SHORT = 12
 """Characters of a hash that are shown."""
 PAGE = "report.html"
-CIRCUMSTANCES = ("manifest.json", "config.yaml", "log.txt", PAGE)
+STEPS = "metrics.jsonl"
+CIRCUMSTANCES = ("manifest.json", "config.yaml", "log.txt", PAGE, STEPS)
 
 
 def file_hash(path: Path) -> str:
@@ -23,7 +24,7 @@ def file_hash(path: Path) -> str:
 def contents_hash(kind: str, hashes: Mapping[str, str]) -> str:
     """Return the hash of an artifact's contents from the hashes of its files by name.
 
-    Manifests, settings, logs and pages say how the contents came about, with commands and paths in them; they do not
+    Manifests, settings, logs, pages and metrics of steps say how and when the contents came about; they do not
     count, so that the same work done again leaves what was built on it valid.
     """
     lines = [f"{name} {sha}" for name, sha in sorted(hashes.items()) if Path(name).name not in CIRCUMSTANCES]

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gsl.errors import ArtifactError
+from gsl.storage.hashing import STEPS
 from gsl.storage.whole import claim, exchange, explain_refusal, flush, remove_temporary
 
 KEY = ".key"
@@ -85,7 +86,7 @@ def workplace(out: Path, key: str, *, progress: str, kept: Collection[str] = ())
         if folder.exists() and not ((folder / KEY).is_file() and (folder / KEY).read_bytes() == key.encode()):
             shutil.rmtree(folder)
         folder.mkdir(exist_ok=True)
-        _clear(folder, {progress, KEY, LOG, *kept})
+        _clear(folder, {progress, KEY, LOG, STEPS, *kept})
         (folder / KEY).write_text(key)
     try:
         yield folder

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 from gsl.core.lanes import LANES
 from gsl.core.plant import Plant
 from gsl.core.servo_law import LAGS
+from gsl.core.step_metrics import note_step
 from gsl.models.servo import NETWORK, NUMBERS, ServoModel, shapes, units
 from gsl.training.adjoint import cost_and_gradient
 from gsl.training.frozen import Frozen, heavier
@@ -137,6 +138,7 @@ def fit_network(
 
     def watch(theta: np.ndarray) -> None:
         way.append(Progress(costs[0], np.nan))
+        note_step("servo", len(way), cost=costs[0])
         if len(way) % every:
             return
         now = free.model_at(theta)

@@ -34,7 +34,11 @@ FLAGS = ("--json", "--multirun", "--check", "--help", "--cfg", "job")
 GROUPS = ("reproduce", "blind")  # whose commands have two words
 AT_ONCE = ("robot", "init")  # quick enough to be run as they are printed
 LOOKING = {
-    "runs": 1,
+    "runs": 4,
+    "diff": 3,
+    "metrics": 3,
+    "view": 4,
+    "clean": 3,
     "bench": 1,
     "show": 2,
     "verify": 2,

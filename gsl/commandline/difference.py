@@ -1,0 +1,90 @@
+"""`gsl diff`: two artifacts side by side, what differs of their settings, parents, versions and metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gsl.errors import ArtifactError
+from gsl.report.account import plain
+from gsl.report.console import Console
+from gsl.storage import manifest
+from gsl.storage.artifact import Artifact
+from gsl.storage.hashing import SHORT
+from gsl.storage.identity import flat
+from gsl.storage.references import name_run, resolve
+
+Pair = tuple[Any, Any]
+ABSENT = "-"
+
+
+def compare(first: str, second: str, console: Console) -> None:
+    """Show what differs between two artifacts, or say that nothing does.
+
+    Args:
+        first: A path, or the name of a run; of a whole run, its `iterate` is meant.
+        second: The other.
+        console: Where they are set side by side.
+
+    Raises:
+        ArtifactError: There is no such artifact, or it is damaged.
+    """
+    one, other = (Artifact(folder, manifest.read(folder)) for folder in map(_find, (first, second)))
+    made = one.manifest, other.manifest
+    parents = [{parent.role: parent.hash[:SHORT] for parent in each.parents} for each in made]
+    roles = parents[0].keys() & parents[1].keys()  # where such a parent lies is told by its contents
+    settings = [{key: value for key, value in flat(each.config).items() if key not in roles} for each in (one, other)]
+    software = [{**each.versions, "sources of gsl": each.sources[:SHORT], "kind": each.kind} for each in made]
+    parts = {
+        "settings": _differ(*settings),
+        "made from": _differ(*parents),
+        "software": _differ(*software),
+        "metrics": _differ(flat(one.metrics), flat(other.metrics)),
+    }
+    names = [name_run(each.folder) for each in (one, other)]
+    for title, pairs in parts.items():
+        if pairs:
+            rows = [
+                (name, *_show(pair), *([_change(pair)] if title == "metrics" else [])) for name, pair in pairs.items()
+            ]
+            columns = [title, *names, *(["change"] if title == "metrics" else [])]
+            console.table(f"{title}: {len(rows)} {'differ' if len(rows) > 1 else 'differs'}", columns, rows)
+    same = not any(parts.values())
+    document = {"folders": [one.folder, other.folder], "same": same}
+    text = f"{names[0]} and {names[1]}: the same settings, parents, software and metrics" if same else ""
+    console.result({**document, **{title.replace(" ", "_"): pairs for title, pairs in parts.items()}}, text=text)
+
+
+def _find(reference: str) -> Path:
+    """Return the artifact that is meant."""
+    try:
+        place = resolve(reference)
+    except ArtifactError as error:
+        try:
+            place = resolve(reference, kind="iterate")
+        except ArtifactError:
+            raise error from None
+    return place.parent if place.is_file() else place
+
+
+def _differ(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Pair]:
+    names = [*before, *(name for name in after if name not in before)]
+    return {
+        name: (before.get(name), after.get(name))
+        for name in names
+        if (name in before) != (name in after) or before.get(name) != after.get(name)
+    }
+
+
+def _show(pair: Pair) -> tuple[str, str]:
+    """Return both values in few digits, in all of them where few are alike."""
+    shown = [ABSENT if value is None else plain(value) for value in pair]
+    if shown[0] == shown[1]:
+        shown = [repr(value) for value in pair]
+    return shown[0], shown[1]
+
+
+def _change(pair: Pair) -> str:
+    numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in pair)
+    return f"{pair[1] - pair[0]:+.4g}" if numbers else ""

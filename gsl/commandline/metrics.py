@@ -1,0 +1,62 @@
+"""`gsl metrics`: the metrics of the generations and epochs of a run, as a table, as JSON, or for TensorBoard."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from gsl.commandline.words import split_words
+from gsl.core.setting import component, setting
+from gsl.core.validation import make
+from gsl.errors import ArtifactError, InputError
+from gsl.report.account import plain
+from gsl.report.console import Console
+from gsl.report.tensorboard import write_events
+from gsl.storage.references import artifact_folders, name_run
+from gsl.storage.step_metrics import Step, read_steps
+from gsl.storage.whole import explain_refusal
+
+
+@component
+class Metrics:
+    """What `gsl metrics` takes beside the reference."""
+
+    tensorboard: Annotated[str, setting("a new folder for TensorBoard's event files, one folder an artifact")] = ""
+
+
+def show_metrics(reference: str, words: Sequence[str], console: Console) -> None:
+    """Show the metrics of the steps of all artifacts that are meant, and write them for TensorBoard if asked.
+
+    Raises:
+        ArtifactError: There is no such artifact, or none that notes steps.
+        ConfigError: A setting is wrong.
+        InputError: The folder is there already, or the library is missing.
+    """
+    settings = make(Metrics, split_words(words, "metrics"))
+    by_artifact = {name_run(folder): steps for folder in artifact_folders(reference) if (steps := read_steps(folder))}
+    if not by_artifact:
+        raise ArtifactError(reference, "has no metrics of steps: searches and networks that are fitted note them")
+    if settings.tensorboard:
+        place = Path(settings.tensorboard)
+        if place.exists():
+            raise InputError(f"{place}: exists; choose another tensorboard=, or take it away")
+        with explain_refusal(place.parent):
+            for name, steps in by_artifact.items():
+                write_events(place / name.lstrip("/"), steps)
+        console.status(f"tensorboard --logdir {place.as_posix()} shows them")
+    for name, steps in by_artifact.items():
+        for series in dict.fromkeys(step.series for step in steps):
+            console.table(f"{name}: {series}", *_tabulate([step for step in steps if step.series == series]))
+    document = {name: [step._asdict() for step in steps] for name, steps in by_artifact.items()}
+    console.result({"artifacts": document}, text=settings.tensorboard)
+
+
+def _tabulate(steps: Sequence[Step]) -> tuple[list[str], list[tuple[str, ...]]]:
+    keys = list(dict.fromkeys(key for step in steps for key in step.values))
+    begun = min(step.time for step in steps)
+    rows = [
+        (str(step.run), str(step.step), f"{step.time - begun:.1f}", *(plain(step.values.get(key)) for key in keys))
+        for step in steps
+    ]
+    return ["run", "step", "time [s]", *keys], rows

@@ -1,0 +1,142 @@
+"""A recording for the Rerun viewer: a robot that moves, its ghost, the floor, and the curves of every joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from gsl.core.body import Robot, Shape, lump
+from gsl.core.dynamics import forward_kinematics
+from gsl.core.trajectory import Trajectory
+from gsl.errors import InputError
+from gsl.report.film import Shot
+from gsl.report.film_strip import places, turns, walks
+
+if TYPE_CHECKING:
+    import rerun
+
+PARTS = ("robot", "ghost")
+CLEAR = 0.35  # opacity of the ghost
+_ALONG = {"x": Rotation.from_euler("y", 90, degrees=True), "y": Rotation.from_euler("x", -90, degrees=True)}
+_UPRIGHT = Rotation.identity()
+
+
+def check_viewer() -> None:
+    """Refuse before anything is simulated.
+
+    Raises:
+        InputError: The library is missing.
+    """
+    try:
+        import rerun  # noqa: F401
+    except ImportError as error:
+        raise InputError("the viewer needs gsl[rerun]: pip install 'gsl[rerun]'") from error
+
+
+def record_shots(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], path: Path | None) -> None:
+    """Write a recording of one or two trajectories, the second as a ghost; without a path, show it in the viewer.
+
+    Raises:
+        InputError: The viewer cannot be started.
+    """
+    import rerun
+
+    recording = rerun.RecordingStream("gsl", recording_id=shots[0].title)
+    if path is not None:
+        recording.save(str(path))
+    else:
+        try:
+            recording.spawn()
+        except (RuntimeError, OSError) as error:
+            raise InputError(f"the viewer cannot be started ({error}); write a file with out=motion.rrd") from error
+    recording.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    _log_floor(recording, shots)
+    for part, shot in zip(PARTS, shots, strict=False):
+        _log_body(recording, robot, part, shot)
+        _log_motion(recording, robot, joints, part, shot.trajectory)
+        _log_curves(recording, joints, part, shot)
+    recording.flush()
+    recording.disconnect()
+
+
+def _log_floor(recording: rerun.RecordingStream, shots: Sequence[Shot]) -> None:
+    """Log lines on the floor, a metre apart, as far as anybody goes; for a base that is held there is none."""
+    import rerun
+
+    if not any(walks(shot.trajectory) for shot in shots):
+        return
+    way = np.concatenate([places(shot.trajectory)[:, :2] for shot in shots])
+    (left, low), (right, high) = np.floor(way.min(axis=0)) - 1.0, np.ceil(way.max(axis=0)) + 1.0
+    lines = [[[x, low, 0.0], [x, high, 0.0]] for x in np.arange(left, right + 0.5)]
+    lines += [[[left, y, 0.0], [right, y, 0.0]] for y in np.arange(low, high + 0.5)]
+    recording.log("world/floor", rerun.LineStrips3D(np.array(lines), colors=[150, 150, 150]), static=True)
+
+
+def _log_body(recording: rerun.RecordingStream, robot: Robot, part: str, shot: Shot) -> None:
+    """Log the shapes of the links once; they hang on frames that move."""
+    import rerun
+
+    ghost = part == PARTS[1]
+    tint = np.array([int(shot.colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+    for name, link in lump(robot).links.items():
+        for number, shape in enumerate(link.shapes):
+            colour = [*(tint if ghost else shape.colour), CLEAR if ghost else 1.0]
+            recording.log(f"world/{part}/{name}/shape_{number}", _solid(rerun, shape, colour), static=True)
+    recording.log(f"world/{part}", rerun.AnyValues(title=shot.title), static=True)
+
+
+def _solid(rerun: Any, shape: Shape, colour: Sequence[float]) -> Any:
+    turn = Rotation.from_euler("xyz", shape.turn)
+    along = _ALONG.get(shape.along, _UPRIGHT) if shape.kind == "cylinder" else _UPRIGHT
+    how = {
+        "centers": [shape.centre],
+        "quaternions": [rerun.Quaternion(xyzw=(turn * along).as_quat())],
+        "colors": [[round(255 * value) for value in colour]],
+        "fill_mode": rerun.components.FillMode.Solid,
+    }
+    if shape.kind == "box":
+        return rerun.Boxes3D(sizes=[shape.size], **how)
+    if shape.kind == "sphere":
+        return rerun.Ellipsoids3D(half_sizes=[[shape.size[0]] * 3], **how)
+    return rerun.Cylinders3D(radii=[shape.size[0]], lengths=[shape.size[1]], **how)
+
+
+def _log_motion(
+    recording: rerun.RecordingStream, robot: Robot, joints: Sequence[str], part: str, trajectory: Trajectory
+) -> None:
+    import rerun
+
+    body = lump(robot)
+    columns = dict(zip(joints, trajectory.position.T, strict=True))
+    columns |= {name: columns[driver] for name, driver in robot.coupled.items() if driver in columns}
+    poses = [
+        forward_kinematics(body, {**robot.stance, **{name: float(values[t]) for name, values in columns.items()}})
+        for t in range(len(trajectory.time))
+    ]
+    where, base = places(trajectory), Rotation.from_quat(turns(trajectory))
+    time = rerun.TimeColumn("time", duration=trajectory.time)
+    for name in body.links:
+        origin = where + base.apply(np.array([pose.origin[name] for pose in poses]))
+        turn = base * Rotation.from_matrix(np.array([pose.turn[name] for pose in poses]))
+        frames = rerun.Transform3D.columns(translation=origin, quaternion=turn.as_quat())
+        recording.send_columns(f"world/{part}/{name}", [time], frames)
+
+
+def _log_curves(recording: rerun.RecordingStream, joints: Sequence[str], part: str, shot: Shot) -> None:
+    import rerun
+
+    colour = [int(shot.colour[k : k + 2], 16) for k in (1, 3, 5)]
+    trajectory = shot.trajectory
+    curves = {part: (trajectory.position, colour, 2.0)}
+    if part == PARTS[0]:
+        curves["command"] = (trajectory.action, [120, 120, 120], 1.0)
+    for name, (values, shade, width) in curves.items():
+        time = rerun.TimeColumn("time", duration=trajectory.time[: len(values)])
+        for k, joint in enumerate(joints):
+            place = f"joints/{joint}/{name}"
+            recording.log(place, rerun.SeriesLines(colors=[shade], widths=[width], names=name), static=True)
+            recording.send_columns(place, [time], rerun.Scalars.columns(scalars=np.degrees(values[:, k])))

@@ -1,0 +1,150 @@
+"""Runs are chosen, set side by side and cleaned up; nothing outside of the runs folder goes."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from commands import done, gsl, refused
+
+from gsl.storage.artifact import build
+
+
+@dataclass
+class Measuring:
+    """A stage that reports what it is made with."""
+
+    kind: str
+    metrics: Mapping[str, Any]
+    above: Mapping[str, Path]
+
+    def parents(self) -> Mapping[str, Path]:
+        return self.above
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        (folder / "note").write_text(json.dumps(self.metrics))
+        return self.metrics
+
+
+def make(place: str, kind: str, metrics: Mapping[str, Any], *, above: str = "", force: bool = False) -> None:
+    parents = {"policies": Path("runs") / above} if above else {}
+    config = {
+        "policies": f"runs/{above}",
+        "world": {"robot": "nao", "effects": {"backlash": {"width": 0.1}}},
+        **metrics,
+    }
+    command = f"gsl {kind} world=worn"
+    stage = Measuring(kind, metrics, parents)
+    build(stage, config=config, out=Path("runs") / place, command=command, force=force, console=None)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    for number, value in enumerate((0.3, 0.1, 0.2)):
+        make(f"walk{number}/optimize", "optimize", {"best": value, "of": {"falls": number}})
+    make("walk0/evaluate", "evaluate", {"best": 0.25}, above="walk0/optimize")
+    return tmp_path
+
+
+def listed(*words: str, folder: Path) -> list[str]:
+    artifacts = json.loads(done("runs", *words, "--json", folder=folder).out)["artifacts"]
+    return [one["folder"].removeprefix("runs/") for one in artifacts]
+
+
+def test_runs_are_sorted_by_any_metric_and_the_last_ones_are_kept(home: Path) -> None:
+    assert listed("sort=best", folder=home) == ["walk1/optimize", "walk2/optimize", "walk0/evaluate", "walk0/optimize"]
+    assert listed("sort=-of.falls", folder=home) == ["walk2/optimize", "walk1/optimize", "walk0/optimize"]
+    assert listed("sort=best", "limit=2", folder=home) == ["walk0/evaluate", "walk0/optimize"]
+
+
+@pytest.mark.parametrize(
+    ("word", "left"),
+    [
+        ("kind=evaluate", ["walk0/evaluate"]),
+        ("name=walk0", ["walk0/evaluate", "walk0/optimize"]),
+        ("name=*1/opt*", ["walk1/optimize"]),
+        ("metric=best>0.2", ["walk0/evaluate", "walk0/optimize"]),
+        ("metric=of.falls<=0", ["walk0/optimize"]),
+        ("newer=1d", ["walk0/evaluate", "walk0/optimize", "walk1/optimize", "walk2/optimize"]),
+        ("older=1d", []),
+        ("world=backlash", ["walk0/evaluate", "walk0/optimize", "walk1/optimize", "walk2/optimize"]),
+        ("world=worn", ["walk0/evaluate", "walk0/optimize", "walk1/optimize", "walk2/optimize"]),
+    ],
+)
+def test_runs_are_chosen_by_one_word(word: str, left: list[str], home: Path) -> None:
+    assert listed(word, "sort=name", folder=home) == left
+
+
+@pytest.mark.parametrize(
+    ("word", "line"),
+    [
+        ("sort=falls", "did you mean of.falls"), ("kind=fly", "there is evaluate, optimize"), ("newer=soon", "7d"),
+        ("metric=best>much", "condition"), ("limit=-1", "at least 0"), ("colour=red", "no such setting"),
+        ("best", "name=value"), ("world=mars", "no artifact"),
+    ],
+)  # fmt: skip
+def test_a_wrong_word_of_runs_is_one_line(word: str, line: str, home: Path) -> None:
+    assert line in refused("runs", word, folder=home)
+
+
+def test_diff_shows_what_differs_and_nothing_else(home: Path) -> None:
+    told = json.loads(done("diff", "walk0/optimize", "walk1", "--json", folder=home).out)
+    assert told["metrics"] == {"best": [0.3, 0.1], "of.falls": [0, 1]}
+    assert told["settings"] == told["metrics"]  # the stage reports what it was made with
+    assert (told["made_from"], told["software"], told["same"]) == ({}, {}, False)
+    assert "-0.2" in done("diff", "walk0/optimize", "walk1", folder=home).out
+    assert "the same settings" in done("diff", "walk1", "walk1", folder=home).out
+    assert "did you mean walk1" in refused("diff", "walk1", "walc1", folder=home)
+
+
+def test_clean_removes_what_it_has_named_when_it_is_asked_to(home: Path) -> None:
+    for name in ("walk1/.evaluate.partial", ".multirun/collect-x", "killed/.optimize.tmp-99999999"):
+        (home / "runs" / name).mkdir(parents=True)
+        (home / "runs" / name / "work").write_bytes(b"0" * 1000)
+    before = json.loads(done("clean", "--json", folder=home).out)
+    assert [entry["bytes"] for entry in before["entries"]] == [1000] * 3 and not before["removed"]
+    assert "3,000 B could go" in done("clean", folder=home).out
+    assert "3,000 B removed" in done("clean", "--yes", folder=home).out
+    assert sorted(path.name for path in (home / "runs").iterdir()) == ["walk0", "walk1", "walk2"]
+    assert [path.name for path in (home / "runs/walk1").iterdir()] == ["optimize"]
+    assert "nothing" in done("clean", "--yes", folder=home).out
+
+
+def test_clean_leaves_work_that_a_process_is_at(home: Path) -> None:
+    for name in (f".note.tmp-{os.getpid()}", ".optimize.partial"):
+        (home / "runs/walk1" / name).mkdir()
+    with (home / "runs/walk1/.optimize.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert "nothing" in done("clean", "--yes", folder=home).out
+    entries = json.loads(done("clean", "--json", folder=home).out)["entries"]
+    assert sorted(Path(entry["path"]).name for entry in entries) == [".optimize.lock", ".optimize.partial"]
+
+
+def test_clean_goes_to_stale_and_orphaned_artifacts_when_asked_and_leaves_foreign_files(home: Path) -> None:
+    make("walk1/evaluate", "evaluate", {"best": 0.1}, above="walk1/optimize")
+    make("walk0/optimize", "optimize", {"best": 0.4}, force=True)
+    (home / "runs/walk0/evaluate/mine.txt").write_text("notes")
+    (home / "outside").mkdir()
+    (home / "outside/keep").write_text("x")
+    (home / "runs/.link.partial").symlink_to(home / "outside")
+    for path in (home / "runs/walk1/optimize").iterdir():
+        path.unlink()
+    (home / "runs/walk1/optimize").rmdir()
+    assert "stale: runs/walk0/optimize was built anew" in done("clean", "stale=true", folder=home).out
+    assert "orphaned: runs/walk1/optimize is gone" in done("clean", "orphaned=true", folder=home).out
+    done("clean", "stale=true", "orphaned=true", "--yes", folder=home)
+    assert (home / "outside/keep").is_file() and not (home / "runs/.link.partial").is_symlink()
+    assert [path.name for path in (home / "runs/walk0/evaluate").iterdir()] == ["mine.txt"]
+    assert listed("sort=name", folder=home) == ["walk0/optimize", "walk2/optimize"]
+
+
+def test_a_wrong_word_of_clean_is_one_line(home: Path) -> None:
+    assert "there is name, orphaned, stale" in refused("clean", "all=true", folder=home)
+    assert gsl("clean", "stale=perhaps", folder=home).code == 2
