@@ -134,9 +134,8 @@ def _count(data: Document, keys: Sequence[tuple[str, str]]) -> str:
 
 
 def _describe_make(document: Document) -> Iterable[tuple[str, Part]]:
-    seconds, command = finite(document.get("seconds")), document.get("command")
+    command = document.get("command")
     yield "command", element("code", str(command)) if command else None
     yield "the answer in Bullet", _describe_verified(part(document, "verified"))
-    yield "took", f"{seconds:.0f} s" if seconds is not None else ""
     world = document.get("world_file")
     yield "corrected simulator", element("code", str(world)) if world else None

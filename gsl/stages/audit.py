@@ -50,7 +50,7 @@ class Audit:
         document = {**found.document(), "summary": found.summary, "sim": self.sim.robot, "real": self.real}
         documents.write_json(folder / REPORT, document)
         kinds = [one["kind"] for one in document["findings"]]
-        return {"verdict": found.verdict, "findings": kinds, "seconds": found.seconds, "headline": found.summary}
+        return {"verdict": found.verdict, "findings": kinds, "headline": found.summary}
 
     def document(self, folder: Path) -> dict[str, Any]:
         """Return what --json shows of an artifact."""
@@ -82,7 +82,6 @@ def write_wiring(found: Found, folder: Path, *, real: str, sim: str, command: st
         "data": {"sim": f"the simulated {sim}", "source": real},
         "report": PAGE,
         "command": command,
-        "seconds": found.seconds,
     }
     documents.write_json(folder / DIAGNOSIS, report)
     (folder / PAGE).write_text(report_html(report), encoding="utf-8")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, field, replace
 from pathlib import Path, PurePosixPath
@@ -82,7 +81,6 @@ class Diagnose:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json, report.html, the diagnosed world and the next experiment."""
-        begin = time.perf_counter()
         wiring = audit_log(read_logs(self.real), self.sim, self.real) if self.audit else None
         if wiring and wiring.spoils:
             return write_wiring(wiring, folder, real=self.real, sim=self.sim.robot, command=self._command())
@@ -99,7 +97,7 @@ class Diagnose:
         findings = diagnose(logs["real"], plant, step, options, tick, reference=logs.get("reference"))
         gap = self._policy_gap(measured, findings, console) if measured else None
         remarks = wiring.doubts if wiring else ()
-        return self._write(findings, logs["real"], gap, folder, tick, begin, remarks)
+        return self._write(findings, logs["real"], gap, folder, tick, remarks)
 
     def document(self, folder: Path) -> dict[str, Any]:
         """Return what --json shows of an artifact: the report without its curves."""
@@ -137,7 +135,6 @@ class Diagnose:
         gap: Mapping[str, Any] | None,
         folder: Path,
         tick: PhaseReporter,
-        begin: float,
         remarks: Sequence[str],
     ) -> Mapping[str, Any]:
         report = document(
@@ -154,7 +151,6 @@ class Diagnose:
         )
         if self.limits:
             report["limits"] = [asdict(one) for one in limits(findings, report["shrinkage"], tick)]
-        report["seconds"] = time.perf_counter() - begin
         report["caveats"] += filter(None, [*remarks, self._stranger(batch), clock_caveat(batch, self.clocks)])
         documents.write_json(folder / REPORT, report)
         (folder / PAGE).write_text(report_html(report), encoding="utf-8")

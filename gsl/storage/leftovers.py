@@ -15,6 +15,7 @@ from gsl.errors import ArtifactError
 from gsl.storage import manifest
 from gsl.storage.lineage import out_of_date
 from gsl.storage.references import find_all
+from gsl.storage.whole import is_alive
 from gsl.storage.workplace import hold_lock
 
 MULTIRUN = ".multirun"
@@ -111,7 +112,7 @@ def _walk(runs: Path) -> Iterator[tuple[Path, str]]:
                     yield job, "what the jobs of a multirun said that failed or was killed"
         for name in [*below, *sorted(files)]:
             entry = _HIDDEN.fullmatch(name)
-            if entry is None or _in_use(here / f".{entry['name']}.lock") or _is_alive(entry["process"]):
+            if entry is None or _in_use(here / f".{entry['name']}.lock") or is_alive(entry["process"] or "0"):
                 continue
             yield here / name, _WORK if entry["partial"] else _TEMPORARY
 
@@ -137,18 +138,6 @@ def _hold(path: Path) -> Iterator[bool]:
         yield free
     finally:
         os.close(descriptor)
-
-
-def _is_alive(process: str | None) -> bool:
-    if process is None:
-        return False
-    try:
-        os.kill(int(process), 0)
-    except PermissionError:
-        return True
-    except (ProcessLookupError, OverflowError):
-        return False
-    return True
 
 
 def _is_inside(path: Path, runs: Path) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import errno
+import glob
 import os
 import re
 from collections.abc import Iterator
@@ -82,9 +83,15 @@ def _is_hidden_in(folder: Path, path: object) -> bool:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary name beside `path` that takes its place when the block ends well and vanishes when not."""
+    """Yield a temporary name beside `path` that takes its place when the block ends well and vanishes when not.
+
+    The temporary file of an earlier, killed process goes.
+    """
     temporary = path.with_name(f".{path.name}.tmp-{os.getpid()}")
     with explain_refusal(path.parent):
+        for other in path.parent.glob(f".{glob.escape(path.name)}.tmp-*"):
+            if other.is_file() and not is_alive(other.name.rpartition("-")[2]):
+                other.unlink(missing_ok=True)
         try:
             yield temporary
             flush(temporary)
@@ -93,6 +100,19 @@ def replacing(path: Path) -> Iterator[Path]:
         finally:
             if temporary.is_file():
                 temporary.unlink()
+
+
+def is_alive(process: str) -> bool:
+    """Whether a process of this number runs on this machine; a word that is no number counts as running, 0 does not."""
+    if not process.isdecimal():
+        return True
+    try:
+        os.kill(int(process), 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return int(process) != 0
 
 
 def remove_temporary(folder: Path) -> None:

@@ -84,3 +84,10 @@ def test_an_import_says_what_it_sees_and_mends_what_it_is_asked_to(tmp_path: Pat
     assert np.ptp(one.position[:, 0] - wave) < 1e-6
     assert np.abs(one.position[:, 1] - 0.4 * np.sin(2.0 * time)).max() < 0.01
     assert np.abs(one.velocity).max() < 10.0
+
+
+@pytest.mark.parametrize("stage", ["audit", "diagnose"])
+def test_the_same_log_gives_the_same_payload_again(stage: str, folder: Path) -> None:
+    few = () if stage == "audit" else ("most=1", "duels=0", "nulls=0", "limits=false")
+    done(stage, "real=good", *SIM, f"name=twice_{stage}", *few, folder=folder)
+    assert "differs" not in done("rerun", f"twice_{stage}/{stage}", "trust=blind_arm", folder=folder).out

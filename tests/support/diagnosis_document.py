@@ -209,7 +209,6 @@ def document(joints: tuple[str, ...] = NAO, *, causes: int = 2) -> dict[str, Any
             ],
         },
         "verified": {"windows": 12, "chain_rms_mrad": 0.31, "rms": 1.07},
-        "seconds": 42.0,
         "command": "gsl diagnose real=runs/worn/collect_real sim=nao_ideal",
     }
 

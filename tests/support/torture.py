@@ -24,16 +24,18 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import yaml
 from commands import SMALL, done
 from torture_faults import FAULTS, fault, fill, flip
-from torture_inputs import feed
-from torture_kills import kill, killed
+from torture_inputs import ROOT, feed
+from torture_kills import BLIND, kill, shares
 
 from gsl.storage.hashing import sources_hash
 
 SIZES = {"kills": 240, "faults": 1, "inputs": 10_000, "flips": 2000, "disks": 20}
 SLICE = {"inputs": 200, "flips": 500, "disks": 10}  # cases
 LANES = 2
+LONGEST = 1800.0  # [s] of a slice; one that takes longer hangs
 MOST = 2e9  # [bytes] of a process
 
 
@@ -62,10 +64,8 @@ def drawn(seed: int, of: Slice) -> np.random.Generator:
 
 def slices(sizes: Mapping[str, int]) -> Iterator[Slice]:
     """Yield all slices of a campaign, those that take long first."""
-    names = killed()
-    for index, name in enumerate(names):
-        if count := sizes["kills"] // len(names) + (index < sizes["kills"] % len(names)):
-            yield Slice("kills", name, 0, count)
+    if sizes["kills"]:
+        yield from (Slice("kills", name, 0, count) for name, count in shares(sizes["kills"]).items())
     yield from (Slice("faults", name, number, 1) for name in FAULTS for number in range(sizes["faults"]))
     for part, most in SLICE.items():
         yield from (Slice(part, "", at, min(most, sizes[part] - at)) for at in range(0, sizes[part], most))
@@ -104,12 +104,12 @@ def campaign(place: Path, seed: int, sizes: Mapping[str, int]) -> Iterator[dict[
 def _apart(place: Path, of: Slice, seed: int) -> dict[str, Any]:
     begin = time.monotonic()
     words = [sys.executable, __file__, "slice", json.dumps(of), f"seed={seed}", f"at={place}"]
-    process = subprocess.run(words, stdout=subprocess.PIPE, text=True)
     try:
+        process = subprocess.run(words, stdout=subprocess.PIPE, text=True, timeout=LONGEST)
         row = json.loads(process.stdout.splitlines()[-1])  # before that, what processes of a launcher say
-    except (ValueError, IndexError):
+    except (ValueError, IndexError, subprocess.TimeoutExpired) as error:
         row = {"counts": {"! slice without a result": 1}, "bytes": 0}
-        sys.stderr.write(f"! {of}: ended with {process.returncode}\n")
+        sys.stderr.write(f"! {of}: {type(error).__name__}\n")
     return {"slice": of, "seconds": round(time.monotonic() - begin), **row}
 
 
@@ -131,21 +131,47 @@ def chain(place: Path) -> Path:
 
 
 def air(place: Path) -> Path:
-    """Record a few motions in the air."""
+    """Record a few motions in the air, ask a robot, and make files that commands begin with."""
     motions = ("policy.motions=[steps_large,triangle_slow]", "policy.duration=1.5", "workers=1")
     done("collect", "role=real", "name=air", "task=excite", "world=nao_worn", *motions, folder=place)
+    done("collect", "role=real", "world=robot", "name=asked", *SMALL, folder=place)
+    done("blind", "make", "name=blind", *BLIND, folder=place)
+    write_log(place / "runs/files")
     return place
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """Return what was tried and what went wrong, as a table of a page."""
-    counts = sum((Counter(row["counts"]) for row in rows), Counter[str]())
-    lines = ["| what | how often |", "|---|---|"]
-    lines += [f"| {what} | {count:,} |" for what, count in sorted(counts.items()) if what[0] != "!"]
-    lines += [f"| **{what[2:]}** | {count:,} |" for what, count in sorted(counts.items()) if what[0] == "!"]
-    lines += [f"| most memory of a process | {max(row['bytes'] for row in rows) / 1e9:.2f} GB |"]
-    lines += [f"| time on {LANES} lanes | {sum(row['seconds'] for row in rows) / 60 / LANES:.0f} min |"]
+def write_log(folder: Path) -> None:
+    """Write a log of a pendulum and its mapping."""
+    folder.mkdir(parents=True, exist_ok=True)
+    moments = np.arange(40) * 0.02
+    angles = np.sin(np.arange(40) * 0.1)
+    lines = (f"{a:.3f},{b:.6f},{0.9 * b:.6f}\n" for a, b in zip(moments, angles, strict=True))
+    (folder / "log.csv").write_text("time,action.joint,position.joint\n" + "".join(lines))
+    mapping = yaml.safe_load((ROOT / "conf/mapping/plain.yaml").read_text())
+    (folder / "mine.yaml").write_text(yaml.safe_dump(mapping | {"robot": "pendulum", "joints": ["joint"]}))
+
+
+def table(rows: list[dict[str, Any]], seed: int) -> str:
+    """Return what was tried, how often, what went wrong, and the command that tries it again, as a table of a page."""
+    lines = ["| tried | how often | went wrong | again with |", "|---|---|---|---|"]
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row["slice"][:2]), []).append(row)
+    for (part, name), mine in sorted(groups.items(), key=lambda group: (list(PARTS).index(group[0][0]), group[0][1])):
+        good, bad = _counted(mine)
+        size = sum(row["slice"][3] for row in mine)
+        lines += [f"| {part} {f'`{name}`' if name else ''} | {good} | {bad or 0} | `{part}={size} seed={seed}` |"]
+    lines += ["", f"Most memory of a process: {max(row['bytes'] for row in rows) / 1e9:.2f} GB."]
+    lines += [f"Time on {LANES} lanes: {sum(row['seconds'] for row in rows) / 60 / LANES:.0f} min."]
     return "\n".join(lines)
+
+
+def _counted(rows: list[dict[str, Any]]) -> tuple[str, str]:
+    """Return what was tried and what went wrong."""
+    counts = sum((Counter(row["counts"]) for row in rows), Counter[str]())
+    items = sorted(item for item in counts.items() if item[1])
+    good = "; ".join(f"{count:,} {what}" for what, count in items if what[0] != "!")
+    return good, "; ".join(f"**{count:,} {what[2:]}**" for what, count in items if what[0] == "!")
 
 
 def main(words: list[str]) -> int:
@@ -172,7 +198,7 @@ def main(words: list[str]) -> int:
         rows.append(row)
         wrong = {what: count for what, count in row["counts"].items() if what[0] == "!" and count}
         sys.stderr.write(f"{Slice(*row['slice'])}: {row['seconds']} s {wrong or ''}\n")
-    sys.stdout.write(table(rows) + "\n")
+    sys.stdout.write(table(rows, seed) + "\n")
     bad = any(count for row in rows for what, count in row["counts"].items() if what[0] == "!")
     return int(bad or max(row["bytes"] for row in rows) > MOST)
 

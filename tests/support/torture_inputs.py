@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import yaml
 from commands import SMALL, Said, done, gsl
+from torture_code import CANARY, CODES, MODULE, YAMLS_WITH_CODE, Pickled, Watch, has_code
 
 SLOW_CPU = 30.0  # [s] after which an input counts as a hang,
 SLOW = 120.0  # [s] of a clock, on a busy machine
@@ -23,17 +24,20 @@ ROOT = Path(__file__).parents[2]
 COMMANDS = (
     *("collect", "train-forward", "train-inverse", "train-servo", "train-grounding", "optimize", "diagnose"),
     *("identify", "cross-validate", "evaluate", "survey", "answer", "rehearse", "iterate", "import", "compare"),
+    *("audit", "wiring", "export", "blind make", "blind answer", "blind reveal", "blind wiring"),
 )
 LINES = (
     *("", "-1", "0", "1e999", "nan", "null", "true", "[]", "{}", "[", "{a: 1", "'", "../x", "/", ".", "*", "a b", "~"),
     *("9" * 400, "${name}", "${nothing}", "${oc.env:HOME}", "${name", "{_target_: os.system}", "???", "1,2", "a=b"),
     *("\n", "x" * 5000, "\u202e", "\x1b[2J", "tcp://127.0.0.1:1", "dask", "range(1,3)", "glob(*)", "choice(1,2)"),
+    *("canary_module.Thing", "{_target_: canary_module.Thing}"),
 )
 KEYS = (
     *("name", "out", "force", "trust", "seed", "workers", "world", "task", "policy", "preset", "recipe", "episodes"),
     *("world.effects.backlash.width", "world.effects", "world.period", "task.duration", "spread", "initial", "role"),
     *("a.b", "_target_", "hydra.run.dir", "world._target_", "effects", "++x", "~world", "policy.file", "experiment"),
     *("executor", "address", "sim", "real", "grounding", "grounding.alpha", "data", "mapping", "source", "request"),
+    *("world.x._target_", "policy._target_", "task._target_", "optimizer._target_", "sim._target_"),
     *("optimizer", "budget.rollouts", "methods.gat", "trials", "hydra/launcher", "hydra.sweeper.params", "known"),
 )
 DOUBLED = "".join(f"a{k}: &a{k} [*a{k - 1}, *a{k - 1}]\n" for k in range(1, 30))
@@ -60,7 +64,11 @@ def feed(folder: Path, number: int, seed: int, counts: Counter[str]) -> None:
     from hypothesis import strategies as st
 
     inputs = Inputs(folder)
-    before = _sizes(folder)
+    (folder / "canary_module.py").write_text(MODULE)
+    plugin = folder / "hydra_plugins/stranger"
+    plugin.mkdir(parents=True)
+    (plugin / "__init__.py").write_text(MODULE)
+    before, watch, canary = _sizes(folder), Watch(folder), folder / CANARY
 
     @seeded(seed)
     @settings(
@@ -70,12 +78,21 @@ def feed(folder: Path, number: int, seed: int, counts: Counter[str]) -> None:
     def give(data: Any) -> None:
         inputs.clear()
         words = inputs.draw(data.draw)
+        counts["inputs with code"] += has_code(words, inputs.mine)
+        watch.elsewhere.clear()
         begin, busy = time.monotonic(), time.process_time()
         said = gsl(*words, folder=folder)
         took, worked = time.monotonic() - begin, time.process_time() - busy
         counts["inputs"] += 1
         counts[f"inputs, exit code {said.code}"] += 1
         judge(said, words, counts)
+        if canary.exists():
+            counts["! code executed without trust="] += 1
+            sys.stderr.write(f"! code executed: {words}\n")
+            canary.unlink()
+        if watch.elsewhere:
+            counts["! written elsewhere"] += 1
+            sys.stderr.write(f"! written elsewhere: {words}: {watch.elsewhere[:3]}\n")
         if worked > SLOW_CPU or took > SLOW:
             counts["! hang"] += 1
             sys.stderr.write(f"! hang ({worked:.0f} s of CPU, {took:.0f} s): {words}\n")
@@ -118,6 +135,9 @@ class Inputs:
         packed = io.BytesIO()
         np.savez_compressed(packed, **{"time": time_, "action.joint": angle, "position.joint": 0.9 * angle})
         self.npz = packed.getvalue()
+        packed = io.BytesIO()
+        np.savez(packed, **{"time": time_, "action.joint": np.array([Pickled()] * 40, dtype=object)})
+        self.pickled = packed.getvalue()
         self.json = [{"time": a, "action.joint": b, "position.joint": b} for a, b in zip(time_, angle, strict=True)]
         self.request = self._asked()
 
@@ -151,7 +171,7 @@ class Inputs:
 
         words = draw(st.lists(st.tuples(st.sampled_from(KEYS), _word()).map("=".join), min_size=1, max_size=3))
         flags = draw(st.sampled_from([("--cfg", "job"), ("--cfg", "job", "--multirun"), ("--cfg", "job", "--json")]))
-        return (draw(st.sampled_from(COMMANDS)), *flags, *words)
+        return (*draw(st.sampled_from(COMMANDS)).split(), *flags, *words)
 
     def _yaml(self, draw: Any) -> tuple[str, ...]:
         from hypothesis import strategies as st
@@ -161,7 +181,8 @@ class Inputs:
         place.parent.mkdir()
         place.write_bytes(self._document(draw, self.world, YAMLS, yaml.safe_dump))
         choice = () if group == "effect" else (f"{group}=mine",)
-        return ("collect", f"--config-dir={self.mine}", "--cfg", "job", *choice)
+        how = ("name=fuzz", *SMALL) if draw(st.integers(0, 3)) == 0 else ("--cfg", "job")
+        return ("collect", f"--config-dir={self.mine}", *how, *choice)
 
     def _artifact(self, draw: Any) -> tuple[str, ...]:
         from hypothesis import strategies as st
@@ -191,6 +212,8 @@ class Inputs:
             mapping = self._document(draw, self.mapping, YAMLS, yaml.safe_dump)
         else:
             log = _damaged(draw, log) if kind != "json" else self._document(draw, self.json, JSONS, json.dumps)
+        if kind == "npz" and draw(st.integers(0, 3)) == 0:
+            log = self.pickled
         (self.mine / f"log.{kind}").write_bytes(log)
         (self.mine / "mine.yaml").write_bytes(mapping)
         more = draw(st.sampled_from([("--check",), ("--check",), ("name=fuzz",)]))
@@ -231,7 +254,12 @@ class Inputs:
         """Return a document in which entries are exchanged, or bytes; or another one altogether."""
         from hypothesis import strategies as st
 
-        match draw(st.sampled_from(["entries", "entries", "bytes", "odd", "other"])):
+        match draw(st.sampled_from(["entries", "entries", "bytes", "odd", "other", "code"])):
+            case "code" if dump is yaml.safe_dump:
+                return str(draw(st.sampled_from(YAMLS_WITH_CODE))).encode()
+            case "code":
+                code = draw(st.sampled_from(CODES))
+                return dump({**tree, "x": code} if isinstance(tree, dict) else code).encode()
             case "entries":
                 return dump(_exchanged(draw, tree)).encode("utf-8", "surrogatepass")
             case "bytes":
@@ -286,7 +314,7 @@ def _change(draw: Any, node: Any, key: Any) -> None:
 
     change = draw(st.sampled_from(["exchange", "exchange", "remove", "rename"]))
     if change == "exchange":
-        node[key] = draw(_tree())
+        node[key] = copy.deepcopy(draw(st.one_of(_tree(), st.sampled_from(CODES))))  # which is changed later
     elif change == "remove" or isinstance(node, list):
         del node[key]
     else:

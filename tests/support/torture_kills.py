@@ -17,6 +17,7 @@ import numpy as np
 from commands import ENVIRONMENT, SMALL, eventually, gsl, session
 
 from gsl.effects.effect import names
+from gsl.runner.preflight import LOCK
 from gsl.storage import manifest
 
 FEW = {"command_latency", "servo_gain", "coulomb_friction"}  # effects that a diagnosis tries
@@ -24,6 +25,11 @@ AIR = ("real=air", "sim=nao_ideal", f"without=[{','.join(sorted({*names()} - FEW
 PAIR = ("preset=toy", "task.duration=1.6", "workers=2")
 METHODS = ("ane_01", "ane_02", "gat_005", "gat", "effects", "effects_gat")
 LEFT_OUT = ("~worlds.nao_weak", *(f"~methods.{name}" for name in METHODS))
+BLIND = (
+    *("cases=2", "mix.foreign=120", "excitation.motions=[steps_large,triangle_fast]", "programmes=1", "workers=1"),
+    *("excitation.repeated=[steps_large]", "excitation.duration=1.6"),
+)
+SHARE = {"train-servo": 0.15, "compare": 0.3, "survey": 0.2, "iterate": 0.6, "identify": 0.6}  # those that take long
 KILLED = {
     "collect": ("role=real", *SMALL),
     "collect with two workers": ("role=real", *PAIR),
@@ -37,11 +43,15 @@ KILLED = {
     "evaluate": ("policies=chain/optimize", *SMALL),
     "iterate": (*SMALL, "grounding=gat", "accept=true", "forward_model=linear"),
     "diagnose": (*AIR, "most=1", "duels=0", "nulls=0", "limits=false"),
-    "identify": AIR,
+    "identify": (*AIR, "evaluations=160"),
+    "import": ("source=runs/files/log.csv", "mapping=runs/files/mine.yaml"),
+    "blind make": BLIND,
+    "rehearse": ("request=runs/asked/collect_real.request", "out=runs/k/rehearsal"),
     "survey": SMALL,
     "compare": ("preset=toy", "iterate.task.duration=1.6", "iterate.workers=1", "trials=1", *LEFT_OUT),
 }  # fmt: skip
 NEEDS = {"executor=dask": "distributed", "hydra/launcher=joblib": "hydra_plugins.hydra_joblib_launcher"}
+STAYS = (".complete", ".trials.json.sha256", LOCK)  # the chain, the hash of a ledger, a file that the runner locks
 LONGEST = 600.0  # [s] that a command may take on a busy machine
 GONE = 20.0  # [s] in which what a killed command started has to end
 
@@ -62,6 +72,7 @@ def _is_there(package: str) -> bool:
 def kill(folder: Path, name: str, number: int, rng: np.random.Generator, counts: Counter[str]) -> None:
     """Kill a command so many times, by turns at a random moment and before a write."""
     words, run = _words(name), folder / "runs/k"
+    _prepare(folder, name)
     begin = time.monotonic()
     with _started(words, 0, folder) as process:
         process.communicate()
@@ -74,6 +85,7 @@ def kill(folder: Path, name: str, number: int, rng: np.random.Generator, counts:
         if counts[f"kills of {name}"] == number:
             break
         at = int(rng.integers(1, writes + 1)) if tried % 2 else 0
+        _prepare(folder, name)
         with _started(words, at, folder) as process:
             # Before a fifth of the time there is nothing but imports.
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -89,17 +101,17 @@ def kill(folder: Path, name: str, number: int, rng: np.random.Generator, counts:
 def again(folder: Path, words: tuple[str, ...], wanted: dict[str, str], counts: Counter[str]) -> None:
     """Start a command again, look at all that it has to come to, and take it away."""
     run = folder / "runs/k"
-    if run.exists() and [*run.rglob("manifest.json")]:
+    if payloads(run):
         damaged = gsl("verify", "k", folder=folder)
         counts["! damaged after a kill"] += _bad(damaged.code != 0, words, damaged.err)
     said = gsl(*words, folder=folder)
     counts["! restart refused"] += _bad(said.code != 0, words, said.err)
     counts["! another payload"] += _bad(payloads(run) != wanted, words, said.err)
-    left = [path for path in (folder / "runs").rglob("*") if path.name.startswith(".") and path.name != ".complete"]
+    left = [path for path in (folder / "runs").rglob(".*") if path.name not in STAYS]
     counts["! left behind"] += _bad(bool(left), words, f"{left}")
     shutil.rmtree(run, ignore_errors=True)
     for path in left:
-        shutil.rmtree(path, ignore_errors=True)
+        path.unlink() if path.is_file() else shutil.rmtree(path, ignore_errors=True)
 
 
 def _bad(wrong: bool, words: tuple[str, ...], told: str) -> bool:
@@ -110,13 +122,32 @@ def _bad(wrong: bool, words: tuple[str, ...], told: str) -> bool:
 
 def payloads(run: Path) -> dict[str, str]:
     """Return the hash of the contents of each artifact of a run."""
-    folders = (path.parent for path in run.rglob("manifest.json"))
-    return {folder.relative_to(run).as_posix(): manifest.read(folder).contents for folder in folders}
+    folders = (path.parent.relative_to(run) for path in run.rglob("manifest.json"))
+    complete = (folder for folder in folders if not any(part.startswith(".") for part in folder.parts))
+    return {folder.as_posix(): manifest.read(run / folder).contents for folder in complete}
 
 
 def _words(name: str) -> tuple[str, ...]:
-    command, *more = name.replace(" with two workers", "").split()
-    return (command, "name=k", *more, *KILLED[name])
+    return (*name.replace(" with two workers", "").split(), "name=k", *KILLED[name])
+
+
+def _prepare(folder: Path, name: str) -> None:
+    """Put down what a command has to find in its run: a blind benchmark draws from a secret."""
+    if name == "blind make":
+        labels = folder / "runs/k/blind_make_labels"
+        labels.mkdir(parents=True, exist_ok=True)
+        (labels / "secret.txt").write_text("the same in every run\n")
+
+
+def shares(number: int) -> dict[str, int]:
+    """Return how often each command is killed, so that it is so many times in all; each at least once."""
+    names = killed()
+    whole = sum(SHARE.get(name, 1.0) for name in names)
+    counts = {name: max(1, int(number * SHARE.get(name, 1.0) / whole)) for name in names}
+    for name in (name for name in names if name not in SHARE):
+        if sum(counts.values()) < number:
+            counts[name] += 1
+    return counts
 
 
 @contextlib.contextmanager
