@@ -32,8 +32,7 @@ MADE = (
 )  # names of what a trial makes; a world's are files
 NUMBER = ("number", "trial")  # what rows call their trial
 # Settings that came after trials were written down, at what changes nothing.
-LATER = {
-    "race": 0.0,"covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim", "rested": False,
+LATER = {"race": 0.0, "covariance": "diagonal", "beta": 0.0, "aggregate": False, "choice": "sim", "rested": False,
          "multi_step": 1, "first": 1, "calibrated": True, "without": [],
          "objective": "mean", "quantile": 0.25, "servo": None, "motors": "servo",
          "servo_member": 0, "draws": False, "ensemble": False, "screening": 0}  # fmt: skip
