@@ -32,8 +32,8 @@ def worth(trials: Sequence[Trial], task: Task) -> Drawn:
     """Return improvements where every trial has one to tell, else values."""
     told = [trial.told_improvement for trial in trials if trial.told_improvement is not None]
     if len(told) == len(trials):
-        return Drawn("improvement over π0 in real [%]", told)
-    return Drawn(f"in real [{task.unit}]", [task.shown * trial.value for trial in trials])
+        return Drawn("improvement over π0 on the real side [%]", told)
+    return Drawn(f"on the real side [{task.unit}]", [task.shown * trial.value for trial in trials])
 
 
 def improvement_cells(one: Summary) -> tuple[str, str]:

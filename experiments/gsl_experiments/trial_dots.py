@@ -43,7 +43,7 @@ def trial_dots_figure(panels: Mapping[str, Mapping[str, Dots]], *, axis: str, ti
         ):
             draw_methods(axes, methods, CLOSE * spanned)
             axes.set_title(world, loc="left", fontsize=10.5)
-            axes.set_xlabel(axis)
+        whole.supxlabel(axis, fontsize="medium")
         headline(whole, title)
     return whole
 
