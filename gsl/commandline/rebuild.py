@@ -9,7 +9,7 @@ from typing import Any
 
 from gsl.core.described import rebuilt
 from gsl.errors import ArtifactError
-from gsl.storage.artifact import Artifact
+from gsl.storage.artifact import CONFIG, Artifact
 from gsl.storage.identity import content_hash
 
 
@@ -21,7 +21,7 @@ def rebuild(artifact: Artifact, trust: Sequence[str]) -> tuple[Any, dict[str, An
         trust: Modules that are not gsl's and whose classes its settings may name.
 
     Raises:
-        ArtifactError: A parent is no longer what the artifact was made from.
+        ArtifactError: A parent is no longer what the artifact was made from, or the settings name no stage.
         ConfigError: Its settings do not fit this version of gsl.
     """
     config = artifact.config
@@ -30,7 +30,12 @@ def rebuild(artifact: Artifact, trust: Sequence[str]) -> tuple[Any, dict[str, An
         if content_hash(source) != parent.hash:
             raise ArtifactError(source, f"is no longer what {artifact.folder.as_posix()} was made from")
         _move(config, parent.role.split("."), source)
-    return rebuilt(config, trust=trust), config
+    stage = rebuilt(config, trust=trust)
+    if not (hasattr(stage, "parents") and hasattr(stage, "run")):
+        raise ArtifactError(
+            artifact.folder / CONFIG, "names no stage; it is not as gsl wrote it, build the artifact again"
+        )
+    return stage, config
 
 
 def _move(settings: Any, role: list[str], source: Path) -> None:

@@ -108,6 +108,13 @@ def test_a_rerun_comes_to_the_same_payload_in_another_place(stage: str, run: Pat
     )
 
 
+def test_settings_that_name_no_stage_are_refused(run: Path) -> None:
+    config = run / "runs/chain/collect_sim/config.yaml"
+    config.write_text("\n".join(line for line in config.read_text().splitlines() if not line.startswith("_target_")))
+    said = gsl("rerun", "chain/collect_sim", folder=run)
+    assert (said.code, "config.yaml: names no stage" in said.lines[-1]) == (2, True)
+
+
 def test_a_rerun_of_other_parents_or_with_another_result_says_so(run: Path) -> None:
     config = run / "runs/chain/collect_sim/config.yaml"
     config.write_text(config.read_text().replace("\nseed: 1\n", "\nseed: 2\n"))

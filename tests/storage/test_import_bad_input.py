@@ -181,6 +181,10 @@ FILES = {
     "cut.json": (b'{"t": [0.0, 0.1', r"is not JSON \(line 1"),
     "deep.json": (b"[" * 100_000, "is not JSON"),
     "number.json": (b"3", "has no rows of named values"),
+    "ragged.json": (
+        b'[{"t": 0, "goal_shoulder": [1, [2, 3]], "goal_elbow": 0, "q_shoulder": 0, "q_elbow": 0}]',
+        "is not a number, or not as long as the first",
+    ),
     "empty.npz": (b"", "is empty"),
     "no.parquet": (b"PAR1 or not", "is not a parquet file"),
     "ragged.csv": (

@@ -30,7 +30,6 @@ LINES = (
     *("", "-1", "0", "1e999", "nan", "null", "true", "[]", "{}", "[", "{a: 1", "'", "../x", "/", ".", "*", "a b", "~"),
     *("9" * 400, "${name}", "${nothing}", "${oc.env:HOME}", "${name", "{_target_: os.system}", "???", "1,2", "a=b"),
     *("\n", "x" * 5000, "\u202e", "\x1b[2J", "tcp://127.0.0.1:1", "dask", "range(1,3)", "glob(*)", "choice(1,2)"),
-    *("canary_module.Thing", "{_target_: canary_module.Thing}"),
 )
 KEYS = (
     *("name", "out", "force", "trust", "seed", "workers", "world", "task", "policy", "preset", "recipe", "episodes"),

@@ -63,9 +63,18 @@ def numbers(path: Path, name: str, values: Sequence[Any]) -> np.ndarray:
         found = np.array(None)
     if found.dtype.kind in "buif" and found.ndim in (1, 2):
         return found
+    first = _shape(filled[0]) if filled else None
     for row, value in enumerate(filled):
-        shape = np.shape(value) if isinstance(value, list) else ()
-        if isinstance(value, str | dict) or shape != np.shape(filled[0]):
+        shape = _shape(value)
+        if isinstance(value, str | dict) or shape is None or shape != first:
             told = str(value) if len(str(value)) <= 40 else f"{str(value)[:37]}..."
             raise TrajectoryError(path, f"{told} is not a number, or not as long as the first", column=name, row=row)
     raise TrajectoryError(path, "holds no numbers", column=name)
+
+
+def _shape(value: Any) -> tuple[int, ...] | None:
+    """Return the shape of a number or of nested lists, None where rows are of different lengths."""
+    try:
+        return np.shape(value) if isinstance(value, list) else ()
+    except ValueError:
+        return None
