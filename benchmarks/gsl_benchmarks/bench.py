@@ -38,14 +38,12 @@ FIGURES: Mapping[str, tuple[str, float | None]] = {
     "step_us": ("bare physics step, µs", None),
     "rollouts_per_hour": ("rollouts in an hour of one core", None),
     "paper_hours": ("a search of the paper's size, core hours", None),
-    "paper_hours_raced": ("the same with optimizer.race=0.05", None),
 }
 """What each figure is, and the most it should be."""
 
 REPEATS = 9
 ROLLOUTS, WORKERS, ROUNDS = 24, 2, 3
 PAPER = 150 * 10 * 20  # rollouts of a search (the paper's section 6.4)
-RACED = 0.36  # share of physics steps that a race plays of 150 candidates, see docs/results/speed.md
 EPISODES = 30  # in the file whose writing is measured
 
 
@@ -82,7 +80,6 @@ def measured(console: Console) -> dict[str, float]:
         "step_us": bare.step_us,
         "rollouts_per_hour": 3600.0 / bare.seconds,
         "paper_hours": PAPER * bare.seconds / 3600.0,
-        "paper_hours_raced": RACED * PAPER * bare.seconds / 3600.0,
     }
 
 

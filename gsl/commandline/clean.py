@@ -10,7 +10,7 @@ from gsl.core.setting import component, setting
 from gsl.core.validation import make
 from gsl.core.words import several, size
 from gsl.report.console import Console
-from gsl.storage.leftovers import Leftover, find_leftovers, find_outdated, remove
+from gsl.storage.leftovers import Leftover, find_leftovers, find_stale, remove
 from gsl.storage.references import RUNS, name_run
 from gsl.storage.whole import explain_refusal
 
@@ -32,7 +32,7 @@ def clean(words: Sequence[str], console: Console, *, yes: bool) -> int:
         GslError: The folder cannot be written.
     """
     cleaning = make(Cleaning, split_words(words, "clean"))
-    outdated = find_outdated(RUNS, stale=cleaning.stale, orphaned=cleaning.orphaned)
+    outdated = find_stale(RUNS, stale=cleaning.stale, orphaned=cleaning.orphaned)
     items = [item for item in (*find_leftovers(RUNS), *outdated) if cleaning.name in name_run(item.path)]
     kept: list[Leftover] = []
     if yes:
@@ -42,7 +42,7 @@ def clean(words: Sequence[str], console: Console, *, yes: bool) -> int:
     rows = [(item.path.as_posix(), size(item.bytes), "in use" if item in kept else item.why) for item in items]
     if rows:
         console.table(f"{'removed' if yes else 'could go'} below {RUNS}/", ["what", "size", "why"], rows)
-    what = f"{several(len(items) - len(kept), 'entry').replace('entrys', 'entries')}, {total}"
+    what = f"{several(len(items) - len(kept), 'leftover')}, {total}"
     told = f"{what} removed" if yes else f"{what} could go; --yes removes {'it' if len(items) == 1 else 'them'}"
     entries = [{"path": item.path, "bytes": item.bytes, "why": item.why, "in_use": item in kept} for item in items]
     document = {"removed": yes, "entries": entries, "bytes": sum(item.bytes for item in items)}

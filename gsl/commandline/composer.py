@@ -152,7 +152,7 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
     for override in overrides:
         key, value = key_of(override), override.partition("=")[2]
         try:
-            parsed.append(one := parser.parse_override(override))
+            parsed.append(one := parser.parse_overrides([override])[0])  # with the loader, which a glob asks
         except HydraException as error:
             raise ConfigError(key, _unreadable(override, parser), given=value) from error
         if one.is_sweep_override() and not multirun:
@@ -235,7 +235,11 @@ def _first_value(override: Override) -> str:
     if not override.is_sweep_override():
         return str(override.input_line)
     sweep: Any = override.value()
-    first = next(iter(override.sweep_string_iterator())) if override.is_discrete_sweep() else sweep.start
+    first = next(iter(override.sweep_string_iterator()), None) if override.is_discrete_sweep() else sweep.start
+    if first is None:
+        raise ConfigError(
+            override.key_or_group, "fits no file of a group", given=str(override.input_line).partition("=")[2]
+        )
     return f"{override.get_key_element()}={first}"
 
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from gsl.errors import ArtifactError
 from gsl.report.account import plain
 from gsl.report.console import Console
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.hashing import SHORT
 from gsl.storage.identity import flat
-from gsl.storage.references import name_run, resolve
+from gsl.storage.references import name_run, resolve_main
 
 Pair = tuple[Any, Any]
 ABSENT = "-"
@@ -30,7 +28,7 @@ def compare(first: str, second: str, console: Console) -> None:
     Raises:
         ArtifactError: There is no such artifact, or it is damaged.
     """
-    one, other = (Artifact(folder, manifest.read(folder)) for folder in map(_find, (first, second)))
+    one, other = (Artifact(folder, manifest.read(folder)) for folder in map(resolve_main, (first, second)))
     made = one.manifest, other.manifest
     parents = [{parent.role: parent.hash[:SHORT] for parent in each.parents} for each in made]
     roles = parents[0].keys() & parents[1].keys()  # where such a parent lies is told by its contents
@@ -54,18 +52,6 @@ def compare(first: str, second: str, console: Console) -> None:
     document = {"folders": [one.folder, other.folder], "same": same}
     text = f"{names[0]} and {names[1]}: the same settings, parents, software and metrics" if same else ""
     console.result({**document, **{title.replace(" ", "_"): pairs for title, pairs in parts.items()}}, text=text)
-
-
-def _find(reference: str) -> Path:
-    """Return the artifact that is meant."""
-    try:
-        place = resolve(reference)
-    except ArtifactError as error:
-        try:
-            place = resolve(reference, kind="iterate")
-        except ArtifactError:
-            raise error from None
-    return place.parent if place.is_file() else place
 
 
 def _differ(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Pair]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,12 +11,13 @@ import numpy as np
 
 from gsl.commandline.own_word import find_own_modules, find_trust
 from gsl.commandline.rebuild import rebuild
+from gsl.commandline.words import split_words
 from gsl.core.body import Robot
 from gsl.core.interfaces import REAL, SIM
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.core.trust import modules_in
+from gsl.core.trust import TRUST, modules_in
 from gsl.core.validation import did_you_mean, make
 from gsl.errors import ArtifactError, ConfigError, InputError
 from gsl.grounding.none import NoGrounding
@@ -31,7 +32,7 @@ from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policies import PolicyRecord
 from gsl.storage.policy_choice import FILE, records, vector
-from gsl.storage.references import RUNS, resolve
+from gsl.storage.references import RUNS, resolve, resolve_main
 from gsl.storage.trajectories import data_file, read
 from gsl.storage.whole import explain_refusal, replacing
 from gsl.worlds.bullet import BulletWorld
@@ -86,7 +87,7 @@ def render(reference: str, words: Sequence[str], console: Console) -> None:
         ConfigError: A setting is wrong.
         InputError: The robot cannot be shown.
     """
-    settings = make(Settings, dict(read_settings(words, "render")))
+    settings = make(Settings, read_settings(words, "render"))
     path = Path(settings.out)
     check_format(path)
     cast = assemble(reference, settings, words, console)
@@ -103,7 +104,7 @@ def assemble(reference: str, subject: Subject, words: Sequence[str], console: Co
     """Return who is seen, and what they did; arguments and errors as those of `render`."""
     trust = find_trust([word for word in words if word.startswith("trust=")])
     find_own_modules(trust)
-    folder = _find(reference)
+    folder = resolve_main(reference, kind=SHOWN)
     kind = manifest.read(folder).kind
     console.status(f"{folder.as_posix()}: {kind}")
     cast = _play_logs(folder, subject) if kind in LOGS else _walk(folder, kind, subject, trust, console)
@@ -112,23 +113,9 @@ def assemble(reference: str, subject: Subject, words: Sequence[str], console: Co
     return cast
 
 
-def read_settings(words: Sequence[str], command: str) -> Iterator[tuple[str, Any]]:
-    """Yield typed settings but `trust`, by name."""
-    for word in words:
-        name, sign, value = word.partition("=")
-        if not sign:
-            raise ConfigError(word, f"is no setting; settings of gsl {command} are typed as name=value")
-        if name != "trust":
-            yield name, value
-
-
-def _find(reference: str) -> Path:
-    """Return the artifact that is meant: of a whole run, the one of `iterate`."""
-    try:
-        place = resolve(reference, kind="iterate")
-    except ArtifactError:
-        place = resolve(reference, kind=SHOWN)
-    return place.parent if place.is_file() else place
+def read_settings(words: Sequence[str], command: str) -> dict[str, str]:
+    """Return typed settings but `trust`, by name."""
+    return {name: value for name, value in split_words(words, command).items() if name != TRUST}
 
 
 def _play_logs(folder: Path, settings: Subject) -> Cast:

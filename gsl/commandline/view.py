@@ -22,10 +22,10 @@ from gsl.report.film_strip import walks
 from gsl.report.recording import check_viewer, record_shots
 from gsl.report.style import SIMULATION
 from gsl.storage.whole import explain_refusal, replacing
+from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.fits import fitting_step
 from gsl.worlds.held import Held
 
-STEP = 0.002  # of the physics [s], as in our worlds
-SETTLE = 0.5  # for which the first command is held before [s], as in our worlds
 FORMAT = ".rrd"
 
 
@@ -52,7 +52,7 @@ def view(reference: str, words: Sequence[str], console: Console) -> None:
         ConfigError: A setting is wrong.
         InputError: The robot cannot be shown, or the viewer is missing.
     """
-    settings = make(Viewing, dict(read_settings(words, "view")))
+    settings = make(Viewing, read_settings(words, "view"))
     path = Path(settings.out) if settings.out else None
     if path is not None and path.suffix.lower() != FORMAT:
         raise InputError(f"{path}: a recording is {FORMAT}; choose such a name with out=")
@@ -90,8 +90,8 @@ def replay_in_the_air(robot: Robot, joints: Sequence[str], trajectory: Trajector
     for k, name in enumerate(joints):
         targets[:, robot.controlled.index(name)] = trajectory.action[:, k]
         start[robot.controlled.index(name)] = trajectory.position[0, k]
-    held = Held.of(nominal(robot), period / max(round(period / STEP), 1), period)
-    settle = max(round(SETTLE / period), 1)
+    held = Held.of(nominal(robot), fitting_step(BulletWorld.step, period), period)
+    settle = max(round(BulletWorld.settle / period), 1)
     [answer] = held.play([targets[:, robot.drive]], [start[robot.drive]], settle)
     columns = [robot.motors.index(name) for name in joints]
     position = answer[:, columns]

@@ -78,7 +78,7 @@ def write_lerobot(folder: Path, batch: Batch, task: str) -> list[str]:
         "meta/episodes/file_index": [0] * len(lengths),
     }
     _write(folder / _EPISODES, pa.table(episodes), pq)
-    return _list_left_out(batch)
+    return _list_omissions(batch)
 
 
 def _vectors(batch: Batch) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -130,7 +130,7 @@ def _tasks(task: str) -> Any:
     return pa.Table.from_pandas(pd.DataFrame({"task_index": [0]}, index=pd.Index([task], name="task")))
 
 
-def _list_left_out(batch: Batch) -> list[str]:
+def _list_omissions(batch: Batch) -> list[str]:
     sensors = sorted({name for episode in batch.episodes for name in episode.sensors})
     lines = ["the state after the last action of an episode"]
     if sensors:

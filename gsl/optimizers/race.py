@@ -51,6 +51,7 @@ class Race:
 
     Attributes:
         values: Of the rollouts, NaN where none was played, shape (n, k).
+        counts: Rollouts that each candidate has played, shape (n,).
     """
 
     def __init__(
@@ -62,20 +63,16 @@ class Race:
         rng: np.random.Generator,
     ) -> None:
         self.values = np.full((candidates, rollouts), np.nan)
+        self.counts = np.zeros(candidates, dtype=int)
         self._error, self._judge, self._rng = error, judge, rng
         self._ends = _double(rollouts) if error else [rollouts]
         self._round, self._chance = 0, 0.0
         self._racing = np.ones(candidates, dtype=bool)
 
     @property
-    def played(self) -> np.ndarray:
-        """Rollouts of each candidate so far, shape (n,)."""
-        return np.isfinite(self.values).sum(axis=1)
-
-    @property
     def worths(self) -> np.ndarray:
         """What the search maximises, by the rollouts that each candidate has played, shape (n,)."""
-        pairs = zip(self.values, self.played, strict=True)
+        pairs = zip(self.values, self.counts, strict=True)
         return np.array([float(self._judge(row[None, :count])[0]) for row, count in pairs])
 
     def pairs(self) -> list[tuple[int, int]]:
@@ -90,8 +87,10 @@ class Race:
         """Take the values of the round, in the order of `pairs`."""
         rows, columns = zip(*self.pairs(), strict=True)
         self.values[rows, columns] = values
+        self.counts[self._racing] = self._ends[self._round]
         self._round += 1
-        if self._round < len(self._ends):
+        so_far = self.values[np.arange(self.values.shape[1]) < self.counts[:, None]]
+        if self._round < len(self._ends) and np.isfinite(so_far).all():  # with other values nothing can be foretold
             self._stop()
 
     def _stop(self) -> None:

@@ -48,7 +48,7 @@ class Source(NamedTuple):
     read: Callable[[np.ndarray, Episode], np.ndarray]
 
 
-def find_needed_part(signal: str) -> str:
+def find_part(signal: str) -> str:
     """Return the part of an observation that a signal is computed from; nothing if it needs none."""
     if signal in ("last_action", "constant", "phase"):
         return ""
@@ -57,7 +57,7 @@ def find_needed_part(signal: str) -> str:
 
 def source_of_part(signal: str, layout: Layout) -> Source:
     """Return a signal that is computed from an observation alone."""
-    place = layout[find_needed_part(signal)]
+    place = layout[find_part(signal)]
     if signal == "gravity":
         return Source(AXES, lambda seen, _: turn_back(seen[place], np.array([0.0, 0.0, -1.0])))
     if signal == "body_velocity":

@@ -17,7 +17,7 @@ from gsl.policies.signals import (
     Signal,
     Source,
     constant_source,
-    find_needed_part,
+    find_part,
     phase_source,
     source_of_part,
 )
@@ -107,7 +107,7 @@ class Wiring:
             return constant_source(term.values)
         if term.signal == "phase":
             return phase_source(term.frequency)
-        part = find_needed_part(term.signal)
+        part = find_part(term.signal)
         if part not in layout.sizes:
             observed = [*layout.sizes, "last_action", "constant", "phase"]
             problem = f"this world does not observe it{did_you_mean(part, observed, listed=True)}"

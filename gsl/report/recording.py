@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Robot, Shape, lump
@@ -81,10 +82,9 @@ def _log_body(recording: rerun.RecordingStream, robot: Robot, part: str, shot: S
     import rerun
 
     ghost = part == PARTS[1]
-    tint = np.array([int(shot.colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
     for name, link in lump(robot).links.items():
         for number, shape in enumerate(link.shapes):
-            colour = [*(tint if ghost else shape.colour), CLEAR if ghost else 1.0]
+            colour = [*(to_rgb(shot.colour) if ghost else shape.colour), CLEAR if ghost else 1.0]
             recording.log(f"world/{part}/{name}/shape_{number}", _solid(rerun, shape, colour), static=True)
     recording.log(f"world/{part}", rerun.AnyValues(title=shot.title), static=True)
 
@@ -129,7 +129,7 @@ def _log_motion(
 def _log_curves(recording: rerun.RecordingStream, joints: Sequence[str], part: str, shot: Shot) -> None:
     import rerun
 
-    colour = [int(shot.colour[k : k + 2], 16) for k in (1, 3, 5)]
+    colour = [round(255 * value) for value in to_rgb(shot.colour)]
     trajectory = shot.trajectory
     curves = {part: (trajectory.position, colour, 2.0)}
     if part == PARTS[0]:

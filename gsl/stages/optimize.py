@@ -205,9 +205,10 @@ class Optimize:
             done = episodes(scenario, jobs, workers=self.workers, progress=progress)
             np.add.at(falls, [n for n, _ in pairs], [episode.fell for episode in done])
             race.take([episode.value for episode in done])
-        progress.advance(race.values.size - int(race.played.sum()))
-        means = np.nanmean(race.values, axis=1).tolist() if self.objective == CVAR else None
-        played = race.played.tolist() if error else None
+        progress.advance(race.values.size - int(race.counts.sum()))
+        rows = zip(race.values, race.counts, strict=True)
+        means = [float(row[:count].mean()) for row, count in rows] if self.objective == CVAR else None
+        played = race.counts.tolist() if error else None
         return Generation(index, race.worths.tolist(), falls.tolist(), means, played)
 
     def _judge(self, values: np.ndarray) -> np.ndarray:

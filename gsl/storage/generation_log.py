@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from gsl.storage.records import Records
 
 FILE = "generations.jsonl"
@@ -31,8 +33,10 @@ class Generation(NamedTuple):
     @property
     def winner(self) -> int:
         """Index of the best candidate, which has played all episodes."""
-        whole = [count == max(self.played) for count in self.played] if self.played else [True] * len(self.values)
-        return max((n for n, all_of_them in enumerate(whole) if all_of_them), key=lambda n: self.values[n])
+        if self.played is None:
+            return int(np.argmax(self.values))
+        whole = np.equal(self.played, max(self.played))
+        return int(np.argmax(np.where(whole, self.values, -np.inf)))
 
 
 class GenerationLog:

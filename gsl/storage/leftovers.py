@@ -46,7 +46,7 @@ def find_leftovers(runs: Path) -> list[Leftover]:
     return [Leftover(path, why, measure(path)) for path, why in _walk(runs)]
 
 
-def find_outdated(runs: Path, *, stale: bool, orphaned: bool) -> list[Leftover]:
+def find_stale(runs: Path, *, stale: bool, orphaned: bool) -> list[Leftover]:
     """Return artifacts below `runs` that were made from one that was built anew since, or from one that is gone."""
     reasons: dict[Path, str] = {}
     for artifact in find_all(runs):
@@ -112,7 +112,9 @@ def _walk(runs: Path) -> Iterator[tuple[Path, str]]:
                     yield job, "what the jobs of a multirun said that failed or was killed"
         for name in [*below, *sorted(files)]:
             entry = _HIDDEN.fullmatch(name)
-            if entry is None or _in_use(here / f".{entry['name']}.lock") or is_alive(entry["process"] or "0"):
+            if entry is None or _in_use(here / f".{entry['name']}.lock"):
+                continue
+            if entry["process"] and is_alive(entry["process"]):
                 continue
             yield here / name, _WORK if entry["partial"] else _TEMPORARY
 

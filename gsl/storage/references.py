@@ -76,6 +76,19 @@ def find_all(runs: Path = RUNS) -> list[Artifact]:
     return sorted(_artifacts(runs), key=lambda one: (one.manifest.created, one.folder))
 
 
+def resolve_main(reference: str, *, kind: str | tuple[str, ...] | None = None) -> Path:
+    """Return the folder of the artifact that is meant: of a whole run its `iterate`, else the only one of `kind`.
+
+    Raises:
+        ArtifactError: There is no such artifact, or several fit.
+    """
+    try:
+        place = resolve(reference, kind="iterate")
+    except ArtifactError:
+        place = resolve(reference, kind=kind)
+    return place.parent if place.is_file() else place
+
+
 def artifact_folders(reference: str | None = None, *, runs: Path = RUNS) -> list[Path]:
     """Return the folders of all artifacts that `reference` names, below runs/ without one, damaged ones as well.
 

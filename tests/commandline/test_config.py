@@ -193,6 +193,17 @@ def test_a_multirun_is_checked_before_it_starts(elsewhere: Path, capsys: pytest.
     assert not (elsewhere / "runs").exists()
 
 
+@pytest.mark.parametrize("show", [(), ("--cfg", "job")])
+def test_a_glob_takes_files_of_a_group_and_nothing_else(
+    show: tuple[str, ...], elsewhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(["collect", "-m", *show, "force=glob(*)"]) == 2
+    assert capsys.readouterr().err == "gsl collect: force = glob(*): fits no file of a group\n"
+    assert call(["collect", "-m", *show, "preset=glob(no_such*)"]) == 2
+    assert not (elsewhere / "runs").exists()
+    assert call(["collect", "-m", "--cfg", "job", "preset=glob(*)"]) == 0
+
+
 def test_a_job_is_named_by_what_is_particular_about_it() -> None:
     assert job_level(["seed=1", "++a.b=0.5", "n=3"], ["seed", "a.b"], 4) == "seed=1,a.b=0.5"
     assert job_level(["world@sim=x/y"], ["world@sim"], 4) == "sim=x_y"

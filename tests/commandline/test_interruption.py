@@ -57,7 +57,9 @@ def stopped(stage: str, stop: signal.Signals, chain: Path, out: Path) -> str:
 def test_a_stage_that_is_stopped_leaves_nothing(stage: str, stop: signal.Signals, chain: Path, tmp_path: Path) -> None:
     said = stopped(stage, stop, chain, tmp_path)
     lines = [line for line in said.splitlines() if not line.startswith("fitting ")]
-    lines = [line for line in lines if " rollouts at most: about " not in line]
+    estimates = [line for line in lines if " rollouts at most: about " in line]
+    assert len(estimates) <= (stage in ("optimize", "compare"))  # of a long search; it may be stopped before
+    lines = [line for line in lines if line not in estimates]
     assert lines == [f"gsl {stage}: interrupted; the same command goes on from what is built"]
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
     assert not (chain / "runs" / tmp_path.name).exists()

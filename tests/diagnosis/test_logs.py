@@ -98,7 +98,9 @@ def test_a_folder_of_files_is_one_log(tmp_path: Path) -> None:
 def test_commands_beside_the_positions_are_refused_unless_they_are_zero(group: str, kind: str) -> None:
     def beside(value: float) -> Batch:
         def with_column(episode: Trajectory) -> Trajectory:
-            column = {f"{group}.LKneePitch": np.full(len(episode.time), value)}
+            values = np.full(len(episode.time), value)
+            values[-1] = np.nan  # after the last action there is no command
+            column = {f"{group}.LKneePitch": values}
             return replace(episode, sensors={**(episode.sensors or {}), **column})
 
         return changed(log(), with_column)

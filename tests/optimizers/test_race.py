@@ -34,7 +34,7 @@ def run_race(returns: np.ndarray, error: float, seed: int = 0, judge: partial[np
 
 def winner(race: Race) -> int:
     """The best of those that have played everything."""
-    return int(np.argmax(np.where(race.played == race.values.shape[1], race.worths, -np.inf)))
+    return int(np.argmax(np.where(race.counts == race.values.shape[1], race.worths, -np.inf)))
 
 
 def walks(rng: np.random.Generator, noise: float, falls: float) -> np.ndarray:
@@ -54,7 +54,7 @@ def test_another_winner_is_no_more_frequent_than_the_stated_error(noise: float, 
         returns = walks(np.random.default_rng(seed), noise, falls)
         race = run_race(returns, ERROR, seed, judge)
         wrong += winner(race) != int(np.argmax(judge(returns)))
-        played.append(race.played.sum() / returns.size)
+        played.append(race.counts.sum() / returns.size)
     assert wilson(wrong, trials).lower <= ERROR
     assert np.mean(played) < 0.95
 
@@ -63,9 +63,9 @@ def test_candidates_far_apart_play_two_rollouts_and_the_winner_all() -> None:
     returns = np.linspace(0.0, 1.0, CANDIDATES)[:, None] + 1e-3 * np.random.default_rng(0).random((1, ROLLOUTS))
     race = run_race(returns, ERROR)
     assert winner(race) == CANDIDATES - 1
-    assert race.played[-1] == ROLLOUTS
-    assert race.played[0] <= 8
-    assert race.played.sum() < 0.5 * returns.size
+    assert race.counts[-1] == ROLLOUTS
+    assert race.counts[0] <= 8
+    assert race.counts.sum() < 0.5 * returns.size
 
 
 def test_without_an_error_every_candidate_plays_everything_in_one_round() -> None:
@@ -77,11 +77,18 @@ def test_without_an_error_every_candidate_plays_everything_in_one_round() -> Non
     np.testing.assert_array_equal(race.worths, returns.mean(axis=1))
 
 
+@pytest.mark.parametrize("strange", [np.nan, -np.inf])
+def test_nobody_stops_where_a_return_is_no_number(strange: float) -> None:
+    returns = np.linspace(0.0, 1.0, CANDIDATES)[:, None] + np.zeros((1, ROLLOUTS))
+    returns[3, 1] = strange
+    assert (run_race(returns, ERROR).counts == ROLLOUTS).all()
+
+
 @pytest.mark.parametrize("rollouts", [1, 2, 3, 7])
 def test_a_race_of_any_length_ends_with_a_winner_that_played_it_all(rollouts: int) -> None:
     race = run_race(np.random.default_rng(0).normal(size=(6, rollouts)), 0.3)
-    assert race.played.max() == rollouts
-    assert race.played.min() >= min(2, rollouts)
+    assert race.counts.max() == rollouts
+    assert race.counts.min() >= min(2, rollouts)
 
 
 def test_the_urn_keeps_what_was_played_and_draws_the_rest_as_its_law_says() -> None:

@@ -11,7 +11,7 @@ from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.log.files import BEYOND
 from gsl.diagnosis.wiring.fault import ACTION, BOTH, POSITION, Fault, gains, hold, permute, rate, rescale, shift
-from gsl.diagnosis.wiring.physics import ZERO, find_documented
+from gsl.diagnosis.wiring.physics import ZERO, parameter_bounds
 from gsl.diagnosis.wiring.relation import FOLLOWS, Relation, relate
 
 UNITS = {"deg": np.pi / 180.0, "ticks/4096": 2.0 * np.pi / 4096.0, "ticks/1024": 2.0 * np.pi / 1024.0,
@@ -60,10 +60,10 @@ def by_relation(batch: Batch, plant: Plant) -> Iterator[Spread]:
         if opposite.any():
             yield Spread("sign", side, np.where(opposite, -1.0, nothing), np.zeros(len(own)), {})
     yield from _units(follows, clear)
-    yield from _propose_normalised(follows, clear, plant)
+    yield from _propose_shares(follows, clear, plant)
     factor = np.abs(follows.factor)
     usual = clear & (follows.likeness > 0.0) & (factor > USUAL[0]) & (factor < USUAL[1])
-    far = usual & (np.abs(follows.offset) > find_documented(plant)[1][ZERO, 0])
+    far = usual & (np.abs(follows.offset) > parameter_bounds(plant)[1][ZERO, 0])
     if far.any():
         sizes = np.where(far, follows.offset, 0.0)
         value: dict[str, object] = {"offset": sizes.tolist()}
@@ -96,7 +96,7 @@ def _zero(follows: Relation, side: str, unit: float | np.ndarray) -> np.ndarray:
     return np.where(np.abs(unit * zero) < 0.15, 0.0, np.where(np.abs(zero - 2048.0) < 150.0, 2048.0, zero))
 
 
-def _propose_normalised(follows: Relation, clear: np.ndarray, plant: Plant) -> Iterator[Spread]:
+def _propose_shares(follows: Relation, clear: np.ndarray, plant: Plant) -> Iterator[Spread]:
     """Yield commands or positions that are given as shares of the joints' ranges."""
     lower, upper = _limits(plant)
     factor = np.abs(follows.factor)
@@ -104,7 +104,7 @@ def _propose_normalised(follows: Relation, clear: np.ndarray, plant: Plant) -> I
         unit, offset = _spread_out(lower, upper, low, high)
         for side, ratio in ((ACTION, unit), (POSITION, 1.0 / unit)):
             fits = clear & (np.abs(np.log(np.where(factor > 0.0, factor, 1e-9) / ratio)) < np.log(NEAR))
-            fits &= (np.abs(np.log(unit)) > np.log(NEAR)) | (np.abs(offset) > find_documented(plant)[1][ZERO, 0])
+            fits &= (np.abs(np.log(unit)) > np.log(NEAR)) | (np.abs(offset) > parameter_bounds(plant)[1][ZERO, 0])
             if fits.any():
                 yield Spread("scale", side, np.where(fits, unit, np.nan), offset, {"range": name})
 
@@ -130,7 +130,7 @@ def by_range(batch: Batch, plant: Plant) -> Iterator[Spread]:
         if fits.any():
             yield Spread("scale", BOTH, np.where(fits, size, np.nan), offset, {"range": name})
     pose = np.array([plant.robot.stance.get(name, 0.0) for name in plant.robot.controlled])
-    if np.abs(pose).max() > find_documented(plant)[1][ZERO, 0]:
+    if np.abs(pose).max() > parameter_bounds(plant)[1][ZERO, 0]:
         moved = np.abs(pose) > 0.0
         value: dict[str, object] = {"offset": pose.tolist()}
         yield Spread("offset", BOTH, np.where(moved, 1.0, np.nan), pose, value)

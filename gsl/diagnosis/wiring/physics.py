@@ -55,7 +55,7 @@ class Fit:
     angle: np.ndarray
 
 
-def find_documented(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
+def parameter_bounds(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     """Return the least and the greatest values of the parameters, gains as logarithms, shapes (7, 1)."""
     lower, upper = [], []
     for effect, name in EFFECTS:
@@ -129,7 +129,7 @@ class Contest:
     def screen(self) -> np.ndarray:
         """Return the cost of the simulator with zeros of its own on the windows for fitting, shape (n_joints,)."""
         z = self.residual(self.plant, self.train)
-        most = find_documented(self.plant)[1][ZERO, 0] / self.floor
+        most = parameter_bounds(self.plant)[1][ZERO, 0] / self.floor
         return loss(z - np.clip(np.median(z, axis=(0, 1)), -most, most)).mean(axis=(0, 1))
 
     @property
@@ -146,7 +146,7 @@ class Contest:
             late: but with any delay.
         """
         joints = self.log.pieces.real.shape[2]
-        low, high = find_documented(self.plant)
+        low, high = parameter_bounds(self.plant)
         high = np.minimum(high, np.where(np.arange(len(EFFECTS))[:, None] == DELAY, self._longest(), np.inf))
         x = np.clip(np.zeros((len(EFFECTS), joints)), low, high)
         pieces, probe = self.train, self._probe(high, joints)

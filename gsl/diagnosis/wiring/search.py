@@ -15,7 +15,7 @@ from gsl.diagnosis.settings import FloorSettings, LogSettings, SearchSettings
 from gsl.diagnosis.wiring.fault import BOTH, Fault, gains, permute, rescale
 from gsl.diagnosis.wiring.options import Spread, by_range, by_relation, find_beyond, gain_grid, permutations, timings
 from gsl.diagnosis.wiring.outcome import Stand, Wiring
-from gsl.diagnosis.wiring.physics import DELAY, KD, KP, Contest, Fit, find_documented
+from gsl.diagnosis.wiring.physics import DELAY, KD, KP, Contest, Fit, parameter_bounds
 from gsl.errors import GslError
 
 NOISE_COST = SearchSettings.noise_cost
@@ -127,7 +127,7 @@ class Search:
         """Whether gains are such as the documented range of their effect holds."""
         if fault.kind != "gains":
             return False
-        low, high = (bound[[KP, KD]] for bound in find_documented(self.plant))
+        low, high = (bound[[KP, KD]] for bound in parameter_bounds(self.plant))
         own = (
             np.log(np.array([fault.value["kp"], fault.value["kd"]])) + after.parameters[[KP, KD]][:, list(fault.joints)]
         )

@@ -57,14 +57,14 @@ class BagTable:
                     raise TrajectoryError(self.path, f"has no topic {self.topic or '(none)'}; its topics are {there}")
                 for connection in chosen:
                     if connection.msgtype not in bag.typestore.fielddefs:
-                        raise TrajectoryError(self.path, _undefined(connection.msgtype))
+                        raise TrajectoryError(self.path, _explain_no_definition(connection.msgtype))
                 for connection, stamp, raw in bag.messages(connections=chosen):
                     yield stamp * NANOSECOND, bag.deserialize(raw, connection.msgtype)
         except (anyreader.AnyReaderError, ValueError, KeyError, OSError) as error:
             raise TrajectoryError(self.path, f"cannot be read as a bag: {' '.join(str(error).split())}") from error
 
 
-def _undefined(kind: str) -> str:
+def _explain_no_definition(kind: str) -> str:
     """Return what to say of messages without a definition, which rosbag2 leaves out of SQLite bags of before 2023."""
     return (
         f"holds messages of {kind} without their definition; write it as MCAP where the type is installed "

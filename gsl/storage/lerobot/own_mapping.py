@@ -99,7 +99,7 @@ def _scales(
     grippers = {joint for joint, entry in entries.items() if is_gripper(entry) and (arm or mapping.angles == "percent")}
     grippers -= set(entries) if data.angles else set()
     body = [joint for joint in entries if joint not in grippers]
-    values = _read_measured(data, entries, memory)
+    values = _read_angles(data, entries, memory)
     ranges = _read_calibration(mapping.calibration, entries, arm) if mapping.calibration else {}
     if mapping.angles is not None:
         kind: str = mapping.angles
@@ -141,7 +141,7 @@ def _gripper(data: DataSet, joint: str, ticks: int | None, so: bool) -> tuple[st
     return "rad", JAW_STROKE / 100.0, 0.0, 1.0, closed
 
 
-def _read_measured(data: DataSet, entries: Mapping[str, str], memory: float) -> dict[str, np.ndarray]:
+def _read_angles(data: DataSet, entries: Mapping[str, str], memory: float) -> dict[str, np.ndarray]:
     """Return measured angles as they are in the files, by joint, of as many episodes as there have to be."""
     columns = [_column(data, STATE, entry) for entry in entries.values()]
     parts: dict[str, list[np.ndarray]] = {joint: [] for joint in entries}

@@ -14,7 +14,7 @@ from gsl.storage.signals.finding import Finding, together
 from gsl.storage.signals.glitches import find_glitches, mend
 from gsl.storage.signals.stuck import find_stuck
 from gsl.storage.signals.velocities import find_velocities
-from gsl.storage.signals.wraps import find_wrapped, find_wraps, join
+from gsl.storage.signals.wraps import find_turns, find_wraps, join
 
 
 def check_signals(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Finding]:
@@ -33,7 +33,7 @@ def check_signals(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list
 
 def join_turns(episodes: Sequence[Trajectory]) -> list[Trajectory]:
     """Return trajectories whose wrapping angles go on; velocities of these are derived anew."""
-    turns = find_wrapped(episodes)
+    turns = find_turns(episodes)
     made = []
     for one in episodes:
         position, action, velocity = one.position.copy(), one.action.copy(), one.velocity.copy()

@@ -39,7 +39,7 @@ def _of_positions(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list
     found = []
     for k, joint in enumerate(joints):
         for other in range(k):
-            if not _are_commanded_apart(episodes, k, other):
+            if not _differ_in_commands(episodes, k, other):
                 continue
             if _same([(one.position[:, k], one.position[:, other]) for one in episodes]):
                 columns, both = (f"position.{joints[other]}", f"position.{joint}"), (joints[other], joint)
@@ -68,7 +68,7 @@ def _same(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> bool:
     return bool(moving.sum() >= LEAST and np.mean(np.abs(a - b)[moving] <= SAME * np.ptp(b)) > MOSTLY)
 
 
-def _are_commanded_apart(episodes: Sequence[Trajectory], k: int, other: int) -> bool:
+def _differ_in_commands(episodes: Sequence[Trajectory], k: int, other: int) -> bool:
     a, b = (np.concatenate([one.action[:, joint] for one in episodes]) for joint in (k, other))
     least = max(MOVES, UNLIKE * max(np.ptp(a), np.ptp(b)))
     return bool(np.ptp(a - b) > least)

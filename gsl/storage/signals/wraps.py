@@ -37,7 +37,7 @@ def join(values: np.ndarray, turn: float) -> np.ndarray:
     return result
 
 
-def find_wrapped(episodes: Sequence[Trajectory]) -> dict[tuple[str, int], float]:
+def find_turns(episodes: Sequence[Trajectory]) -> dict[tuple[str, int], float]:
     """Return by how much channels wrap [rad], by signal and joint."""
     return {
         (signal, place.joint): turn for signal in ("position", "action") for place, turn in _wraps(episodes, signal)
@@ -53,7 +53,7 @@ def _wraps(episodes: Sequence[Trajectory], signal: str) -> Iterator[tuple[Place,
             if signal == "action" and turn != TURN:  # a command may jump from one end of its motion to the other
                 continue
             for row in rows:
-                if not _is_asked_for(values, other, row, turn):
+                if not _moves_along(values, other, row, turn):
                     yield Place(k, number, row + 1), turn
 
 
@@ -73,7 +73,7 @@ def _jumps(values: np.ndarray) -> tuple[float, list[int]]:
     return whole, np.flatnonzero(far).tolist()
 
 
-def _is_asked_for(values: np.ndarray, other: np.ndarray, row: int, turn: float) -> bool:
+def _moves_along(values: np.ndarray, other: np.ndarray, row: int, turn: float) -> bool:
     """Whether the other signal of the joint, command or position, moves as far the same way around a jump."""
     jump = values[row + 1] - values[row]
     near = other[max(0, row - AROUND) : min(len(other), row + 2 + AROUND)]
