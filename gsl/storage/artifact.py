@@ -88,8 +88,9 @@ class Artifact:
             stored = read(path)
         except (OSError, ValueError, InputError) as error:
             raise ArtifactError(path, "is missing or damaged; build the artifact again with force=true") from error
-        if not isinstance(stored, dict):
-            raise ArtifactError(path, "is damaged: it holds no mapping; build the artifact again with force=true")
+        if not (isinstance(stored, dict) and all(isinstance(name, str) for name in stored)):
+            problem = "is damaged: it holds no mapping of names; build the artifact again with force=true"
+            raise ArtifactError(path, problem)
         return stored
 
     def _inside(self, name: str) -> Path:

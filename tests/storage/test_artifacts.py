@@ -97,6 +97,14 @@ def test_an_artifact_holds_all_that_the_contract_names(out: Path) -> None:
     assert not hidden(out.parent)
 
 
+@pytest.mark.parametrize("text", ["null: 1\n", "3: 1\n", "- 1\n", "a: [\n"])
+def test_settings_that_are_no_mapping_of_names_are_damaged(text: str, out: Path) -> None:
+    made = built(Doubling(), out)
+    (out / "config.yaml").write_text(text)
+    with pytest.raises(ArtifactError, match="config.yaml: is .*damaged.*force=true"):
+        _ = made.config
+
+
 def test_the_same_work_is_not_done_twice_but_looks_fresh(out: Path) -> None:
     built(Doubling(), out)
     os.utime(out / "manifest.json", (0, 0))
