@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 
 from gsl.core.console import Console, Progress
 from gsl.core.setting import component, setting
+from gsl.core.step_metrics import note_step
 from gsl.core.validation import make
 from gsl.diagnosis.log.files import check_log, on_ground
 from gsl.diagnosis.options import Options
@@ -38,6 +40,7 @@ from gsl_benchmarks.blind.files import (
     read_case,
     seals_of,
 )
+from gsl_benchmarks.blind.results import OURS
 from gsl_benchmarks.blind.seals import VERSION, total
 
 ANSWERED = "answered.jsonl"
@@ -90,13 +93,10 @@ class BlindAnswer:
         sealed = {"schema_version": VERSION, "data": file_hash(seals), "answers": hashes, "total": total(hashes)}
         documents.write_json(folder / SEAL, sealed)
         (folder / ANSWERED).unlink()  # its order is that in which the answers came
-        seconds = [one["seconds"] for one in answers]
         words = [one["verdict"] for one in answers]
         return {
             "cases": len(answers),
             "verdicts": {word: words.count(word) for word in sorted(set(words))},
-            "median_seconds": float(np.median(seconds)),
-            "longest_seconds": max(seconds),
             "seal": sealed["total"],
         }
 
@@ -107,8 +107,9 @@ class BlindAnswer:
         missing = [case for case in sorted(cases) if not _file(folder, case).exists()]
         tasks = [_Task(case, folder, _nulls(folder, leaders.get(case))) for case in missing]
         options = Options(most=self.most, duels=self.duels, nulls=self.nulls, threads=1)
-        for _, hashes in arriving(_answer, (options, self.baselines), tasks, self.workers, progress):
+        for index, (hashes, seconds) in arriving(_answer, (options, self.baselines), tasks, self.workers, progress):
             answered.append(hashes)
+            note_step(missing[index].name, 1, **seconds)
 
 
 def _drop_unrecorded(folder: Path, answered: Records, console: Console) -> None:
@@ -153,20 +154,27 @@ def _file(folder: Path, case: Path) -> Path:
     return folder / ANSWERS / f"{case.name}.json"
 
 
-def _answer(frozen: bytes, task: _Task) -> dict[str, str]:
-    """Answer one case and return the hashes of the files by name; its own answer says that the case is done."""
+def _answer(frozen: bytes, task: _Task) -> tuple[dict[str, str], dict[str, float]]:
+    """Answer one case; its own answer says that the case is done.
+
+    Returns:
+        The hashes of the files by name, and the time that each answer took [s] by the name of who gave it.
+    """
     options, baselines = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
     question, without = _question(task.case)
     asked = replace(options, without=tuple(without))
-    files = []
-    for name, told in (answered_by_baselines(question, asked, _quiet) if baselines else {}).items():
+    files, seconds = [], {}
+    for name, (told, took) in (answered_by_baselines(question, asked, _quiet) if baselines else {}).items():
         (task.folder / BASELINES / name).mkdir(parents=True, exist_ok=True)
         files.append(task.folder / BASELINES / name / f"{task.case.name}.json")
         documents.write_json(files[-1], told)
+        seconds[name] = took
+    begin = time.perf_counter()
     told = answered(question, asked, known_nulls=task.nulls, tick=_quiet)
+    seconds[OURS] = time.perf_counter() - begin
     files.append(_file(task.folder, task.case))
     documents.write_json(files[-1], told)
-    return {path.relative_to(task.folder).as_posix(): file_hash(path) for path in files}
+    return {path.relative_to(task.folder).as_posix(): file_hash(path) for path in files}, seconds
 
 
 def _question(folder: Path) -> tuple[Question, list[str]]:

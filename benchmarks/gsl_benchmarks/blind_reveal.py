@@ -11,6 +11,7 @@ from gsl.core.setting import component, setting
 from gsl.errors import GslError
 from gsl.storage import documents
 from gsl.storage.hashing import file_hash
+from gsl.storage.step_metrics import read_steps
 from gsl_benchmarks.blind.figures import figures
 from gsl_benchmarks.blind.files import ANSWERS, BASELINES, LABELS, SEAL, SEALS, answers_below, document, found, seals_of
 from gsl_benchmarks.blind.label import WALK, Label
@@ -45,9 +46,11 @@ class BlindReveal:
         labels = _labels(files["data"], files["labels"])
         _check_answers(files["data"], files["answers"])
         place = files["answers"].parent
-        marks = {OURS: _marks(labels, place / ANSWERS)}
+        seconds = {line.series: line.values for line in read_steps(place)}
+        marks = {OURS: _marks(labels, place / ANSWERS, OURS, seconds)}
         in_the_air = {name: label for name, label in labels.items() if label.kind != WALK}
-        marks |= {one.name: _marks(in_the_air, one) for one in sorted((place / BASELINES).glob("*"))}
+        baselines = sorted((place / BASELINES).glob("*"))
+        marks |= {path.name: _marks(in_the_air, path, path.name, seconds) for path in baselines}
         documents.write_json(folder / DATA, results(marks))
         seals = f"data {file_hash(files['data'])[:16]}, answers {document(files['answers'])['total'][:16]}"
         about = f"{len(labels)} cases; every seal holds ({seals})."
@@ -83,5 +86,11 @@ def _check_answers(seals: Path, path: Path) -> None:
             raise GslError(f"{folder}: the seal of {name} does not hold, the answer was changed after it was given")
 
 
-def _marks(labels: Mapping[str, Label], folder: Path) -> list[Mark]:
-    return [marked(label, document(folder / f"{name}.json")) for name, label in labels.items()]
+def _marks(
+    labels: Mapping[str, Label], folder: Path, who: str, seconds: Mapping[str, Mapping[str, float | None]]
+) -> list[Mark]:
+    """Return the marks of the answers in a folder; how long they took is not sealed and may be missing."""
+    answers = {name: document(folder / f"{name}.json") for name in labels}
+    return [
+        marked(label, {"seconds": seconds.get(name, {}).get(who), **answers[name]}) for name, label in labels.items()
+    ]

@@ -29,7 +29,10 @@ BLIND = (
     *("cases=2", "mix.foreign=120", "excitation.motions=[steps_large,triangle_fast]", "programmes=1", "workers=1"),
     *("excitation.repeated=[steps_large]", "excitation.duration=1.6"),
 )
-SHARE = {"train-servo": 0.15, "compare": 0.3, "survey": 0.2, "iterate": 0.6, "identify": 0.6}  # those that take long
+ASKED = "runs/asked/collect_real.request"  # what a robot was asked
+SHARE = {  # those that take long
+    **dict.fromkeys(("train-servo", "blind answer", "survey"), 0.15), "compare": 0.3, "iterate": 0.6, "identify": 0.6,
+}  # fmt: skip
 KILLED = {
     "collect": ("role=real", *SMALL),
     "collect with two workers": ("role=real", *PAIR),
@@ -46,7 +49,9 @@ KILLED = {
     "identify": (*AIR, "evaluations=160"),
     "import": ("source=runs/files/log.csv", "mapping=runs/files/mine.yaml"),
     "blind make": BLIND,
-    "rehearse": ("request=runs/asked/collect_real.request", "out=runs/k/rehearsal"),
+    "blind answer": ("data=runs/blind/blind_make", "most=1", "duels=0", "nulls=0", "workers=1"),
+    "answer": (f"request={ASKED}", "returns=runs/files/returns.csv", "out=runs/k/answer"),
+    "rehearse": (f"request={ASKED}", "out=runs/k/rehearsal"),
     "survey": SMALL,
     "compare": ("preset=toy", "iterate.task.duration=1.6", "iterate.workers=1", "trials=1", *LEFT_OUT),
 }  # fmt: skip

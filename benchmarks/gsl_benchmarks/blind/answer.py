@@ -49,20 +49,20 @@ class Question:
 def answered(
     question: Question, options: Options, *, known_nulls: Sequence[float] | None, tick: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Return the document of a diagnosis with the time it took [s] and the gains of chance that it measured."""
-    begin = time.perf_counter()
+    """Return the document of a diagnosis with the gains of chance that it measured."""
     options = replace(options, null_gains=tuple(known_nulls or ()))
     found = diagnose(question.log, question.plant, question.step, options, tick, reference=question.reference)
-    told = document(found, seconds=time.perf_counter() - begin, null_gains=list(found.null_gains))
+    told = document(found, null_gains=list(found.null_gains))
     return {key: value for key, value in told.items() if key not in BULKY}
 
 
 def answered_by_baselines(
     question: Question, options: Options, tick: Callable[[str], None]
-) -> dict[str, dict[str, Any]]:
-    """Return what each baseline says, by name; with a reference they get the same calibrated simulator as we do.
+) -> dict[str, tuple[dict[str, Any], float]]:
+    """Return what each baseline says and the time it took [s], by name.
 
-    They work in the air: of a robot on the ground they say nothing.
+    With a reference they get the same calibrated simulator as we do. They work in the air: of a robot on the ground
+    they say nothing.
     """
     if question.walking:
         return {}
@@ -77,5 +77,5 @@ def answered_by_baselines(
         begin = time.perf_counter()
         with np.errstate(all="ignore"):
             told = baseline(found, arena)
-        answers[name] = {**told, "seconds": time.perf_counter() - begin}
+        answers[name] = told, time.perf_counter() - begin
     return answers
