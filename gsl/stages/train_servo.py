@@ -88,7 +88,7 @@ class TrainServo:
         write_model(folder, ServoMembers((model, *further)))
         self._write_world(folder, learned)
         servo_curves(folder / CURVES, self.sim.plant, model, fitting_step(self.sim.step, exp.period), exp.period)
-        told = document(learned)
+        told = document(learned) | {"step": fitting_step(self.sim.step, exp.period)}
         for line in remarks(told):
             console.status(f"warning: {line}")
         noise = dict(zip(model.joints, model.noise.tolist(), strict=True))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 NEAR, FARTHEST = 1.0, 3.0  # noise floors: up to the first it is as good as the log can tell, beyond the second useless
+COARSE = 0.0025  # physics period [s] above which joints of a NAO leave the replay (docs/results/speed.md)
 
 
 def problems(metrics: Mapping[str, Any]) -> list[str]:
@@ -14,9 +15,10 @@ def problems(metrics: Mapping[str, Any]) -> list[str]:
     Args:
         metrics: Of its artifact.
     """
-    after, before = metrics["floors_after"], metrics["floors_before"]
+    after, before, step = metrics["floors_after"], metrics["floors_before"], metrics.get("step", 0.0)
     if after > FARTHEST:
-        return [f"held out, the learned servo is {after:.1f} noise floors from the log, more than {FARTHEST:g}"]
+        coarse = f"; physics at {1e3 * step:g} ms are too coarse for it: try sim.step=0.002" if step > COARSE else ""
+        return [f"held out, the learned servo is {after:.1f} noise floors from the log, more than {FARTHEST:g}{coarse}"]
     if after > before:
         return [f"held out, the gap is {after:.2f} noise floors, {before:.2f} without"]
     if after > NEAR and not metrics["learned"]:
