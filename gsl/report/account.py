@@ -37,7 +37,7 @@ def account(artifact: Artifact) -> list[Told]:
     try:
         told = tell(artifact.folder, artifact.metrics, unit_of(artifact))
         return [told] if isinstance(told, Told) else told
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, StopIteration):
         return [_plain(artifact)]
 
 

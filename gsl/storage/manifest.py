@@ -23,6 +23,14 @@ HASH = "sha256"
 
 _ALWAYS = frozenset({"config.yaml", "log.txt", "metrics.json"})  # files that no artifact lacks
 _DAMAGED = "build the artifact again with force=true"
+LONGEST = 1e12  # of a duration [s]
+_KINDS: Mapping[str, type | tuple[type, ...]] = {
+    **dict.fromkeys(("kind", "key", "command", "sources", "created", "metrics"), str),
+    **dict.fromkeys(("seeds", "versions"), dict),
+    **dict.fromkeys(("git", "unit"), (dict, type(None))),
+    "duration": (int, float),
+}
+"""What entries have to be that are taken as they are."""
 
 
 @dataclass(frozen=True)
@@ -171,6 +179,15 @@ def _parse(stored: dict[str, Any]) -> Manifest:
     parents = tuple(Parent(**parent) for parent in stored.pop("parents"))
     links = tuple(Parent(**link) for link in stored.pop("links", ()))
     trust = tuple(stored.pop("trust", ()))
+    for name, kinds in _KINDS.items():
+        if name in stored and not isinstance(stored[name], kinds):
+            raise ValueError(f"{name} is of another kind")
+    texts = [text for one in (*parents, *links) for text in (one.role, one.path, one.hash)]
+    texts += [*trust, *(file.sha256 for file in files.values())]
+    if not all(isinstance(text, str) and "\0" not in text for text in texts):
+        raise ValueError("a part of it is no text")
+    if not abs(stored["duration"]) < LONGEST:
+        raise ValueError("its duration is none")
     for name in (*files, stored.get("metrics", Manifest.metrics)):
         if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
             raise ValueError(f"{name} is no file of the artifact")
