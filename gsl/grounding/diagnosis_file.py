@@ -6,8 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from gsl.effects.effect import build
 from gsl.errors import ArtifactError
 from gsl.grounding.draws import UncertainCause
+from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import DIGITS, report_of
 from gsl.storage.references import load
 
@@ -62,10 +64,19 @@ def read_diagnosis(reference: str, kind: str) -> Diagnosis:
         ArtifactError: There is none, or it is not as it was written.
     """
     artifact = load(reference, kind)
+    try:
+        return _read(artifact)
+    except (OSError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        problem = f"its report lacks a part, or is damaged ({type(error).__name__}: {error}); diagnose again"
+        raise ArtifactError(artifact.folder, problem) from error
+
+
+def _read(artifact: Artifact) -> Diagnosis:
     report, sim = report_of(artifact.folder), artifact.config["sim"]
     if report["verdict"] == "wiring":
         raise ArtifactError(artifact.folder, f"{report['summary']} Mend the log and diagnose it again")
     gap = report["shrinkage"]
+    build({**sim["effects"], **report["effects"]})  # they are what effects are
     return Diagnosis(
         verdict=report["verdict"],
         causes=tuple(one["effect"] for one in report["causes"]),
