@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import warnings
+import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,7 @@ class TensorArrays:
         import torch
 
         self.path = path
-        check_need(path, 2.0 * path.stat().st_size, memory)
+        check_need(path, 2.0 * _measure(path), memory)
         try:
             with within(f"{path}: reading it", growth=memory), warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)  # of pickles of another protocol, which are refused
@@ -54,6 +55,16 @@ class TensorArrays:
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return tensors by name."""
         return {name: np.array(self.tensors[name].numpy()) for name in names}
+
+
+def _measure(path: Path) -> float:
+    """Return the bytes of a file, or what it unpacks to if it is an archive."""
+    size = float(path.stat().st_size)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return max(size, float(sum(entry.file_size for entry in archive.infolist())))
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        return size  # an older file, or damaged, which torch will tell
 
 
 def _plain() -> set[Any]:
