@@ -6,11 +6,13 @@ import io
 import json
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import yaml
 from commands import refused
 from test_import import mapping
 
@@ -74,14 +76,29 @@ def test_a_shape_that_no_array_has(shape: str, tmp_path: Path) -> None:
     "settings",
     [
         {"period": 1e-9}, {"period": 1e-300}, {"period": int("9" * 400)}, {"longest_gap": 1e300, "period": 1e-9},
+        {"time": {1: 2}}, {"time": {"__dataclass_self__": 1}}, {1: 2},
+        {"about": {"x": {"2026": float("nan")}}, "period": 9e99},
         {"signals": {"action": {"column": "goal_{joint}", "unit": "ticks/" + "9" * 400}, "position": "q_{joint}"}},
     ],
 )  # fmt: skip
-def test_a_mapping_asks_for_no_gigabytes(settings: dict[str, object], tmp_path: Path) -> None:
+def test_a_mapping_asks_for_no_gigabytes(settings: dict[Any, Any], tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(LOG)
     signals = {"action": "goal_{joint}", "position": "q_{joint}"}
-    line = told(tmp_path / "log.csv", **{"signals": signals, **settings})
+    whole = {"joints": ["a"], "time": {"column": "t"}, "signals": signals, **settings}
+    (tmp_path / "m.yaml").write_text(yaml.safe_dump(whole))
+    line = refused("import", "source=log.csv", "mapping=m.yaml", folder=tmp_path)
     assert "internal error" not in line and len(line) < 1000
+
+
+@pytest.mark.parametrize(
+    "files", ["/etc/*", "../*.csv", "a/../../*", "**x", {"": ""}, {}, {"": "../log.csv"}, "[", "\0"]
+)
+def test_patterns_of_files_stay_below_the_source(files: object, tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "log.csv").write_text(LOG)
+    settings = {"signals": {"action": "goal_{joint}", "position": "q_{joint}"}, "joints": ["a"], "files": files}
+    line = refused("import", "source=logs", mapping(tmp_path / "m.yaml", **settings), folder=tmp_path)
+    assert "internal error" not in line
 
 
 def test_numbers_that_no_data_set_has(tmp_path: Path) -> None:
