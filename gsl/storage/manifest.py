@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gsl.core.budget import ARTIFACT_BYTES, read_json
-from gsl.errors import ArtifactError
+from gsl.errors import ArtifactError, InputError
 from gsl.storage import documents
 from gsl.storage.hashing import contents_hash, file_hash
 
@@ -153,6 +153,8 @@ def read(folder: Path) -> Manifest:
         raise ArtifactError(folder, f"is no complete artifact: it holds no {NAME}") from error
     except OSError as error:
         raise ArtifactError(folder / NAME, f"cannot be read: {error.strerror}") from error
+    except InputError as error:  # no plain file, or too large
+        raise ArtifactError(folder / NAME, str(error).removeprefix(f"{folder / NAME}: ")) from error
     except (ValueError, RecursionError) as error:
         raise ArtifactError(folder / NAME, f"is damaged: it is not JSON; {_DAMAGED}") from error
     version = stored.get("schema_version") if isinstance(stored, dict) else None

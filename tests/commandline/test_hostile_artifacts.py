@@ -111,6 +111,26 @@ def test_a_parent_of_terabytes_is_not_hashed(artifact: Path, tmp_path: Path) -> 
         assert "internal error" not in said.err and said.code in (0, 1, 2)
 
 
+@pytest.mark.parametrize("kind", ["a pipe", "a device", "gigabytes", "deep"])
+def test_a_manifest_that_cannot_be_read_does_not_stop_the_list(kind: str, artifact: Path, tmp_path: Path) -> None:
+    done("import", "source=log.csv", "mapping=plain", "name=b", folder=tmp_path)
+    path = artifact / manifest.NAME
+    path.unlink()
+    match kind:
+        case "a pipe":
+            os.mkfifo(path)
+        case "a device":
+            path.symlink_to("/dev/zero")
+        case "gigabytes":
+            with path.open("wb") as file:
+                file.truncate(2**40)
+        case _:
+            path.write_text("[" * 10_000)
+    assert "runs/b" in gsl("runs", "--json", folder=tmp_path).out
+    assert gsl("verify", folder=tmp_path).code == 1
+    assert gsl("show", "a", folder=tmp_path).code == 2
+
+
 def test_cleaning_removes_no_file_of_another_artifact(artifact: Path, tmp_path: Path) -> None:
     done("import", "source=log.csv", "mapping=plain", "name=b", folder=tmp_path)
     log = artifact / "trajectories.parquet"
