@@ -11,6 +11,7 @@ from gsl.errors import ArtifactError
 from gsl.grounding.draws import UncertainCause
 from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import DIGITS, report_of
+from gsl.storage.documents import as_written
 from gsl.storage.references import load
 
 MANY = 6  # effects, more of which are counted and not named
@@ -64,11 +65,8 @@ def read_diagnosis(reference: str, kind: str) -> Diagnosis:
         ArtifactError: There is none, or it is not as it was written.
     """
     artifact = load(reference, kind)
-    try:
+    with as_written(artifact.folder, "diagnose again"):
         return _read(artifact)
-    except (OSError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
-        problem = f"its report lacks a part, or is damaged ({type(error).__name__}: {error}); diagnose again"
-        raise ArtifactError(artifact.folder, problem) from error
 
 
 def _read(artifact: Artifact) -> Diagnosis:
