@@ -44,6 +44,7 @@ SENSORS = (
 )
 
 
+LARGEST = 1e12  # of any number in a column, in SI units: squares and sums of such numbers are still numbers
 SHOWN = 40  # characters of a value in an error
 MOST_PERIOD = 1e6  # of a control period [s], days
 MOST_TRANSITIONS = 100_000_000  # from cell to cell by a choice, which a table of counts takes in memory
@@ -197,6 +198,9 @@ def _check_values(path: Path, name: str, values: np.ndarray, last: np.ndarray) -
     if values.dtype.kind != "f":
         return
     inside = ~last if blank_at_the_end(name) else slice(None)
+    _refuse(
+        path, name, np.abs(values) > LARGEST, f"is beyond {LARGEST:g}, which nothing measures; drop or mend the row"
+    )
     if np.isfinite(values[inside]).all() and (isinstance(inside, slice) or np.isnan(values[last]).all()):
         return
     if isinstance(inside, slice):
