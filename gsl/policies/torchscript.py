@@ -19,10 +19,10 @@ from gsl.policies.outside import File, Joints, Network, OutsideFile, Ports, read
 from gsl.policies.wired import Answer
 from gsl.policies.wiring import Wiring
 
-_REACHING = re.compile(
-    rb"\b(save|from_file|rpc_\w+|getattr|print)\b|\bops\s*\.\s*(?!(aten|prim|quantized|prepacked)\b)\w+"
-)
-"""Words of a program that no policy needs: operations on files, machines and the terminal, and names in disguise."""
+_REACHING = re.compile(rb"\b(save|from_file|rpc_\w+|print)\b|\bops\s*\.\s*(?!(aten|prim|quantized|prepacked)\b)\w+")
+"""Words of a program that no policy needs: operations on files, machines and the terminal."""
+_PART = re.compile(rb'\bgetattr\([\w.]+, "[^"\\\n]*"\)')  # how a program writes a layer of a sequence
+_GETTING = re.compile(rb"\bgetattr\b")  # in any other way, such as with a name in two parts
 
 
 @component
@@ -107,7 +107,8 @@ def check_program(path: Path) -> None:
     except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, NotImplementedError) as error:
         advice = "write it with torch.jit.script(module).save(file)"
         raise ConfigError("policy.file", f"is no TorchScript; {advice}", given=str(path)) from error
-    if (match := next(filter(None, map(_REACHING.search, sources)), None)) is not None:
+    searches = (_REACHING.search(source) or _GETTING.search(_PART.sub(b"", source)) for source in sources)
+    if (match := next(filter(None, searches), None)) is not None:
         problem = (
             f"uses {match[0].decode()}, with which a program could reach files or the terminal; no policy needs it"
         )

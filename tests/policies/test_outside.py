@@ -255,14 +255,22 @@ def test_a_trainer_sees_what_the_policy_will_see_and_acts_as_it_will() -> None:
 
 LINES = (
     *('torch.save(x, "ran")', 'torch . save (x, "ran")', 'torch.from_file("ran", True, 16)', 'ops.aten.save(x, "ran")'),
-    *('getattr(torch, "sa" "ve")', 'print("\\x1b[2J")', "ops.profiler._record_function_exit(x)", "rpc_async(x)"),
+    *(
+        'getattr(torch, "sa" "ve")',
+        'getattr(torch, "save")',
+        r'getattr(torch, "\x73ave")',
+        'print("\\x1b[2J")',
+        "ops.profiler._record_function_exit(x)",
+        "rpc_async(x)",
+    ),
 )
 
 
 @pytest.mark.parametrize("line", LINES)
 def test_a_program_that_could_reach_files_is_refused_before_it_is_loaded(line: str, tmp_path: Path) -> None:
     torch = pytest.importorskip("torch")
-    torch.jit.script(torch.nn.Linear(3, 2)).save(str(tmp_path / "good.pt"))
+    layers = torch.nn.Sequential(torch.nn.Linear(3, 4), torch.nn.Sequential(torch.nn.ELU()), torch.nn.LSTM(4, 2))
+    torch.jit.script(layers).save(str(tmp_path / "good.pt"))
     check_program(tmp_path / "good.pt")
     with zipfile.ZipFile(tmp_path / "good.pt") as good, zipfile.ZipFile(tmp_path / "bad.pt", "w") as bad:
         for entry in good.infolist():
