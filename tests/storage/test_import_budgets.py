@@ -37,6 +37,12 @@ def test_tensors_that_unpack_to_more_than_the_memory(tmp_path: Path) -> None:
     assert "would need about 0.06 GB" in told(tmp_path / "log.pt", SMALL)
 
 
+def test_tensors_without_numbers_are_one_line(tmp_path: Path) -> None:
+    torch = pytest.importorskip("torch")
+    torch.save({name: torch.empty(40, device="meta") for name in ("t", "goal", "q")}, tmp_path / "log.pt")
+    assert "internal error" not in told(tmp_path / "log.pt")
+
+
 def test_matrices_that_unpack_to_more_than_the_memory(tmp_path: Path) -> None:
     from scipy.io import savemat
 

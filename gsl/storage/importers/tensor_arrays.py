@@ -40,7 +40,7 @@ class TensorArrays:
         dense = {
             name: one
             for name, one in leaves.items()
-            if isinstance(one, torch.Tensor) and one.layout == torch.strided and not one.is_quantized
+            if isinstance(one, torch.Tensor) and one.layout == torch.strided and not (one.is_quantized or one.is_meta)
         }
         self.tensors = {name: one.detach() for name, one in dense.items()}
         self.shapes: Shapes = {
@@ -54,7 +54,10 @@ class TensorArrays:
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return tensors by name."""
-        return {name: np.array(self.tensors[name].numpy()) for name in names}
+        try:
+            return {name: np.array(self.tensors[name].numpy()) for name in names}
+        except (RuntimeError, TypeError) as error:
+            raise TrajectoryError(self.path, f"holds no plain tensors: {str(error).splitlines()[0]}") from error
 
 
 def _measure(path: Path) -> float:
