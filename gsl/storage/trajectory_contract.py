@@ -44,6 +44,7 @@ SENSORS = (
 )
 
 
+MOST_EPISODES = 100_000
 LARGEST = 1e12  # of any number in a column, in SI units: squares and sums of such numbers are still numbers
 SHOWN = 40  # characters of a value in an error
 MOST_PERIOD = 1e6  # of a control period [s], days
@@ -191,6 +192,8 @@ def check_rows(path: Path, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         if name.startswith("next_state."):
             after = np.append(columns[name.removeprefix("next_")][1:], np.nan)
             _refuse(path, name, ~last & (values != after), "is not the state of the next row; split the episode there")
+    if (count := int(last.sum())) > MOST_EPISODES:
+        raise TrajectoryError(path, f"has {count:,} episodes; {MOST_EPISODES:,} are read", column="episode")
     return np.insert(np.flatnonzero(last) + 1, 0, 0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import io
 import json
 import zipfile
@@ -94,6 +95,21 @@ def test_a_mapping_asks_for_no_gigabytes(settings: dict[Any, Any], tmp_path: Pat
     (tmp_path / "m.yaml").write_text(yaml.safe_dump(whole))
     line = refused("import", "source=log.csv", "mapping=m.yaml", folder=tmp_path)
     assert "internal error" not in line and len(line) < 1000
+
+
+def test_a_column_that_tells_no_episodes_apart(tmp_path: Path) -> None:
+    rows = "".join(f"{0.01 * k:.2f},{k // 2},0.1,0.1\n" for k in range(40_000))
+    (tmp_path / "log.csv").write_text(f"t,who,goal_a,q_a\n{rows}")
+    signals = {"action": "goal_{joint}", "position": "q_{joint}"}
+    line = told(tmp_path / "log.csv", signals=signals, episode="who")
+    assert "tells 20,000 episodes apart" in line
+
+
+def test_lines_without_end_in_a_packed_log(tmp_path: Path) -> None:
+    (tmp_path / "log.csv.gz").write_bytes(gzip.compress(LOG.encode() + b"\n" * 210_000_000, 1))
+    assert "unpacks to more than 0.2 GB" in told(
+        tmp_path / "log.csv.gz", signals={"action": "goal_a", "position": "q_a"}
+    )
 
 
 @pytest.mark.parametrize(
