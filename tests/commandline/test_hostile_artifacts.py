@@ -182,3 +182,9 @@ def test_a_word_that_is_no_text_is_one_line(tmp_path: Path) -> None:
 def test_a_name_with_line_ends_makes_no_second_line(tmp_path: Path) -> None:
     said = gsl("show", "a\nwarning: all is well\u202e\u061c", folder=tmp_path)
     assert len(said.lines) == 1 and "\u202e" not in said.err and "\u061c" not in said.err
+
+
+@pytest.mark.parametrize("word", ["name=.multirun", "name=a/.collect_real.tmp-1", "out=runs/x/.collect_real.partial"])
+def test_an_artifact_does_not_hide_among_what_is_cleaned_away(word: str, artifact: Path, tmp_path: Path) -> None:
+    said = gsl("import", "source=log.csv", "mapping=plain", word, folder=tmp_path)
+    assert said.code == 2 and ("hidden" in said.err), said
