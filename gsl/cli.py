@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from gsl.commandline.failure import INTERRUPTED, leave_quietly, report
+from gsl.commandline.failure import INTERRUPTED, is_text, leave_quietly, report
 from gsl.commandline.plugins import Commands, is_group
 from gsl.commandline.run_commands import Reference, add_run_commands
 from gsl.commandline.stage_command import (
@@ -23,6 +23,7 @@ from gsl.commandline.stage_command import (
     add_stage,
     run_stage,
 )
+from gsl.commandline.streams import prepare_streams
 from gsl.core.interruption import ignore, listen
 from gsl.report.console import Console
 from gsl.version import PACKAGE, __version__
@@ -184,9 +185,18 @@ def root(
 def main() -> None:
     """Run the command line of this process."""
     listen()
-    _leave_current_folder()
-    code = call(sys.argv[1:])
+    prepare_streams()
+    try:
+        _leave_current_folder()
+    except FileNotFoundError:
+        code = Console().error("the current folder is gone; change into one that is there", 2)
+    else:
+        code = call(sys.argv[1:])
     ignore()
+    try:
+        sys.stdout.flush()
+    except OSError:  # has been told; what is left in the buffer would be written, and fail, once more
+        code = leave_quietly()
     exec("")  # else Python, if it was interrupted in a library's exec(), ends by the signal and not with our exit code
     sys.exit(code)
 
@@ -205,6 +215,8 @@ def call(arguments: Sequence[str]) -> int:
     console = Console(json="--json" in arguments)
     if any("\0" in word for word in arguments):
         return console.error("an argument holds a null character", 2)
+    if word := next((word for word in arguments if not is_text(word)), ""):
+        return console.error(f"an argument is no text in UTF-8: {word}; rename what it names", 2)
     try:
         code = int(app(args=list(arguments), prog_name="gsl", standalone_mode=False) or 0)
         return report(KeyboardInterrupt(), console, command=_command(arguments)) if code == INTERRUPTED else code

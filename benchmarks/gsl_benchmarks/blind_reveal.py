@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 from gsl.core.console import Console
 from gsl.core.setting import component, setting
-from gsl.errors import GslError
+from gsl.errors import ArtifactError, GslError
 from gsl.storage import documents
 from gsl.storage.hashing import file_hash
 from gsl.storage.step_metrics import read_steps
@@ -52,7 +52,7 @@ class BlindReveal:
         baselines = sorted((place / BASELINES).glob("*"))
         marks |= {path.name: _marks(in_the_air, path, path.name, seconds) for path in baselines}
         documents.write_json(folder / DATA, results(marks))
-        seals = f"data {file_hash(files['data'])[:16]}, answers {document(files['answers'])['total'][:16]}"
+        seals = f"data {file_hash(files['data'])[:16]}, answers {document(files['answers'], total=str)['total'][:16]}"
         about = f"{len(labels)} cases; every seal holds ({seals})."
         (folder / TABLE).write_text(markdown(marks, about), encoding="utf-8")
         judged = [one for one in figures(marks[OURS]) if one.met is not None]
@@ -68,16 +68,25 @@ class BlindReveal:
 
 def _labels(seals: Path, path: Path) -> dict[str, Label]:
     """Return the labels by case, having checked their seals and the data's."""
-    entries = document(path)["cases"]
+    entries = document(path, cases=dict)["cases"]
     cases = seals_of(seals)
     for name, seal in cases.items():
-        check_label(path, name, seal["label"], entries.get(name, {}))
-    return {name: Label.of(entries[name]["label"]) for name in cases}
+        if not isinstance(entry := entries.get(name), dict) or not isinstance(entry.get("label"), dict):
+            raise ArtifactError(path, f"has no label of {name}; copy it again")
+        check_label(path, name, seal["label"], entry)
+    return {name: _label(path, name, entries[name]["label"]) for name in cases}
+
+
+def _label(path: Path, name: str, entry: Mapping[str, Any]) -> Label:
+    try:
+        return Label.of(entry)
+    except (TypeError, ValueError, AttributeError) as error:
+        raise ArtifactError(path, f"the label of {name} is none: {error}") from error
 
 
 def _check_answers(seals: Path, path: Path) -> None:
     """Refuse answers that were changed after they were sealed, or are to other data."""
-    sealed, folder = document(path), path.parent
+    sealed, folder = document(path, data=str, answers=dict), path.parent
     if sealed["data"] != file_hash(seals):
         raise GslError(f"{path}: these are answers to other data than {seals.parent}")
     there = answers_below(folder)
@@ -90,7 +99,18 @@ def _marks(
     labels: Mapping[str, Label], folder: Path, who: str, seconds: Mapping[str, Mapping[str, float | None]]
 ) -> list[Mark]:
     """Return the marks of the answers in a folder; how long they took is not sealed and may be missing."""
-    answers = {name: document(folder / f"{name}.json") for name in labels}
-    return [
-        marked(label, {"seconds": seconds.get(name, {}).get(who), **answers[name]}) for name, label in labels.items()
-    ]
+    return [_mark(label, folder / f"{name}.json", seconds.get(name, {}).get(who)) for name, label in labels.items()]
+
+
+def _mark(label: Label, path: Path, seconds: float | None) -> Mark:
+    """Set an answer against its label; it may be of any program.
+
+    Raises:
+        ArtifactError: It is no answer.
+    """
+    answer = {"seconds": seconds, **document(path, verdict=str)}
+    try:
+        return marked(label, answer)
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        problem = f"is no answer as docs/reference/blind.md has it ({type(error).__name__}: {error})"
+        raise ArtifactError(path, problem) from error

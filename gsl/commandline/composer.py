@@ -24,7 +24,7 @@ from yaml import YAMLError
 from gsl.commandline.config_errors import Vocabulary, misshapen, translate, unfit, unknown_key
 from gsl.commandline.known_settings import list_keys, plain, read_declared, read_parts
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
-from gsl.commandline.own_word import find_own_modules, find_trust
+from gsl.commandline.own_word import check_own_word, find_own_modules, find_trust
 from gsl.commandline.plugins import folders, packages
 from gsl.commandline.yaml_files import USER, BudgetedFiles, load_plugins
 from gsl.core.setting import Setting
@@ -130,6 +130,7 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
     _check_referred(command, composition)
     _check_made(command, composition)
     values = plain(composition.config)
+    check_own_word(values, {key_of(word) for word in arguments})
     strangers = values.keys() - read_declared(values).keys() - base.keys() - {*COMMAND_KEYS}
     if misfit := unfit(command, arguments, min(strangers, default=None)):
         raise misfit

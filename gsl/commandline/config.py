@@ -38,6 +38,8 @@ def _inside(name: str) -> str:
         raise ValueError(f"must be a name of folders, each of {LONGEST} bytes at most")
     if any(part in ("", ".", "..") for part in name.split("/")):
         raise ValueError("must be a name in runs/, without an empty part or ..; a folder elsewhere is out=")
+    if any(part.startswith(".") for part in name.split("/")):
+        raise ValueError("must not begin with a dot: what is hidden in runs/ is gsl's own, and is cleaned away")
     return name
 
 

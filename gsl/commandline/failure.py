@@ -38,9 +38,16 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
         return f"{line}; GSL_TRACEBACK=1 shows more", 1
     if isinstance(failure, OSError):
         return failure.strerror or text, 1
+    if isinstance(failure, UnicodeEncodeError) and not is_text(failure.object):
+        return f"a name is no text in UTF-8: {failure.object[:100]!r}; rename what is called so", 2
     if isinstance(failure, RecursionError):
         return "what was given is nested too deeply", 2
     return f"internal error: {type(failure).__name__}: {text}; GSL_TRACEBACK=1 shows where", 1
+
+
+def is_text(word: str) -> bool:
+    """Whether a word from the system, such as an argument or the name of a file, was text in UTF-8."""
+    return not any("\ud800" <= letter <= "\udfff" for letter in word)
 
 
 def leave_quietly() -> int:

@@ -17,7 +17,7 @@ from gsl.core.interfaces import REAL, SIM
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.core.trust import TRUST, modules_in
+from gsl.core.trust import TRUST, check_code
 from gsl.core.validation import did_you_mean, make
 from gsl.errors import ArtifactError, ConfigError, InputError
 from gsl.grounding.none import NoGrounding
@@ -107,7 +107,7 @@ def assemble(reference: str, subject: Subject, words: Sequence[str], console: Co
     folder = resolve_main(reference, kind=SHOWN)
     kind = manifest.read(folder).kind
     console.status(f"{folder.as_posix()}: {kind}")
-    cast = _play_logs(folder, subject) if kind in LOGS else _walk(folder, kind, subject, trust, console)
+    cast = _play_logs(folder, subject, trust) if kind in LOGS else _walk(folder, kind, subject, trust, console)
     if not any(link.shapes for link in cast.robot.links.values()):
         raise InputError(f"{cast.robot.name}: none of its links has a shape that could be shown")
     return cast
@@ -118,11 +118,11 @@ def read_settings(words: Sequence[str], command: str) -> dict[str, str]:
     return {name: value for name, value in split_words(words, command).items() if name != TRUST}
 
 
-def _play_logs(folder: Path, settings: Subject) -> Cast:
+def _play_logs(folder: Path, settings: Subject, trust: Sequence[str]) -> Cast:
     """Return an episode of one log, or of two."""
     first = read(data_file(str(folder)))
     name = str(first.metadata.get("robot", ""))
-    find_own_modules(modules_in({"robot": name}))
+    check_code({"robot": name}, trust)  # the log may be somebody else's
     robot = robot_of(name)
     logs = {folder.as_posix().removeprefix(f"{RUNS}/"): first}
     if settings.beside:

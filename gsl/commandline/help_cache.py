@@ -26,7 +26,10 @@ def read_or_write(command: str, typed: Sequence[str], write: Callable[[], str]) 
     """
     if "GSL_TRUST" in os.environ or not all(CHOICE.fullmatch(word) for word in typed):
         return write()
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gsl"
+    try:
+        home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gsl"
+    except RuntimeError:  # there is no home
+        return write()
     place = home / f"help-{_key(command, typed)}.txt"
     try:
         digest, _, text = place.read_text(encoding="utf-8").partition("\n")

@@ -43,7 +43,7 @@ def show_metrics(reference: str, words: Sequence[str], console: Console) -> None
             raise InputError(f"{place}: exists; choose another tensorboard=, or take it away")
         with explain_refusal(place.parent):
             for name, steps in by_artifact.items():
-                write_events(place / name.lstrip("/"), steps)
+                write_events(place.joinpath(*(part for part in Path(name).parts if part not in ("/", ".."))), steps)
         console.status(f"tensorboard --logdir {place.as_posix()} shows them")
     for name, steps in by_artifact.items():
         for series in dict.fromkeys(step.series for step in steps):

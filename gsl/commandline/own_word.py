@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
@@ -18,6 +18,13 @@ from gsl.errors import ConfigError
 VARIABLE = "GSL_TRUST"
 _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _TRUTH = ("true", "false")
+_USUAL = {
+    "force": re.compile("(False)?"),
+    "executor": re.compile("(local)?"),
+    "address": re.compile("(None)?"),
+    "out": re.compile(r"(runs/\$\{name\}/[\w${}]+|\$\{request\}/\$\{name\}|None)?"),
+}
+"""What our files say of settings that a file of others may not say otherwise."""
 
 
 def find_trust(arguments: Sequence[str]) -> tuple[str, ...]:
@@ -44,6 +51,21 @@ def modules_of(value: Any) -> tuple[str, ...]:
             given = str(word).lower() if isinstance(word, bool) else str(word)
             raise ConfigError(TRUST, "names the modules whose code may run, such as trust=my_module", given=given)
     return tuple(words)
+
+
+def check_own_word(values: Mapping[str, Any], typed: Collection[str]) -> None:
+    """Refuse settings that a file has set and only the user can: they replace artifacts, and write and send elsewhere.
+
+    Args:
+        values: All settings of a command, references not replaced.
+        typed: Keys that the user has typed.
+
+    Raises:
+        ConfigError: It names one of them.
+    """
+    for key, usual in _USUAL.items():
+        if key not in typed and not usual.fullmatch(value := str(values.get(key, ""))):
+            raise ConfigError(key, f"is said by a file, and only you can say it: type {key}=...", given=value)
 
 
 def find_own_modules(trust: Collection[str]) -> None:

@@ -24,6 +24,10 @@ DOCUMENT_BYTES = 200_000_000
 """Of a JSON document in an artifact."""
 ARTIFACT_BYTES = 16_000_000_000
 """Of one file in an artifact: what a trajectory file may take in memory (gsl/storage/parquet.py)."""
+NETWORK_BYTES = 2_000_000_000
+"""Of the file of a policy that was trained elsewhere, and of what it unpacks to."""
+DIGITS = 300
+"""Of a whole number, so that it is also one of floating point."""
 DEPTH = 64
 """Of what is nested; the deepest of ours has 12 levels."""
 ENTRIES = 100_000
@@ -80,9 +84,15 @@ def parse_json(text: str | bytes) -> Any:
         ValueError: It is no JSON, not UTF-8, nested too deeply, or holds a number of too many digits.
     """
     try:
-        return json.loads(text)
+        return json.loads(text, parse_int=_whole)
     except RecursionError as error:
         raise ValueError("is nested too deeply") from error
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > DIGITS:
+        raise ValueError(f"holds a number of {len(digits):,} digits")
+    return int(digits)
 
 
 def read_json(path: Path) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.budget import parse_json
+from gsl.core.budget import NETWORK_BYTES, check_file, parse_json
 from gsl.errors import ArtifactError
 
 SCHEMA_VERSION = 1
@@ -25,11 +25,12 @@ def read_checkpoint(path: Path, *, kind: str) -> tuple[dict[str, np.ndarray], di
 
     if not path.is_file():
         raise ArtifactError(path, "there is no such checkpoint")
+    check_file(path, NETWORK_BYTES)
     try:
         with safe_open(path, framework="numpy") as file:
             metadata = _metadata(path, file.metadata(), kind)
             arrays = {name: file.get_tensor(name) for name in sorted(file.keys())}
-    except (SafetensorError, OSError) as error:
+    except (SafetensorError, OSError, TypeError, ValueError, AttributeError) as error:  # types that numpy lacks
         raise ArtifactError(path, "is not a checkpoint, or truncated or damaged; train the model again") from error
     check_finite(path, arrays)
     return arrays, metadata

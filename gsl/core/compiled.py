@@ -23,11 +23,17 @@ F = TypeVar("F", bound=Callable[..., object])
 
 
 def compile_kernel(function: F) -> F:
-    """Compile a function when it is first called, or take it from the cache; threads may run it side by side."""
-    if "NUMBA_CACHE_DIR" not in os.environ:
-        numba.config.CACHE_DIR = _folder()  # type: ignore[attr-defined]
-    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    if (kept := getattr(dispatcher, "_cache", None)) is not None:  # none with NUMBA_DISABLE_JIT
+    """Compile a function when it is first called, or take it from the cache; threads may run it side by side.
+
+    Where no folder can be written, there is no cache.
+    """
+    try:
+        if "NUMBA_CACHE_DIR" not in os.environ:
+            numba.config.CACHE_DIR = _folder()  # type: ignore[attr-defined]
+        dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    except RuntimeError:  # no home, or none that can be written
+        dispatcher = numba.njit(nogil=True, error_model="numpy")(function)
+    if hasattr(kept := getattr(dispatcher, "_cache", None), "_impl"):  # not with NUMBA_DISABLE_JIT, or without a folder
         place = kept._impl
         kept._cache_file = _CheckedFiles(kept.cache_path, place.filename_base, place.locator.get_source_stamp())
     return dispatcher  # type: ignore[return-value]

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from gsl.errors import ConfigError
 
-_SUFFIXES = {1: ("",), 2: (".left", ".right"), 3: (".x", ".y", ".z"), 4: (".x", ".y", ".z", ".w")}
+SUFFIXES = {1: ("",), 2: (".left", ".right"), 3: (".x", ".y", ".z"), 4: (".x", ".y", ".z", ".w")}
+"""Ends of the names of a part's entries, by their number; but those of joints."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Layout:
 
 
 def _columns(part: str, size: int) -> tuple[str, ...]:
-    return tuple(part + suffix for suffix in _SUFFIXES[size])
+    return tuple(part + suffix for suffix in SUFFIXES[size])
 
 
 def check_alike(sim: Layout, real: Layout) -> None:

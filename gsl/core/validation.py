@@ -45,6 +45,9 @@ def make(target: Callable[..., T], values: Mapping[str, Any], *, where: str = ""
     Raises:
         ConfigError: A setting is unknown, missing or has an impossible value.
     """
+    for key in values:
+        if not isinstance(key, str) or key.startswith("__"):
+            raise ConfigError(".".join(filter(None, [where, str(key)])), "is no name of a setting")
     try:
         return target(**values)
     except ValidationError as error:

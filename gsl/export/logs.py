@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.errors import ConfigError
+from gsl.errors import ConfigError, InputError
 from gsl.export.lerobot import write_lerobot
 from gsl.storage.trajectory_columns import columns_of
 
 NANOSECONDS = 1e9
+MOST_SECONDS = 2**31 - 1  # of a stamp of ROS 2
 _ROOT = "MINARI_DATASETS_PATH"
 PAUSE = 1.0  # between two episodes of a recording that has one clock [s]
 
@@ -43,6 +44,8 @@ def write_mcap(folder: Path, batch: Batch, task: str) -> list[str]:
         kinds[f"{package}/msg/{name}"]
         for package, name in (("std_msgs", "Header"), ("builtin_interfaces", "Time"), ("sensor_msgs", "JointState"))
     )
+    if max(float(episode.time[-1]) for episode in batch.episodes) > MOST_SECONDS:
+        raise InputError(f"format = mcap: its stamps end at {MOST_SECONDS:,} s; let the log begin at 0 s")
     nothing, names = np.zeros(0), list(batch.joints)
 
     def message(seconds: float, position: np.ndarray, velocity: np.ndarray) -> tuple[int, Any]:

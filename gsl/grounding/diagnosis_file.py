@@ -6,9 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from gsl.effects.effect import build
 from gsl.errors import ArtifactError
 from gsl.grounding.draws import UncertainCause
+from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import DIGITS, report_of
+from gsl.storage.documents import as_written
 from gsl.storage.references import load
 
 MANY = 6  # effects, more of which are counted and not named
@@ -62,10 +65,16 @@ def read_diagnosis(reference: str, kind: str) -> Diagnosis:
         ArtifactError: There is none, or it is not as it was written.
     """
     artifact = load(reference, kind)
+    with as_written(artifact.folder, "diagnose again"):
+        return _read(artifact)
+
+
+def _read(artifact: Artifact) -> Diagnosis:
     report, sim = report_of(artifact.folder), artifact.config["sim"]
     if report["verdict"] == "wiring":
         raise ArtifactError(artifact.folder, f"{report['summary']} Mend the log and diagnose it again")
     gap = report["shrinkage"]
+    build({**sim["effects"], **report["effects"]})  # they are what effects are
     return Diagnosis(
         verdict=report["verdict"],
         causes=tuple(one["effect"] for one in report["causes"]),

@@ -53,5 +53,5 @@ def _read(path: Path, changed: int) -> ServoMembers:
     arrays, about = read_checkpoint(path, kind=ServoModel.kind)
     try:
         return ServoMembers.from_arrays(arrays, about)
-    except (KeyError, ValueError, TypeError) as error:
+    except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, AssertionError) as error:
         raise ArtifactError(path, f"is no learned servo of this version ({error}); train it again") from error

@@ -17,6 +17,7 @@ from typing import Annotated, Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
+from gsl.core.budget import NETWORK_BYTES, check_file
 from gsl.core.layout import Layout
 from gsl.core.setting import setting
 from gsl.errors import ConfigError
@@ -124,10 +125,12 @@ def policy_file(name: str) -> Path:
 
     Raises:
         ConfigError: There is none.
+        InputError: It is too large.
     """
     path = Path(name)
     if not path.is_file():
         raise ConfigError("policy.file", "is no file; name the network's file as seen from here", given=name)
+    check_file(path, NETWORK_BYTES)
     return path
 
 

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import re
 import warnings
+import zipfile
+import zlib
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
+from gsl.core.budget import NETWORK_BYTES
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.policies.outside import File, Joints, Network, OutsideFile, Ports, read_once
 from gsl.policies.wired import Answer
 from gsl.policies.wiring import Wiring
+
+_REACHING = re.compile(rb"\b(save|from_file|rpc_\w+|print)\b|\bops\s*\.\s*(?!(aten|prim|quantized|prepacked)\b)\w+")
+"""Words of a program that no policy needs: operations on files, machines and the terminal."""
+_PART = re.compile(rb'\bgetattr\([\w.]+, "[^"\\\n]*"\)')  # how a program writes a layer of a sequence
+_GETTING = re.compile(rb"\bgetattr\b")  # in any other way, such as with a name in two parts
 
 
 @component
@@ -39,6 +48,7 @@ class TorchScript:
     def __init__(self, path: Path) -> None:
         import torch
 
+        check_program(path)
         try:
             load: Any = torch.jit.load
             with warnings.catch_warnings():  # of torch, which would like torch.export
@@ -77,6 +87,32 @@ class TorchScript:
                 problem = f"cannot take {len(observation)} numbers: {_last_line(error)}"
                 raise ConfigError("policy.wiring.observation", problem, given=self._where) from error
             return np.asarray((outputs[0] if isinstance(outputs, tuple) else outputs).numpy())
+
+
+def check_program(path: Path) -> None:
+    """Refuse a file whose program can write files, reach other machines or print: operations that no policy needs.
+
+    Every file of its source is searched for their names, before any of it is loaded.
+
+    Raises:
+        ConfigError: It names one of them, or is no such file.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries = archive.infolist()
+            if sum(entry.file_size for entry in entries) > NETWORK_BYTES:
+                problem = f"unpacks to more than {NETWORK_BYTES / 1e9:g} GB; no policy is as large"
+                raise ConfigError("policy.file", problem, given=str(path))
+            sources = [archive.read(entry) for entry in entries if entry.filename.endswith(".py")]
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, NotImplementedError) as error:
+        advice = "write it with torch.jit.script(module).save(file)"
+        raise ConfigError("policy.file", f"is no TorchScript; {advice}", given=str(path)) from error
+    searches = (_REACHING.search(source) or _GETTING.search(_PART.sub(b"", source)) for source in sources)
+    if (match := next(filter(None, searches), None)) is not None:
+        problem = (
+            f"uses {match[0].decode()}, with which a program could reach files or the terminal; no policy needs it"
+        )
+        raise ConfigError("policy.file", problem, given=str(path))
 
 
 def _first_line(error: Exception) -> str:

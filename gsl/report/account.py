@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import itertools
-import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from gsl.core.budget import DOCUMENT_BYTES, read_json, read_text
 from gsl.core.unit import Unit
 from gsl.core.words import in_unit
+from gsl.errors import InputError
 from gsl.models.free_run import TICKS
 from gsl.report.audit import audit_table
 from gsl.report.diagnosis_text import summary_lines
@@ -37,7 +38,7 @@ def account(artifact: Artifact) -> list[Told]:
     try:
         told = tell(artifact.folder, artifact.metrics, unit_of(artifact))
         return [told] if isinstance(told, Told) else told
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (InputError, OSError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, StopIteration):
         return [_plain(artifact)]
 
 
@@ -118,7 +119,7 @@ def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 
 
 def _optimize(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    document = json.loads((folder / "policies.json").read_text(encoding="utf-8"))
+    document = read_json(folder / "policies.json")
     rows = [
         (str(one["generation"]), str(one["name"]), unit.bare(one["value_sim"]))
         for one in document["policies"]
@@ -131,11 +132,11 @@ def _optimize(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 
 def _problems(folder: Path) -> str:
     report = folder / "grounding.json"
-    return "; ".join(json.loads(report.read_text(encoding="utf-8"))["problems"]) if report.is_file() else ""
+    return "; ".join(read_json(report)["problems"]) if report.is_file() else ""
 
 
 def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    document = json.loads((folder / "evaluation.json").read_text(encoding="utf-8"))
+    document = read_json(folder / "evaluation.json")
     return Told("policies in the real world", *evaluation_table(document, unit), describe_choice(metrics, unit))
 
 
@@ -200,7 +201,7 @@ def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 
 def _markdown(path: Path) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return the titles and rows of the first table of a file."""
-    below_title = itertools.dropwhile(lambda line: line[:1] != "|", path.read_text(encoding="utf-8").splitlines())
+    below_title = itertools.dropwhile(lambda line: line[:1] != "|", read_text(path, DOCUMENT_BYTES).splitlines())
     return read_table(list(itertools.takewhile(lambda line: line.startswith("|"), below_title)))
 
 
@@ -243,7 +244,7 @@ def _diagnose(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> list[Told
 
 
 def _audit(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    document = json.loads((folder / "audit.json").read_text(encoding="utf-8"))
+    document = read_json(folder / "audit.json")
     return Told(*audit_table(document))
 
 

@@ -7,7 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -118,12 +118,13 @@ class Console:
 
     def error(self, message: str, exit_code: int, *, command: str = "gsl") -> int:
         """Say in one line why the command ends, and return the exit code."""
-        message = visible(message)
+        message = visible(" ".join(message.splitlines()))  # what it names may hold line ends
         _log.info("%s", message)
         if self.json:
             self.result({"error": message, "exit_code": exit_code})
         else:
-            sys.stdout.flush()
+            with suppress(OSError):  # the disk may be full to which stdout goes, and that is what is told
+                sys.stdout.flush()
             sys.stderr.write(f"{visible(command)}: {message}\n")
         return exit_code
 

@@ -24,7 +24,7 @@ def headline(artifact: Artifact) -> str:
     tell = _TELLERS.get(artifact.manifest.kind)
     try:
         return tell(artifact.metrics, unit_of(artifact)) if tell else str(artifact.metrics.get("headline", ""))
-    except (ArtifactError, ValueError, KeyError, TypeError, AttributeError, IndexError):
+    except (ArtifactError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, StopIteration):
         return ""
 
 

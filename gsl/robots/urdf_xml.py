@@ -135,6 +135,8 @@ def _each(root: xml.Element, tag: str, read: Callable[[str, xml.Element], T]) ->
         name = node.get("name")
         if not name:
             raise ValueError(f"a <{tag}> has no name")
+        if not name.isprintable():
+            raise ValueError(f"the name of a {tag}, {name!r}, has marks that cannot be printed")
         if name in names:
             raise ValueError(f"two {tag}s are called '{name}'")
         names.add(name)

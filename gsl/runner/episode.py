@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from gsl.runner.acting import Actor
 from gsl.runner.bounds import narrowest
 from gsl.runner.clock import Clock, Time
 from gsl.runner.following import Following
-from gsl.runner.guard import Guard, ramp
+from gsl.runner.guard import Guard, longest, ramp
 from gsl.runner.request import layout_of
 from gsl.runner.senses import RobotError, Seen, Senses, names_of
 from gsl.runner.watch import FIRST, Watch, limit_of
@@ -21,6 +21,7 @@ HOLD = 1.0  # for which the last safe target is held before the ramp out of a st
 LATEST = 3.0  # that a tick may come before the episode is stopped, in periods
 ENDS = ("fell", "stopped")  # the last columns
 CALM = 0.5  # of a joint's speed limit, the most in a ramp
+LONGEST_RAMP = 600.0  # to the start of an episode [s]
 
 
 class Lies(RobotError):
@@ -212,9 +213,14 @@ class Player:
 
     def _ramp(self, end: np.ndarray, *, back: bool = False) -> None:
         speed = np.minimum(self.request["ramp"]["speed"], CALM * np.array(self.request["limits"]["speed"]))
-        self._follow(list(ramp(self.guard.last, end, self.request["ramp"]["seconds"], speed, self.period)), back=back)
+        seconds = longest(self.guard.last, end, speed)
+        if seconds > LONGEST_RAMP and not back:
+            raise RobotError(
+                f"a ramp would take {seconds:.3g} s, more than {LONGEST_RAMP:g} s: a speed limit is too low"
+            )
+        self._follow(ramp(self.guard.last, end, self.request["ramp"]["seconds"], speed, self.period), back=back)
 
-    def _follow(self, targets: list[np.ndarray], *, held: bool = False, back: bool = False) -> None:
+    def _follow(self, targets: Iterable[np.ndarray], *, held: bool = False, back: bool = False) -> None:
         """Send targets one by one while the robot stands and, unless one and the same is `held`, follows.
 
         On the way `back` it is gone on where reading hangs.

@@ -98,7 +98,12 @@ def ramp(start: np.ndarray, end: np.ndarray, seconds: float, speed: np.ndarray, 
         speed: The most of each joint [rad/s], shape (n_joints,).
         period: Control period [s].
     """
-    longest = 0.5 * np.pi * float((np.abs(end - start) / speed).max())
-    ticks = max(1, math.ceil(max(seconds, longest) / period - _ROUNDING))
+    ticks = max(1, math.ceil(max(seconds, longest(start, end, speed)) / period - _ROUNDING))
     for tick in range(1, ticks + 1):
         yield start + (end - start) * (0.5 - 0.5 * np.cos(np.pi * tick / ticks))
+
+
+def longest(start: np.ndarray, end: np.ndarray, speed: np.ndarray) -> float:
+    """Return how long the slowest joint needs for a ramp [s]; arguments as those of `ramp`."""
+    with np.errstate(over="ignore"):
+        return 0.5 * np.pi * float((np.abs(end - start) / speed).max())

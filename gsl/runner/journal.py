@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from gsl.core.budget import ARTIFACT_BYTES, DOCUMENT_BYTES, check_file
 from gsl.errors import ArtifactError
 
 ANSWER, RETURNS = "answer.csv", "returns.csv"
@@ -20,7 +21,12 @@ YES = ("true", "yes", "1")
 
 
 def read_mark(path: Path) -> str:
-    """Return the hash of the request that a file says it answers, nothing if it says none."""
+    """Return the hash of the request that a file says it answers, nothing if it says none.
+
+    Raises:
+        InputError: It is no plain file, or too large.
+    """
+    check_file(path, ARTIFACT_BYTES)
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         first = file.readline(200)
     return first.removeprefix(MARK).strip() if first.startswith(MARK) else ""
@@ -84,11 +90,19 @@ def ends(path: Path) -> dict[int, bool]:
 
 
 def table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
-    """Return the columns of a CSV file and its rows, whoever has written it; lines that begin with # are no rows."""
+    """Return the columns of a CSV file and its rows, whoever has written it; lines that begin with # are no rows.
+
+    Raises:
+        InputError: It is no plain file, too large, or no table.
+    """
+    check_file(path, DOCUMENT_BYTES)
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         read = csv.DictReader((line for line in file if not line.startswith("#")), restkey="", restval="")
-        columns = [name.strip() for name in read.fieldnames or ()]
-        rows = [dict(zip(columns, row.values(), strict=False)) for row in read]
+        try:
+            columns = [name.strip() for name in read.fieldnames or ()]
+            rows = [dict(zip(columns, row.values(), strict=False)) for row in read]
+        except csv.Error as error:
+            raise ArtifactError(path, f"is no table: {error}; move it away, or mend it") from error
     return columns, rows
 
 

@@ -56,7 +56,7 @@ def _run(folder: Path, asked: argparse.Namespace) -> int:
         with alone(folder):
             return Sitting(request, asked).run()
     except GslError as error:
-        say(f"runner.py: {error}")
+        say(" ".join(f"runner.py: {error}".splitlines()))
         return 2
     except OSError as error:
         say(f"runner.py: {error.filename or 'a file'} cannot be read or written: {error.strerror or error}")

@@ -9,11 +9,13 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from gsl.core.layout import SUFFIXES
 from gsl.runner.bounds import ENDLESS, limits_problem
 
-SLOWEST = 0.1  # control period [s]
+SHORTEST, SLOWEST = 1e-4, 0.1  # control period [s]; no servo takes 10,000 targets a second
 RAMP = {"seconds": (1.0, 60.0), "speed": (0.0, 2.0), "within": (0.0, 1.0)}  # [s], [rad/s], [rad], as world=robot takes
 LONGEST = 1_000_000  # steps of an episode: hours
+TEXTS, FLAGS = ("about", "robot", "place"), ("distance", "until_fall")
 
 
 def request_problem(request: Mapping[str, Any]) -> str:
@@ -29,8 +31,9 @@ def _problems(request: Mapping[str, Any]) -> Iterator[str]:
     joints, period = request["joints"], request["control_period"]
     if not joints or len(set(joints)) != len(joints) or not all(isinstance(joint, str) for joint in joints):
         yield "joints must be different names"
-    if not 0.0 < period <= SLOWEST:
-        yield f"control_period is {period:g} s, not between 0 and {SLOWEST:g} s"
+    if not SHORTEST <= period <= SLOWEST:
+        yield f"control_period is {period:g} s, not between {SHORTEST:g} and {SLOWEST:g} s"
+    yield from _parts(request, len(joints))
     if problem := limits_problem(request["limits"], joints, period):
         yield problem
     for name, (least, most) in RAMP.items():
@@ -45,7 +48,28 @@ def _problems(request: Mapping[str, Any]) -> Iterator[str]:
         yield from (f"{episode['name']}: {problem}" for problem in _episode(episode, len(joints)))
 
 
+def _parts(request: Mapping[str, Any], joints: int) -> Iterator[str]:
+    """Yield which of the parts that are taken as they are is of another kind."""
+    for name, kind in {**dict.fromkeys(TEXTS, str), **dict.fromkeys(FLAGS, bool)}.items():
+        if not isinstance(request[name], kind):
+            yield f"{name} must be {'a text' if kind is str else 'true or false'}"
+    if not isinstance(request["policy"], Mapping):
+        yield "policy must be settings by name"
+    observes = request["observes"]
+    for part, size in observes.items():
+        due = (joints,) if part in ("position", "velocity") else SUFFIXES
+        if type(size) is not int or size not in due:
+            yield f"observes.{part} is {str(size)[:20]}, not {' or '.join(map(str, due))} numbers"
+    if "position" not in observes:
+        yield "observes has no position"
+
+
 def _episode(episode: Mapping[str, Any], joints: int) -> Iterator[str]:
+    if not isinstance(episode["policy"], str):
+        yield "policy must be a name"
+    parameters = episode["parameters"]
+    if not (isinstance(parameters, list) and _is_row(parameters, len(parameters))):
+        yield "parameters must be numbers"
     steps = episode["steps"]
     if not isinstance(steps, int) or not 0 < steps <= LONGEST:
         yield f"steps is {steps!r}, not a whole number from 1 on"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from gsl.core.body import lump
+from gsl.core.budget import read_json
 from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
@@ -54,7 +54,7 @@ class Audit:
 
     def document(self, folder: Path) -> dict[str, Any]:
         """Return what --json shows of an artifact."""
-        document: dict[str, Any] = json.loads((folder / REPORT).read_text(encoding="utf-8"))
+        document: dict[str, Any] = read_json(folder / REPORT)
         return document
 
 

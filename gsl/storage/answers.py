@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.budget import COLUMNS, find_repeat
 from gsl.core.layout import Layout
 from gsl.core.trajectory import Trajectory
 from gsl.core.validation import did_you_mean
@@ -256,9 +257,10 @@ def _csv_columns(path: Path, request: Mapping[str, Any]) -> dict[str, np.ndarray
         table = pc.read_csv(path, read_options=pc.ReadOptions(skip_rows=above))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise TrajectoryError(path, f"is no CSV file with a row of names: {' '.join(str(error).split())}") from error
-    for name in table.column_names:
-        if (count := table.column_names.count(name)) > 1:
-            raise TrajectoryError(path, f"there are {count} columns of this name; keep one", column=name)
+    if len(table.column_names) > COLUMNS:
+        raise TrajectoryError(path, f"has {len(table.column_names):,} columns; {COLUMNS:,} are read")
+    if (twice := find_repeat(table.column_names)) is not None:
+        raise TrajectoryError(path, "there are several columns of this name; keep one", column=twice)
     if not table.num_rows:
         raise TrajectoryError(path, "has no rows; nothing was logged")
     return {name: _values(path, name, table.column(name)) for name in table.column_names}

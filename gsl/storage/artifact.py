@@ -120,6 +120,8 @@ def build(
     """
     if out.name in ("", ".."):
         raise ArtifactError(out, "is no folder for an artifact, which is replaced as a whole; choose another out=")
+    if out.name.startswith("."):
+        raise ArtifactError(out, "is hidden, as what killed commands leave is; choose another out=")
     sources = _sources(stage)
     package, made = package_of(type(stage)), getattr(stage, "makes", ())
     identity = identify(stage.kind, config, sources, package, made=made)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,20 @@ def read_versioned(path: Path, version: int, damaged: str) -> dict[str, Any]:
     if found != version:
         raise ArtifactError(path, f"schema_version {found!r} is unknown; this gsl reads {version}")
     return dict(stored)
+
+
+@contextmanager
+def as_written(path: Path, advice: str) -> Iterator[None]:
+    """Within, entries of documents are taken for what they should be; one that is missing or of another kind is damage.
+
+    Raises:
+        ArtifactError: It says where, and the `advice`.
+    """
+    try:
+        yield
+    except (OSError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        problem = f"lacks a part, or is damaged ({type(error).__name__}: {error})"
+        raise ArtifactError(path, f"{problem}; {advice}") from error
 
 
 def _on_one_line(numbers: re.Match[str]) -> str:

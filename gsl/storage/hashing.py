@@ -7,6 +7,8 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
+from gsl.core.budget import ARTIFACT_BYTES, check_file
+
 PACKAGE = Path(__file__).parents[1]
 SHORT = 12
 """Characters of a hash that are shown."""
@@ -16,7 +18,12 @@ CIRCUMSTANCES = ("manifest.json", "config.yaml", "log.txt", PAGE, STEPS)
 
 
 def file_hash(path: Path) -> str:
-    """Return the sha256 of a file's bytes."""
+    """Return the sha256 of a file's bytes.
+
+    Raises:
+        InputError: It is no plain file, or too large.
+    """
+    check_file(path, ARTIFACT_BYTES)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

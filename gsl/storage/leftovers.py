@@ -77,7 +77,7 @@ def remove(leftover: Leftover, runs: Path) -> bool:
         else:
             with hold_lock(path.with_name(hidden["name"]) if hidden else path):  # which recovers what it can
                 if leftover.artifact:
-                    _erase_artifact(path, runs)
+                    _erase_artifact(path)
                 elif os.path.lexists(path) and not path.name.endswith(".lock"):
                     _erase(path)
     except ArtifactError:
@@ -157,12 +157,12 @@ def _measure_artifact(folder: Path) -> int:
     return sum(file.bytes for file in manifest.read(folder).files.values()) + measure(folder / manifest.NAME)
 
 
-def _erase_artifact(folder: Path, runs: Path) -> None:
+def _erase_artifact(folder: Path) -> None:
     """Remove the manifest first, so that what is left after a kill is no artifact, and then the files that it names."""
     files = manifest.read(folder).files
     (folder / manifest.NAME).unlink()
     for path in (folder / name for name in files):
-        if _is_inside(path.parent, runs):
+        if _is_inside(path.parent, folder):  # a folder in it may be a link to another artifact
             path.unlink(missing_ok=True)
     for place, _, _ in os.walk(folder, topdown=False):
         with suppress(OSError):  # something of somebody else's is in it

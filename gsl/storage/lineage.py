@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from gsl.errors import ArtifactError
+from gsl.errors import ArtifactError, InputError
 from gsl.storage import manifest
 from gsl.storage.hashing import file_hash
 from gsl.storage.manifest import Manifest, Parent
@@ -47,7 +47,7 @@ def _trace(role: str, place: Path, expected: str | None, seen: set[Path]) -> Anc
     try:
         stored = None if place.is_file() else manifest.read(place)
         problem = _file_problem(place, expected) if stored is None else _problem(place, stored, expected)
-    except ArtifactError as error:
+    except (InputError, OSError) as error:
         return Ancestor(role, place, None, str(error).removeprefix(f"{place}: "))
     if stored is None or place.absolute() in seen:
         return Ancestor(role, place, stored, problem)

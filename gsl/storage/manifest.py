@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gsl.core.budget import ARTIFACT_BYTES, read_json
-from gsl.errors import ArtifactError
+from gsl.errors import ArtifactError, InputError
 from gsl.storage import documents
 from gsl.storage.hashing import contents_hash, file_hash
 
@@ -23,6 +23,14 @@ HASH = "sha256"
 
 _ALWAYS = frozenset({"config.yaml", "log.txt", "metrics.json"})  # files that no artifact lacks
 _DAMAGED = "build the artifact again with force=true"
+LONGEST = 1e12  # of a duration [s]
+_KINDS: Mapping[str, type | tuple[type, ...]] = {
+    **dict.fromkeys(("kind", "key", "command", "sources", "created", "metrics"), str),
+    **dict.fromkeys(("seeds", "versions"), dict),
+    **dict.fromkeys(("git", "unit"), (dict, type(None))),
+    "duration": (int, float),
+}
+"""What entries have to be that are taken as they are."""
 
 
 @dataclass(frozen=True)
@@ -145,6 +153,8 @@ def read(folder: Path) -> Manifest:
         raise ArtifactError(folder, f"is no complete artifact: it holds no {NAME}") from error
     except OSError as error:
         raise ArtifactError(folder / NAME, f"cannot be read: {error.strerror}") from error
+    except InputError as error:  # no plain file, or too large
+        raise ArtifactError(folder / NAME, str(error).removeprefix(f"{folder / NAME}: ")) from error
     except (ValueError, RecursionError) as error:
         raise ArtifactError(folder / NAME, f"is damaged: it is not JSON; {_DAMAGED}") from error
     version = stored.get("schema_version") if isinstance(stored, dict) else None
@@ -171,6 +181,15 @@ def _parse(stored: dict[str, Any]) -> Manifest:
     parents = tuple(Parent(**parent) for parent in stored.pop("parents"))
     links = tuple(Parent(**link) for link in stored.pop("links", ()))
     trust = tuple(stored.pop("trust", ()))
+    for name, kinds in _KINDS.items():
+        if name in stored and not isinstance(stored[name], kinds):
+            raise ValueError(f"{name} is of another kind")
+    texts = [text for one in (*parents, *links) for text in (one.role, one.path, one.hash)]
+    texts += [*trust, *(file.sha256 for file in files.values())]
+    if not all(isinstance(text, str) and "\0" not in text for text in texts):
+        raise ValueError("a part of it is no text")
+    if not abs(stored["duration"]) < LONGEST:
+        raise ValueError("its duration is none")
     for name in (*files, stored.get("metrics", Manifest.metrics)):
         if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
             raise ValueError(f"{name} is no file of the artifact")

@@ -69,5 +69,5 @@ def _read(reference: str, kind: str, of_states: Callable[..., Any], of_joints: C
     make = Counts.from_arrays if space == Counts.space else of_joints if space is None else of_states
     try:
         return make(arrays, about)
-    except (KeyError, IndexError, TypeError, AssertionError) as error:
-        raise ArtifactError(path, f"lacks part of the model ({error}); train it again") from error
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, AssertionError, MemoryError) as error:
+        raise ArtifactError(path, f"lacks part of the model, or is damaged ({error}); train it again") from error

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gsl.core.budget import COLUMNS
 from gsl.errors import TrajectoryError
 
 if TYPE_CHECKING:
     import pyarrow.parquet as pq
 
 MOST = 16e9  # bytes of a trajectory file in memory; hours of a humanoid are some 0.1e9
+FEW, PACKED = 0.3e9, 50.0  # bytes in memory that any file may take, and bytes for one of a larger file: logs pack by 10
 
 
 def count_bytes(metadata: pq.FileMetaData, names: Sequence[str] | None = None) -> float:
@@ -27,8 +29,15 @@ def count_bytes(metadata: pq.FileMetaData, names: Sequence[str] | None = None) -
 
 
 def check_declared(path: Path, metadata: pq.FileMetaData) -> None:
-    """Refuse a trajectory file that says it holds more than fits into any memory."""
+    """Refuse a trajectory file that says it holds more than fits into any memory, or than any log of its size."""
+    if metadata.num_columns > COLUMNS:
+        raise TrajectoryError(path, f"has {metadata.num_columns:,} columns; {COLUMNS:,} are read")
     need = count_bytes(metadata)
+    if need > max(FEW, PACKED * (size := path.stat().st_size)):
+        problem = (
+            f"has {size / 1e6:.3g} MB, which unpack to {need / 1e9:.3g} GB: no log packs so well; collect it again"
+        )
+        raise TrajectoryError(path, problem)
     if need > MOST:
         problem = f"declares {metadata.num_rows:,} rows, {need / 1e9:.3g} GB of memory; a log this long has to be cut"
         raise TrajectoryError(path, problem)

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from gsl.core.budget import read_text
+from gsl.core.budget import DOCUMENT_BYTES, read_text
 from gsl.errors import ArtifactError, InputError
 from gsl.storage.hashing import STEPS
 
@@ -70,9 +70,9 @@ def read_steps(folder: Path) -> list[Step]:
     if not path.exists():
         return []
     try:
-        lines = read_text(path).splitlines()
+        lines = read_text(path, DOCUMENT_BYTES).splitlines()
         return [_parse(line) for line in lines]
-    except (ValueError, TypeError, AttributeError, RecursionError, InputError) as error:
+    except (ValueError, TypeError, AttributeError, OverflowError, RecursionError, InputError) as error:
         raise ArtifactError(path, "is damaged; build the artifact again with force=true") from error
 
 
@@ -80,7 +80,7 @@ def _read_whole(path: Path) -> Iterator[Step]:
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
         try:
             yield _parse(line)
-        except (ValueError, TypeError, AttributeError):
+        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError):
             return
 
 

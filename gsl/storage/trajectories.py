@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gsl.core.budget import parse_json
+from gsl.core.budget import ARTIFACT_BYTES, check_file, parse_json
 from gsl.core.trajectory import Batch
 from gsl.errors import TrajectoryError
 from gsl.storage import documents
@@ -93,6 +93,7 @@ def _table(path: Path) -> pa.Table:
         raise TrajectoryError(path, "is a folder; give the parquet file in it")
     if not path.exists():
         raise TrajectoryError(path, "does not exist")
+    check_file(path, ARTIFACT_BYTES)
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             check_declared(path, file.metadata)

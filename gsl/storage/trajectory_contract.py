@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import difflib
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gsl.core.budget import COLUMNS, find_repeat
 from gsl.errors import TrajectoryError
 
 SCHEMA_VERSION = 1
@@ -42,6 +42,34 @@ SENSORS = (
     *(f"{group}.{axis}" for group in ("gyro", "acceleration", "base.position", "base.velocity") for axis in "xyz"),
     *(f"base.orientation.{axis}" for axis in "xyzw"),
 )
+
+
+MOST_EPISODES = 100_000
+LARGEST = 1e12  # of any number in a column, in SI units: squares and sums of such numbers are still numbers
+SHOWN = 40  # characters of a value in an error
+MOST_PERIOD = 1e6  # of a control period [s], days
+MOST_TRANSITIONS = 100_000_000  # from cell to cell by a choice, which a table of counts takes in memory
+
+
+def _is_number(value: Any, most: float) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= most
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and _is_number(value, COLUMNS) and value >= 0
+
+
+_KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
+    "robot": (lambda value: isinstance(value, str), "a name"),
+    "episodes": (
+        lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value),
+        "a list of mappings, one an episode",
+    ),
+    "action_noise": (lambda value: _is_number(value, 1e6), "a number"),
+    "pi0_falls": (lambda value: _is_number(value, 1.0), "a share"),
+    **dict.fromkeys(("cells", "choices"), (_is_count, "a number of them")),
+}
+"""What further entries of the metadata have to be, where they are there."""
 
 
 def joint_columns(group: str, joints: Iterable[str]) -> list[str]:
@@ -78,11 +106,18 @@ def check_metadata(path: Path, metadata: Any, robot_joints: tuple[str, ...] | No
     if metadata["role"] not in ROLES:
         raise TrajectoryError(path, f"role {metadata['role']!r} is none of {', '.join(ROLES)}")
     period = metadata["control_period"]
-    if isinstance(period, bool) or not isinstance(period, (int, float)) or not (math.isfinite(period) and period > 0):
-        raise TrajectoryError(path, f"control_period {period!r} must be a positive number of seconds")
+    if not (_is_number(period, MOST_PERIOD) and period > 0):
+        raise TrajectoryError(path, f"control_period {_short(period)} must be a positive number of seconds")
     states = metadata.get("states", 0)
-    if isinstance(states, bool) or not isinstance(states, int) or states < 0:
-        raise TrajectoryError(path, f"states {states!r} must be the number of entries of the state")
+    if not _is_count(states):
+        raise TrajectoryError(path, f"states {_short(states)} must be the number of entries of the state")
+    for key, (fits, what) in _KINDS.items():
+        if metadata.get(key) is not None and not fits(metadata[key]):
+            raise TrajectoryError(path, f"{key} {_short(metadata[key])} must be {what} in the metadata")
+    if (metadata.get("cells") or 0) ** 2 * (metadata.get("choices") or 0) > MOST_TRANSITIONS:
+        raise TrajectoryError(
+            path, f"cells and choices make more than {MOST_TRANSITIONS:,} transitions in the metadata"
+        )
     _check_joints(path, metadata, None if states else robot_joints)
     _check_units(path, metadata["units"])
 
@@ -113,29 +148,25 @@ def _spell(unit: str) -> str:
 def check_names(path: Path, names: list[str], metadata: Mapping[str, Any]) -> None:
     """Refuse missing, duplicated and unknown columns; a column named in `units` beside the contract's is known."""
     joints, units, states = metadata["joints"], metadata["units"], metadata.get("states", 0)
-    for name in names:
-        if names.count(name) > 1:
-            raise TrajectoryError(path, f"there are {names.count(name)} columns of this name; keep one", column=name)
+    if (name := find_repeat(names)) is not None:
+        raise TrajectoryError(path, f"there are {names.count(name)} columns of this name; keep one", column=name)
     required = list_required(joints, states)
     if any(name.startswith("grounded_action.") for name in names):
         required += joint_columns("grounded_action", joints)
+    there, own = set(names), set(units) - set(UNITS)
     for name in required:
-        if name not in names:
-            raise TrajectoryError(path, f"is missing{suggestion(name, set(names) - set(required))}", column=name)
+        if name not in there:
+            raise TrajectoryError(path, f"is missing{suggestion(name, there - set(required))}", column=name)
     known = {*required, "reward"}
     if states:
         known.add("terminated")
     else:
         known.update((*SENSORS, "fell", *(name for group in JOINT_SENSORS for name in joint_columns(group, joints))))
     for name in names:
-        if name not in known and not _declares(name, units):
+        declared = (name in own or name.rpartition(".")[0] in own) and not name.startswith("next_state.")
+        if name not in known and not declared:
             advice = f"is unknown{suggestion(name, known)}; a column of your own needs a unit under `units`"
             raise TrajectoryError(path, advice, column=name)
-
-
-def _declares(name: str, units: Mapping[str, Any]) -> bool:
-    own = set(units) - set(UNITS)
-    return name in own or name.rpartition(".")[0] in own
 
 
 def check_rows(path: Path, columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -161,6 +192,8 @@ def check_rows(path: Path, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         if name.startswith("next_state."):
             after = np.append(columns[name.removeprefix("next_")][1:], np.nan)
             _refuse(path, name, ~last & (values != after), "is not the state of the next row; split the episode there")
+    if (count := int(last.sum())) > MOST_EPISODES:
+        raise TrajectoryError(path, f"has {count:,} episodes; {MOST_EPISODES:,} are read", column="episode")
     return np.insert(np.flatnonzero(last) + 1, 0, 0)
 
 
@@ -168,6 +201,9 @@ def _check_values(path: Path, name: str, values: np.ndarray, last: np.ndarray) -
     if values.dtype.kind != "f":
         return
     inside = ~last if blank_at_the_end(name) else slice(None)
+    _refuse(
+        path, name, np.abs(values) > LARGEST, f"is beyond {LARGEST:g}, which nothing measures; drop or mend the row"
+    )
     if np.isfinite(values[inside]).all() and (isinstance(inside, slice) or np.isnan(values[last]).all()):
         return
     if isinstance(inside, slice):
@@ -186,3 +222,8 @@ def suggestion(name: str, choices: Iterable[str]) -> str:
     """Return `, did you mean ...?` when one of `choices` resembles `name`, else nothing."""
     close = difflib.get_close_matches(name, sorted(choices), n=1, cutoff=0.75)
     return f", did you mean {close[0]}?" if close else ""
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."

@@ -141,8 +141,9 @@ def degrees_by_joint(errors: np.ndarray, joints: tuple[str, ...]) -> dict[str, f
 
 
 def compute_r2(errors: np.ndarray, wanted: np.ndarray) -> float:
-    """Return the share of the variance that is explained, R², over all joints."""
-    return float(1.0 - np.sum(errors**2) / np.sum((wanted - wanted.mean(axis=0)) ** 2))
+    """Return the share of the variance that is explained, R², over all joints; NaN where nothing varies."""
+    varies = float(np.sum((wanted - wanted.mean(axis=0)) ** 2))
+    return 1.0 - float(np.sum(errors**2)) / varies if varies > 0.0 else float("nan")
 
 
 def check_lengths(path: Path, episodes: Sequence[Trajectory], needed: int) -> Sequence[Trajectory]:

@@ -13,6 +13,7 @@ from gsl.core.region import Region
 from gsl.core.seeds import derive_seed
 from gsl.core.trajectory import Trajectory
 from gsl.core.transitions import transitions, usable
+from gsl.errors import ArtifactError
 from gsl.grounding.gat import LoadedTransformation
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.storage.checkpoints import write_checkpoint
@@ -36,7 +37,10 @@ def read_region(folder: Path) -> Region:
         ArtifactError: The file is missing or damaged.
     """
     arrays, _ = read_checkpoint(folder / FILE, kind=KIND)
-    return Region(arrays["mean"], arrays["whitening"], float(arrays["bound"][0]))
+    try:
+        return Region(arrays["mean"], arrays["whitening"], float(arrays["bound"][0]))
+    except (LookupError, TypeError, ValueError) as error:
+        raise ArtifactError(folder / FILE, f"lacks a part ({error}); train the model again") from error
 
 
 def drifts(scenario: Scenario, known: Region, found: Mapping[str, np.ndarray], seed: int) -> dict[str, float]:

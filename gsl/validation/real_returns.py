@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
@@ -11,18 +10,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gsl.core.budget import read_json
 from gsl.core.described import rebuilt
 from gsl.core.interfaces import Policy, Task
 from gsl.core.setting import settings_of
 from gsl.errors import ArtifactError
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
+from gsl.storage.documents import as_written
 from gsl.storage.identity import content_hash
 from gsl.storage.policies import read_policies
 from gsl.storage.policy_choice import EVALUATION, FILE, records, vector
 from gsl.storage.references import resolve
 from gsl.worlds.bullet import BulletWorld
 
+MOST_ROUNDS = 1000  # of an iteration
 MOST = 12  # policies that are compared; of more, some are taken that are spread over the list
 ROLE, FOUND = "policies", "found"
 _EVALUATE, _ITERATE = "evaluate", "iterate"
@@ -99,6 +101,11 @@ def real_returns(reference: str, sim: BulletWorld, *, trust: Collection[str] = (
         ConfigError: It names a class that is not gsl's, and whose module is not in `trust`.
     """
     named = _resolve(reference)
+    with as_written(named, "evaluate again"):
+        return _read(named, sim, trust)
+
+
+def _read(named: Path, sim: BulletWorld, trust: Collection[str]) -> RealReturns:
     places = _iterations(named) if manifest.read(named).kind == _ITERATE else [named]
     configs = [_check(place, sim) for place in places]
     config = configs[-1]
@@ -127,8 +134,9 @@ def _resolve(reference: str) -> Path:
 
 def _iterations(named: Path) -> list[Path]:
     """Return the evaluations beside an artifact of `iterate`."""
-    count = int(Artifact(named, manifest.read(named)).metrics["iterations"])
-    return [named.parent / f"iteration_{number:02d}" / _EVALUATE for number in range(1, count + 1)]
+    with as_written(named, "iterate again"):
+        count = int(Artifact(named, manifest.read(named)).metrics["iterations"])
+    return [named.parent / f"iteration_{number:02d}" / _EVALUATE for number in range(1, min(count, MOST_ROUNDS) + 1)]
 
 
 def _source(evaluation: Path) -> Path:
@@ -167,7 +175,7 @@ def _file(source: Path) -> Path:
 
 def _measure(evaluation: Path, policy: Policy, episodes: int, prefix: str) -> list[MeasuredPolicy]:
     """Return all policies of one evaluation; fresh episodes count instead of the `episodes` by which one was chosen."""
-    table = json.loads((evaluation / EVALUATION).read_text(encoding="utf-8"))
+    table = read_json(evaluation / EVALUATION)
     fresh = {row["name"]: row for row in table["confirmation"]}
     thetas = {one.name: vector(policy, one) for one in records(policy, str(_source(evaluation)))}
     return [

@@ -106,3 +106,23 @@ def test_after_kill_9_no_worker_stays_and_the_artifact_can_be_built(chain: Path,
     quick = ("episodes=1", "neighbours=0", "task.duration=0.1", "workers=1")
     assert gsl("collect", *quick, f"out={tmp_path}/it", folder=chain).code == 0
     assert [path.name for path in tmp_path.iterdir()] == ["it"]
+
+
+EARLY = """
+import os, signal, sys
+
+class Finder:
+    def find_spec(self, name, *more):
+        if name == "gsl.cli":
+            os.kill(os.getpid(), getattr(signal, sys.argv[1]))
+
+sys.meta_path.insert(0, Finder())
+import gsl.__main__
+gsl.__main__.main()
+"""
+
+
+@pytest.mark.parametrize("stop", ["SIGINT", "SIGTERM"])
+def test_an_interruption_before_anything_is_loaded_is_one_line(stop: str) -> None:
+    said = subprocess.run([sys.executable, "-c", EARLY, stop], capture_output=True, text=True, check=False)
+    assert (said.returncode, said.stdout, said.stderr) == (130, "", "gsl: interrupted before it began\n")

@@ -46,3 +46,10 @@ def test_a_damaged_cache_is_compiled_again_and_said(tmp_path: Path) -> None:
     said, warned = doubled(tmp_path)
     assert said.startswith("6.0 Counter({")
     assert warned == ""
+
+
+def test_where_no_folder_can_be_written_it_is_compiled_every_time() -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": "/proc/none", "HOME": "/proc/none"}
+    command = [sys.executable, "-c", DOUBLING]  # beside a source there would be one more place
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("6.0 Counter()")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from gsl.policies.function import FunctionPolicy
 from gsl.policies.onnx import OnnxPolicy
 from gsl.policies.outside import Ports
 from gsl.policies.signals import turn_back
-from gsl.policies.torchscript import TorchScriptPolicy
+from gsl.policies.torchscript import TorchScriptPolicy, check_program
 from gsl.policies.wired import Eyes, Hands, WiredEnv
 from gsl.policies.wiring import Term, Wiring
 from gsl.policies.wiring_audit import audit
@@ -250,6 +251,44 @@ def test_a_trainer_sees_what_the_policy_will_see_and_acts_as_it_will() -> None:
     env.reset()
     seen, *_ = env.step(np.array([0.75]))
     np.testing.assert_allclose(seen, [0.5, 0.75])  # 2 · 0.75 of 3 is half a range
+
+
+LINES = (
+    *('torch.save(x, "ran")', 'torch . save (x, "ran")', 'torch.from_file("ran", True, 16)', 'ops.aten.save(x, "ran")'),
+    *(
+        'getattr(torch, "sa" "ve")',
+        'getattr(torch, "save")',
+        r'getattr(torch, "\x73ave")',
+        'print("\\x1b[2J")',
+        "ops.profiler._record_function_exit(x)",
+        "rpc_async(x)",
+    ),
+)
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_program_that_could_reach_files_is_refused_before_it_is_loaded(line: str, tmp_path: Path) -> None:
+    torch = pytest.importorskip("torch")
+    layers = torch.nn.Sequential(torch.nn.Linear(3, 4), torch.nn.Sequential(torch.nn.ELU()), torch.nn.LSTM(4, 2))
+    torch.jit.script(layers).save(str(tmp_path / "good.pt"))
+    check_program(tmp_path / "good.pt")
+    with zipfile.ZipFile(tmp_path / "good.pt") as good, zipfile.ZipFile(tmp_path / "bad.pt", "w") as bad:
+        for entry in good.infolist():
+            bad.writestr(entry.filename, good.read(entry))
+        bad.writestr("bad/code/__torch__/data/x.py", f"def f(x: Tensor) -> None:\n  {line}\n")
+    with pytest.raises(ConfigError, match="could reach files"):
+        TorchScriptPolicy(file=str(tmp_path / "bad.pt")).network()
+
+
+def test_a_network_that_unpacks_to_gigabytes_is_refused(tmp_path: Path) -> None:
+    with (
+        zipfile.ZipFile(tmp_path / "bomb.pt", "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("x/data/0", "w", force_zip64=True) as file,
+    ):
+        for _ in range(21):
+            file.write(bytes(100_000_000))
+    with pytest.raises(ConfigError, match="unpacks to more than 2 GB"):
+        TorchScriptPolicy(file=str(tmp_path / "bomb.pt")).network()
 
 
 def test_files_that_are_no_networks_are_one_line(tmp_path: Path) -> None:

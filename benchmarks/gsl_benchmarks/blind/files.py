@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gsl.core.budget import read_json
 from gsl.core.trajectory import Batch
+from gsl.core.trust import check_code
 from gsl.errors import ArtifactError
 from gsl.storage.documents import write_json
 from gsl.storage.references import resolve
@@ -47,9 +48,17 @@ def write_case(folder: Path, log: Batch, reference: Batch | None, case: Mapping[
 
 
 def read_case(folder: Path) -> tuple[Batch, Batch | None, dict[str, Any]]:
-    """Return log, reference if there is one, and what case.json says."""
-    reference = folder / REFERENCE
-    return read(folder / LOG), read(reference) if reference.exists() else None, document(folder / CASE)
+    """Return log, reference if there is one, and what case.json says, which names no code.
+
+    Raises:
+        ArtifactError: It is no case.
+        ConfigError: Its simulator is code of somebody else.
+    """
+    reference, case = folder / REFERENCE, document(folder / CASE, sim=dict)
+    check_code(case, where=folder.name)
+    if not isinstance(case.get("without", []), list):
+        raise ArtifactError(folder / CASE, "without is no list of effects; copy it again")
+    return read(folder / LOG), read(reference) if reference.exists() else None, case
 
 
 def seals_of(path: Path) -> dict[str, Any]:
@@ -58,18 +67,33 @@ def seals_of(path: Path) -> dict[str, Any]:
     Raises:
         GslError: A file was changed, is missing or is new.
     """
-    cases: dict[str, Any] = document(path)["cases"]
+    cases: dict[str, Any] = document(path, cases=dict)["cases"]
     for name, seal in cases.items():
+        if not (isinstance(seal, dict) and isinstance(seal.get("files"), dict) and isinstance(seal.get("label"), str)):
+            raise ArtifactError(path, f"{name} is no seal of a case; copy it again")
+        if name != Path(name).name or name.startswith("."):
+            raise ArtifactError(path, f"{name} is no name of a case, which is a folder beside it")
         check_files(path.parent / CASES / name, seal["files"])
     return cases
 
 
-def document(path: Path) -> dict[str, Any]:
-    """Return a JSON document of this version, with or without a version number."""
+def document(path: Path, **needed: type) -> dict[str, Any]:
+    """Return a JSON document of this version, with or without a version number.
+
+    Args:
+        path: The file.
+        needed: Kinds of the entries that it must have, by name.
+
+    Raises:
+        ArtifactError: It is damaged, of another version, or lacks an entry.
+    """
     try:
-        read_in: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        read_in: dict[str, Any] = read_json(path)
     except (OSError, ValueError) as error:
         raise ArtifactError(path, "cannot be read as JSON; copy it again") from error
     if not isinstance(read_in, dict) or read_in.get("schema_version", VERSION) != VERSION:
         raise ArtifactError(path, f"is of another version; this gsl reads {VERSION}")
+    for name, kind in needed.items():
+        if not isinstance(read_in.get(name), kind):
+            raise ArtifactError(path, f"has no {name}, or what is none; copy it again")
     return read_in

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -59,6 +60,10 @@ class ArrayTable:
 
     def _read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         declared = [self.arrays.shapes[name] for name in names]
-        sizes = [float(np.prod(shape, dtype=float)) * kind.itemsize for shape, kind in declared]
+        sizes = [math.prod(map(_float, shape)) * kind.itemsize for shape, kind in declared]
         check_need(self.path, 3.0 * sum(sizes), self.memory)
         return self.arrays.read(names)
+
+
+def _float(count: int) -> float:
+    return float(count) if count < 1e300 else math.inf

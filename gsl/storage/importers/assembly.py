@@ -21,6 +21,7 @@ from gsl.storage.signals.check import join_turns
 from gsl.storage.signals.glitches import find_glitches, mend
 
 ARRAYS = (*COMMANDS, "position", "velocity")
+MOST_ROWS, FINER = 100_000, 20  # rows that any resampling may make, and for each row of a larger log
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,10 @@ def _trajectory(raw: Raw, stamps: np.ndarray, mapping: LogMapping) -> Trajectory
     """Return the rows at `stamps`, or at even steps between the first and the last of them."""
     at = stamps
     if mapping.period is not None:
-        count = int((stamps[-1] - stamps[0]) / mapping.period + 1e-6)
+        count = int(min((stamps[-1] - stamps[0]) / mapping.period + 1e-6, 1e18))
+        if count > MOST_ROWS and count > FINER * len(stamps):
+            problem = f"would make {count:.3g} rows of {len(stamps):,}; a longer mapping.period makes fewer"
+            raise InputError(f"{raw.name}: resampled to {mapping.period:g} s {problem}")
         at = stamps[0] + mapping.period * np.arange(count + 1)
     if len(at) < 2:
         raise InputError(f"{raw.name}: lasts {np.ptp(stamps):.3g} s, not even one mapping.period")

@@ -60,7 +60,9 @@ class BagTable:
                         raise TrajectoryError(self.path, _explain_no_definition(connection.msgtype))
                 for connection, stamp, raw in bag.messages(connections=chosen):
                     yield stamp * NANOSECOND, bag.deserialize(raw, connection.msgtype)
-        except (anyreader.AnyReaderError, ValueError, KeyError, OSError) as error:
+        except InputError:
+            raise
+        except Exception as error:  # a damaged bag ends the reader in many ways
             raise TrajectoryError(self.path, f"cannot be read as a bag: {' '.join(str(error).split())}") from error
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,7 @@ from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.array_table import Shapes
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
+CHUNK = 256_000_000  # bytes of what is unpacked at once; common ones have one million
 MATLAB_HEADER = 512  # bytes before the magic in a mat file of version 7.3
 
 
@@ -58,10 +60,11 @@ class Hdf5Arrays:
         """Return arrays by path."""
         with _opened(self.path) as file:
             root = _at(file, self.group)
-            try:
-                values = {name: np.asarray(root[name][()]) for name in names}
-            except (OSError, KeyError, ValueError) as error:
-                raise TrajectoryError(self.path, "is truncated or damaged; copy it again") from error
+            for name in names:
+                if math.prod(root[name].chunks or ()) * root[name].dtype.itemsize > CHUNK:
+                    problem = f"is stored in chunks of more than {CHUNK / 1e6:g} MB; store it in smaller ones"
+                    raise TrajectoryError(self.path, problem, column=name)
+            values = {name: np.asarray(root[name][()]) for name in names}
         return {name: one.T.reshape(_turn(one.shape)) if self.turned else one for name, one in values.items()}
 
 
@@ -80,8 +83,13 @@ def _opened(path: Path) -> Iterator[Any]:
         file = h5py.File(path, "r")
     except OSError as error:
         raise TrajectoryError(path, "is no HDF5 file, or truncated or damaged; copy it again") from error
-    with file:
-        yield file
+    try:
+        with file:
+            yield file
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file ends the library in many ways
+        raise TrajectoryError(path, "is truncated or damaged; copy it again") from error
 
 
 def _names(file: Any, group: str) -> list[str]:

@@ -116,6 +116,11 @@ class Mapping:
         for name in ("action", "position"):
             if name not in self.signals:
                 raise ConfigError(f"signals.{name}", "has no value; say in which column it is")
+        for pattern in self.files.values() if isinstance(self.files, dict) else filter(None, [self.files]):
+            if not pattern or pattern.startswith("/") or ".." in pattern.split("/"):
+                raise ConfigError("files", "must be names or patterns of files below the source", given=pattern or "''")
+        if self.files == {}:
+            raise ConfigError("files", "names no file of an episode; leave it out, or say which there are")
         for label, known in self.conditions.items():
             if label not in self.about:
                 given = ", ".join(self.about) or "nothing"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,17 +12,23 @@ import numpy as np
 from gsl.core.budget import DEPTH, within
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.array_table import Shapes
+from gsl.storage.importers.sizes import check_need
+
+NUMBER = 8.0  # bytes of one, the most
 
 
 class MatlabArrays:
     """The arrays of a mat file; a row of numbers is taken for a column."""
 
     def __init__(self, path: Path, memory: float) -> None:
-        from scipy.io import loadmat
+        from scipy.io import loadmat, whosmat
 
         self.path = path
         try:
             with within(f"{path}: reading it", growth=memory):
+                check_need(
+                    path, 3.0 * sum(NUMBER * math.prod(map(float, shape)) for _, shape, _ in whosmat(path)), memory
+                )
                 saved = loadmat(path, simplify_cells=True)
         except InputError:
             raise

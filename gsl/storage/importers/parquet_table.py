@@ -16,6 +16,8 @@ from gsl.storage.parquet import count_bytes
 if TYPE_CHECKING:
     import pyarrow as pa
 
+OBJECTS = 12.0  # bytes of memory for one of texts or lists, which become objects of Python
+
 
 class ParquetTable:
     """A parquet file."""
@@ -34,7 +36,11 @@ class ParquetTable:
 
         try:
             with pq.ParquetFile(self.path) as file:
-                check_need(self.path, 2.0 * count_bytes(file.metadata, wanted), self.memory)
+                simple = [field.name for field in file.schema_arrow if pa.types.is_primitive(field.type)]
+                simple = [name for name in simple if name in wanted]
+                nested = [name for name in wanted if name not in simple]
+                need = 2.0 * count_bytes(file.metadata, simple) + OBJECTS * count_bytes(file.metadata, nested)
+                check_need(self.path, need, self.memory)
                 table = file.read(columns=list(wanted))
         except (pa.ArrowException, OSError) as error:
             raise TrajectoryError(self.path, "is truncated or damaged; copy it again") from error

@@ -38,7 +38,9 @@ class Place(NamedTuple):
 
 def locate(source: str) -> str:
     """Return a source as it is, or below the folder of gsl's repository if it is only there."""
-    if not glob.glob(source) and not Path(source).exists() and not os.path.isabs(source) and (HOME / source).exists():
+    with within(f"{source[:80]}: looking for logs in it"):
+        there = bool(glob.glob(source)) or Path(source).exists()
+    if not there and not os.path.isabs(source) and (HOME / source).exists():
         return os.path.relpath(HOME / source)
     return source
 
@@ -57,6 +59,8 @@ def places(source: str, files: str | Mapping[str, str] | None, records: str = ""
     try:
         with within(f"{source}: looking for logs in it"):
             return _places(source, files, records)
+    except (ValueError, NotImplementedError, re.error) as error:
+        raise ConfigError("mapping.files", f"is no pattern of files: {error}", given=str(files)[:80]) from error
     except OSError as error:
         problem = f"cannot be looked into: {error.strerror} ({error.filename})"
         raise InputError(f"source = {source}: {problem}; name the folder of the logs") from error

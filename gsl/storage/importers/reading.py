@@ -20,6 +20,7 @@ from gsl.storage.importers.table import Table, missing_column
 from gsl.storage.trajectory_contract import UNITS
 
 FILE = "file"
+MOST_EPISODES = 10_000  # in one file
 
 
 class Series(NamedTuple):
@@ -164,13 +165,17 @@ def _groups(
     if mapping.episode == FILE:
         yield None, {role: np.arange(len(next(iter(columns.values())))) for role, columns in values.items()}
         return
-    keys = {role: columns[mapping.episode] for role, columns in values.items()}
-    first = next(iter(keys.values()))
-    for key in dict.fromkeys(first.tolist()):
-        rows = {role: np.flatnonzero(column == key) for role, column in keys.items()}
-        if empty := [role for role, own in rows.items() if not len(own)]:
+    apart: dict[str, dict[Any, list[int]]] = {role: {} for role in values}
+    for role, columns in values.items():
+        for row, key in enumerate(columns[mapping.episode].tolist()):
+            apart[role].setdefault(key if np.ndim(key) == 0 else str(key), []).append(row)
+        if (count := len(apart[role])) > MOST_EPISODES:
+            problem = f"tells {count:,} episodes apart, {MOST_EPISODES:,} at most; is it the column of mapping.episode?"
+            raise TrajectoryError(tables[role].path, problem, column=mapping.episode)
+    for key in next(iter(apart.values())):
+        if empty := [role for role, own in apart.items() if key not in own]:
             raise TrajectoryError(tables[empty[0]].path, f"lacks the episode {key}", column=mapping.episode)
-        yield key, rows
+        yield key, {role: np.array(own[key]) for role, own in apart.items()}
 
 
 class _Reading(NamedTuple):

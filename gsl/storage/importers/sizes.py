@@ -15,6 +15,8 @@ from gsl.errors import TrajectoryError
 GB = 1e9
 LONGEST_LINE = 4_000_000
 """Bytes; a text file without line ends would fill the memory."""
+FEW, PACKED = 2e8, 100.0
+"""Bytes that come out of any packed file, and for one of a larger file: text of logs packs by 10."""
 PICKLE = b"\x80"
 
 
@@ -38,8 +40,10 @@ def open_log(path: Path, *, most: float, lines: bool = False) -> Iterator[IO[byt
         TrajectoryError: It is empty, damaged, a pickle, or holds more.
     """
     try:
+        packed = path.name.endswith(".gz")
+        most = min(most, max(FEW, PACKED * path.stat().st_size)) if packed else most
         with path.open("rb") as raw:
-            source = gzip.GzipFile(fileobj=raw) if path.name.endswith(".gz") else raw
+            source = gzip.GzipFile(fileobj=raw) if packed else raw
             reader = io.BufferedReader(_Counted(path, source, most, lines))
             start = reader.peek(1)[:1]
             if not start:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import warnings
+import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,7 @@ class TensorArrays:
         import torch
 
         self.path = path
-        check_need(path, 2.0 * path.stat().st_size, memory)
+        check_need(path, 2.0 * _measure(path), memory)
         try:
             with within(f"{path}: reading it", growth=memory), warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)  # of pickles of another protocol, which are refused
@@ -39,7 +40,7 @@ class TensorArrays:
         dense = {
             name: one
             for name, one in leaves.items()
-            if isinstance(one, torch.Tensor) and one.layout == torch.strided and not one.is_quantized
+            if isinstance(one, torch.Tensor) and one.layout == torch.strided and not (one.is_quantized or one.is_meta)
         }
         self.tensors = {name: one.detach() for name, one in dense.items()}
         self.shapes: Shapes = {
@@ -53,7 +54,20 @@ class TensorArrays:
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return tensors by name."""
-        return {name: np.array(self.tensors[name].numpy()) for name in names}
+        try:
+            return {name: np.array(self.tensors[name].numpy()) for name in names}
+        except (RuntimeError, TypeError) as error:
+            raise TrajectoryError(self.path, f"holds no plain tensors: {str(error).splitlines()[0]}") from error
+
+
+def _measure(path: Path) -> float:
+    """Return the bytes of a file, or what it unpacks to if it is an archive."""
+    size = float(path.stat().st_size)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return max(size, float(sum(entry.file_size for entry in archive.infolist())))
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        return size  # an older file, or damaged, which torch will tell
 
 
 def _plain() -> set[Any]:

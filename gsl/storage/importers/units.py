@@ -25,7 +25,7 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
 }
 """SI unit of the contract -> unit of a log -> factor."""
 
-_TICKS = re.compile(r"ticks/(\d+)(/s)?")
+_TICKS = re.compile(r"ticks/(\d{1,18})(/s)?")
 _SPELLINGS = {
     **dict.fromkeys(("degrees", "degree", "deg.", "°"), "deg"),
     **dict.fromkeys(("°/s", "dps"), "deg/s"),

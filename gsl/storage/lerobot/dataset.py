@@ -20,6 +20,7 @@ STATE, ACTION = "observation.state", "action"
 VERSIONS = ("v2.0", "v2.1", "v3.")
 BY_EPISODE = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"  # of version 2
 BY_FILE = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"  # of version 3
+MOST = 10**9  # of a number that an episode, a chunk or a file has, or of its frames
 
 
 class Entry(NamedTuple):
@@ -101,6 +102,8 @@ def open_data_set(folder: Path, memory: float) -> DataSet:
     robot = str(info.get("robot_type") or "unknown")
     known = {"robot_type": robot, "fps": fps, "data_set": folder.resolve().name}
     chunk = info.get("chunks_size", 1000)
+    if type(chunk) is not int or not 0 < chunk < MOST:
+        raise TrajectoryError(folder / INFO, f"chunks_size is {chunk!s:.20}, no number of episodes")
     told = list(_read_episodes(folder, version, memory))
     if not told:
         raise TrajectoryError(folder, "has no episode; was the recording finished (dataset.finalize())?")
@@ -110,7 +113,7 @@ def open_data_set(folder: Path, memory: float) -> DataSet:
         if version.startswith("v3"):
             place = BY_FILE.format(chunk_index=one["data/chunk_index"], file_index=one["data/file_index"])
         else:
-            place = BY_EPISODE.format(episode_chunk=index // max(int(chunk), 1), episode_index=index)
+            place = BY_EPISODE.format(episode_chunk=index // chunk, episode_index=index)
         tasks = one.get("tasks")
         task = {"task": "; ".join(map(str, tasks))} if isinstance(tasks, list) and tasks else {}
         found.append(Entry(index, one["length"], folder / place, {**known, "episode_index": index, **task}, names))
@@ -168,10 +171,10 @@ def _read_episodes(folder: Path, version: str, memory: float) -> Iterator[dict[s
     for path in _episode_files(folder, version):
         try:
             rows = _read_table(path, [*due, "tasks"], memory) if version.startswith("v3") else _read_lines(path, memory)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, NotImplementedError) as error:
             raise TrajectoryError(path, f"cannot be read: {error}; copy the data set again") from error
         for row, one in enumerate(rows):
-            whole = isinstance(one, dict) and all(type(one.get(key)) is int and one[key] >= 0 for key in due)
+            whole = isinstance(one, dict) and all(type(one.get(key)) is int and 0 <= one[key] < MOST for key in due)
             if not whole:
                 raise TrajectoryError(path, f"has no whole number for each of {', '.join(due)}", row=row)
             yield one

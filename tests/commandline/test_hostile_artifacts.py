@@ -1,0 +1,190 @@
+"""Artifacts, logs and settings of strangers whose hashes are right: nothing in them is believed without a look."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from commands import ENVIRONMENT, done, gsl
+
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.errors import ArtifactError
+from gsl.storage import manifest
+from gsl.storage.hashing import file_hash
+from gsl.storage.manifest import HASH, hash_entries
+from gsl.storage.trajectories import write
+
+pytestmark = pytest.mark.slow
+
+LOG = "time,action.a,position.a\n" + "".join(f"{0.01 * k:.2f},{0.1 * k},{0.1 * k}\n" for k in range(50))
+NO_TEXT = os.fsdecode(b"a\xff")
+MARK = "from pathlib import Path\nPath('ran').write_text('yes')\n\n\ndef arm():\n    pass\n"
+
+
+@pytest.fixture
+def artifact(tmp_path: Path) -> Path:
+    """An imported log as runs/a/import, in a folder with a module that leaves a mark when it is imported."""
+    (tmp_path / "log.csv").write_text(LOG)
+    (tmp_path / "evil.py").write_text(MARK)
+    done("import", "source=log.csv", "mapping=plain", "name=a", folder=tmp_path)
+    return tmp_path / "runs/a/import"
+
+
+def seal(artifact: Path, **entries: Any) -> None:
+    """Write a manifest as a stranger would: all hashes are right."""
+    stored = json.loads((artifact / manifest.NAME).read_text())
+    files = {
+        name: {"sha256": file_hash(artifact / name), "bytes": (artifact / name).stat().st_size}
+        for name in stored["files"]
+    }
+    stored = {key: value for key, value in stored.items() if key != HASH} | {"files": files} | entries
+    (artifact / manifest.NAME).write_text(json.dumps({**stored, HASH: hash_entries(stored)}))
+
+
+def test_a_film_of_a_log_imports_no_robot_that_only_the_log_names(artifact: Path, tmp_path: Path) -> None:
+    moments = np.arange(20) * 0.01
+    still = np.zeros((20, 1))
+    episode = Trajectory(time=moments, action=still[1:], position=still, velocity=still)
+    write(artifact / "trajectories.parquet", Batch((episode,), ("a",), 0.01, {"robot": "evil.arm", "role": "real"}))
+    seal(artifact)
+    said = gsl("render", "a", "out=film.gif", folder=tmp_path)
+    assert (said.code, "say trust=evil if" in said.err) == (2, True), said
+    assert not (tmp_path / "ran").exists()
+
+
+SAID = {"force": "true", "out": "../elsewhere", "executor": "dask", "address": "tcp://127.0.0.1:1"}
+
+
+@pytest.mark.parametrize("key", SAID)
+def test_a_file_neither_replaces_artifacts_nor_writes_or_sends_elsewhere(key: str, tmp_path: Path) -> None:
+    place = tmp_path / "theirs/experiment/theirs.yaml"
+    place.parent.mkdir(parents=True)
+    place.write_text(f"# @package _global_\n{key}: {SAID[key]}\n")
+    said = gsl("collect", "--config-dir=theirs", "experiment=theirs", "--cfg", "job", folder=tmp_path)
+    assert (said.code, f"type {key}=..." in said.err) == (2, True), said
+    typed = {"address": ("executor=dask", f"{key}={SAID[key]}")}.get(key, (f"{key}={SAID[key]}",))
+    done("collect", *typed, "--cfg", "job", folder=tmp_path)
+
+
+def test_a_file_does_not_refer_to_another_place_either(tmp_path: Path) -> None:
+    place = tmp_path / "theirs/experiment/theirs.yaml"
+    place.parent.mkdir(parents=True)
+    place.write_text("# @package _global_\nout: ${task.elsewhere}\ntask: {elsewhere: /tmp}\n")
+    said = gsl("collect", "--config-dir=theirs", "experiment=theirs", "--cfg", "job", folder=tmp_path)
+    assert said.code == 2, said
+
+
+ENTRIES: dict[str, Any] = {
+    "kind": {"a": 1}, "key": [], "command": 5, "created": None, "duration": 10**290, "versions": [], "seeds": 3,
+    "git": "x", "unit": [1], "sources": {}, "trust": [1], "parents": [{"role": 1, "path": "x", "hash": "y"}],
+    "links": [{"role": "x", "path": "a\0b", "hash": "y"}],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_a_manifest_whose_entries_are_of_another_kind_is_damaged(name: str, artifact: Path, tmp_path: Path) -> None:
+    seal(artifact, **{name: ENTRIES[name]})
+    with pytest.raises(ArtifactError, match="is damaged"):
+        manifest.read(artifact)
+    assert gsl("runs", folder=tmp_path).code == 0
+
+
+def test_metrics_that_no_number_fits_do_not_stop_the_list(artifact: Path, tmp_path: Path) -> None:
+    (artifact / "metrics.json").write_text(f'{{"seconds": {"9" * 400}, "episodes": {"9" * 299}}}')
+    seal(artifact)
+    for words in (("runs",), ("runs", "metric=seconds"), ("show", "a")):
+        assert "internal error" not in gsl(*words, folder=tmp_path).err
+
+
+def test_a_parent_of_terabytes_is_not_hashed(artifact: Path, tmp_path: Path) -> None:
+    with (tmp_path / "sparse").open("wb") as file:
+        file.truncate(2**40)
+    seal(artifact, parents=[{"role": "source", "path": "../../../sparse", "hash": "0" * 64}])
+    for words in (("verify", "a"), ("lineage", "a"), ("show", "a"), ("rerun", "a")):
+        said = gsl(*words, folder=tmp_path)
+        assert "internal error" not in said.err and said.code in (0, 1, 2)
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a device", "gigabytes", "deep"])
+def test_a_manifest_that_cannot_be_read_does_not_stop_the_list(kind: str, artifact: Path, tmp_path: Path) -> None:
+    done("import", "source=log.csv", "mapping=plain", "name=b", folder=tmp_path)
+    path = artifact / manifest.NAME
+    path.unlink()
+    match kind:
+        case "a pipe":
+            os.mkfifo(path)
+        case "a device":
+            path.symlink_to("/dev/zero")
+        case "gigabytes":
+            with path.open("wb") as file:
+                file.truncate(2**40)
+        case _:
+            path.write_text("[" * 10_000)
+    assert "runs/b" in gsl("runs", "--json", folder=tmp_path).out
+    assert gsl("verify", folder=tmp_path).code == 1
+    assert gsl("show", "a", folder=tmp_path).code == 2
+
+
+def test_cleaning_removes_no_file_of_another_artifact(artifact: Path, tmp_path: Path) -> None:
+    done("import", "source=log.csv", "mapping=plain", "name=b", folder=tmp_path)
+    log = artifact / "trajectories.parquet"
+    theirs = tmp_path / "runs/b/import"
+    (theirs / "beside").symlink_to(artifact)
+    stored = json.loads((theirs / manifest.NAME).read_text())
+    parents = [{"role": "source", "path": "../gone", "hash": "0" * 64}]
+    seal(theirs, parents=parents)
+    files = {**stored["files"], "beside/trajectories.parquet": {"sha256": file_hash(log), "bytes": log.stat().st_size}}
+    seal(theirs, parents=parents, files=files)
+    done("clean", "orphaned=true", "--yes", "name=b", folder=tmp_path)
+    assert log.exists() and not (theirs / "trajectories.parquet").exists()
+
+
+STREAMS = {
+    "stdout is closed": ">&-", "stderr is closed": "2>&-", "stdin is closed": "<&-", "the disk is full": "> /dev/full",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("how", STREAMS)
+def test_a_stream_that_is_gone_is_no_traceback(how: str, tmp_path: Path) -> None:
+    said = _in_shell(f'"$0" -m gsl runs {STREAMS[how]}', tmp_path)
+    assert "Traceback" not in said.stderr and "internal error" not in said.stderr, said
+    assert "Exception ignored" not in said.stderr
+    assert said.returncode == (1 if "full" in how else 0)
+
+
+def test_a_folder_that_is_gone_is_one_line(tmp_path: Path) -> None:
+    said = _in_shell('mkdir x && cd x && rmdir ../x && "$0" -m gsl runs', tmp_path)
+    assert (said.returncode, said.stderr.count("\n")) == (2, 1), said
+    assert "the current folder is gone" in said.stderr
+
+
+def test_what_a_terminal_cannot_show_is_spelled_out(tmp_path: Path) -> None:
+    said = _in_shell('PYTHONIOENCODING=ascii "$0" -m gsl show π0', tmp_path)
+    assert said.returncode == 2 and "\\u03c00" in said.stderr, said
+
+
+def _in_shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    environment = {**ENVIRONMENT, "PYTHONPATH": str(Path(__file__).parents[2])}
+    words = ["sh", "-c", line, sys.executable]
+    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_a_word_that_is_no_text_is_one_line(tmp_path: Path) -> None:
+    assert "is no text in UTF-8" in gsl("collect", f"name={NO_TEXT}", folder=tmp_path).err
+
+
+def test_a_name_with_line_ends_makes_no_second_line(tmp_path: Path) -> None:
+    said = gsl("show", "a\nwarning: all is well\u202e\u061c", folder=tmp_path)
+    assert len(said.lines) == 1 and "\u202e" not in said.err and "\u061c" not in said.err
+
+
+@pytest.mark.parametrize("word", ["name=.multirun", "name=a/.collect_real.tmp-1", "out=runs/x/.collect_real.partial"])
+def test_an_artifact_does_not_hide_among_what_is_cleaned_away(word: str, artifact: Path, tmp_path: Path) -> None:
+    said = gsl("import", "source=log.csv", "mapping=plain", word, folder=tmp_path)
+    assert said.code == 2 and ("hidden" in said.err), said
