@@ -33,7 +33,8 @@ def compile_kernel(function: F) -> F:
         dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:  # no home, or none that can be written
         dispatcher = numba.njit(nogil=True, error_model="numpy")(function)
-    if hasattr(kept := getattr(dispatcher, "_cache", None), "_impl"):  # not with NUMBA_DISABLE_JIT, or without a folder
+    kept: Any = getattr(dispatcher, "_cache", None)
+    if hasattr(kept, "_impl"):  # not with NUMBA_DISABLE_JIT, or without a folder
         place = kept._impl
         kept._cache_file = _CheckedFiles(kept.cache_path, place.filename_base, place.locator.get_source_stamp())
     return dispatcher  # type: ignore[return-value]
