@@ -17,7 +17,7 @@ from omegaconf.errors import OmegaConfBaseException
 from omegaconf.grammar.gen.OmegaConfGrammarParser import OmegaConfGrammarParser
 from omegaconf.grammar_parser import parse
 
-from gsl.core.budget import read_text
+from gsl.core.budget import SETTINGS, read_text
 from gsl.core.trust import TRUST
 from gsl.core.yaml_tree import yaml_tree
 from gsl.errors import InputError
@@ -57,7 +57,7 @@ class BudgetedFiles(FileConfigSource):
 def check_file(path: Path, name: str) -> None:
     """Refuse a file that is too large, or that sets what only the user can set."""
     text = read_text(path)
-    tree = yaml_tree(path, text)
+    tree = yaml_tree(path, text, SETTINGS)
     if not isinstance(tree, dict | None):
         raise InputError(f"{path}: holds no settings by name")
     settings = tree or {}

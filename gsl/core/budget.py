@@ -32,6 +32,8 @@ DEPTH = 64
 """Of what is nested; the deepest of ours has 12 levels."""
 ENTRIES = 100_000
 """Of a yaml file with its aliases written out."""
+SETTINGS = 20_000
+"""Entries of a yaml file that is put together with others, which takes a millisecond each."""
 COLUMNS = 10_000
 """Of a log; a humanoid with all its sensors has some hundred."""
 HEADER_BYTES = 10_000

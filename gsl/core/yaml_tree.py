@@ -11,8 +11,13 @@ from gsl.core.budget import DEPTH, ENTRIES, within
 from gsl.errors import InputError
 
 
-def yaml_tree(path: Path, text: str) -> Any:
+def yaml_tree(path: Path, text: str, most: int = ENTRIES) -> Any:
     """Return what a yaml text says as plain data, once it is known to be small with its aliases written out.
+
+    Args:
+        path: For errors.
+        text: Of the file.
+        most: Entries that it may hold.
 
     Raises:
         InputError: It is no YAML, nested too deeply, or too large.
@@ -21,7 +26,7 @@ def yaml_tree(path: Path, text: str) -> Any:
         with within(f"{path}: reading it"):
             node = yaml.compose(text, Loader=yaml.SafeLoader)
             if node is not None:
-                _check_size(path, node)
+                _check_size(path, node, most)
             return yaml.safe_load(text)
     except RecursionError as error:
         raise InputError(f"{path}: is nested too deeply; {DEPTH} levels are read") from error
@@ -30,7 +35,7 @@ def yaml_tree(path: Path, text: str) -> Any:
         raise InputError(f"{path}: is not YAML, or damaged: {told}") from error
 
 
-def _check_size(path: Path, root: Any) -> None:
+def _check_size(path: Path, root: Any, most: int) -> None:
     """Count entries and levels of a tree of yaml nodes, in which an alias is the same node again."""
     known: dict[int, tuple[int, int]] = {}
     open_nodes: set[int] = set()
@@ -51,8 +56,8 @@ def _check_size(path: Path, root: Any) -> None:
     count, depth = size(root)
     if depth > DEPTH:
         raise InputError(f"{path}: is nested {depth} levels deep; {DEPTH} are read")
-    if count > ENTRIES:
-        raise InputError(f"{path}: holds {count:,} entries, aliases written out; {ENTRIES:,} are read")
+    if count > most:
+        raise InputError(f"{path}: holds {count:,} entries, aliases written out; {most:,} are read")
 
 
 def _nodes(part: Any) -> tuple[Any, ...]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import ENVIRONMENT, done, gsl
+from commands import ENVIRONMENT, done, gsl, refused
 
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ArtifactError
@@ -70,6 +70,14 @@ def test_a_file_neither_replaces_artifacts_nor_writes_or_sends_elsewhere(key: st
     assert (said.code, f"type {key}=..." in said.err) == (2, True), said
     typed = {"address": ("executor=dask", f"{key}={SAID[key]}")}.get(key, (f"{key}={SAID[key]}",))
     done("collect", *typed, "--cfg", "job", folder=tmp_path)
+
+
+def test_a_file_of_very_many_settings_is_refused(tmp_path: Path) -> None:
+    place = tmp_path / "theirs/experiment/theirs.yaml"
+    place.parent.mkdir(parents=True)
+    place.write_text("# @package _global_\n" + "".join(f"a{k}: {k}\n" for k in range(11_000)))
+    said = refused("collect", "--config-dir=theirs", "experiment=theirs", folder=tmp_path)
+    assert "holds 22,001 entries" in said
 
 
 def test_a_file_does_not_refer_to_another_place_either(tmp_path: Path) -> None:
