@@ -27,6 +27,7 @@ from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of
 from gsl.commandline.own_word import check_own_word, find_own_modules, find_trust
 from gsl.commandline.plugins import folders, packages
 from gsl.commandline.yaml_files import USER, BudgetedFiles, load_plugins
+from gsl.core.budget import within
 from gsl.core.setting import Setting
 from gsl.core.trust import TARGET, check_code, is_ours
 from gsl.core.validation import did_you_mean
@@ -249,7 +250,8 @@ def _compose(command: str, overrides: Sequence[str], trust: Sequence[str]) -> Di
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None
     name, how = file_of(command), {"from_shell": False, "with_log_configuration": False}
-    config = hydra.compose_config(config_name=name, overrides=list(overrides), run_mode=RunMode.RUN, **how)
+    with within("putting the settings together"):  # files may name each other again and again
+        config = hydra.compose_config(config_name=name, overrides=list(overrides), run_mode=RunMode.RUN, **how)
     check_code(plain(_without_hydra(config)), trust, references=True)
     return config
 

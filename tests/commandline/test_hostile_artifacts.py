@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,19 @@ def test_a_file_of_very_many_settings_is_refused(tmp_path: Path) -> None:
     place.write_text("# @package _global_\n" + "".join(f"a{k}: {k}\n" for k in range(11_000)))
     said = refused("collect", "--config-dir=theirs", "experiment=theirs", folder=tmp_path)
     assert "holds 22,001 entries" in said
+
+
+@pytest.mark.parametrize("names", [["theirs"], ["e{}@a", "e{}@b"]], ids=["itself", "twice the next"])
+def test_files_that_name_each_other_without_end_are_given_up(names: list[str], tmp_path: Path) -> None:
+    place = tmp_path / "theirs/experiment"
+    place.mkdir(parents=True)
+    for k in range(40):
+        words = ", ".join(name.format(k + 1) for name in names)
+        (place / ("theirs.yaml" if k == 0 else f"e{k}.yaml")).write_text(f"defaults: [{words}]\n")
+    begin = time.process_time()
+    said = gsl("collect", "--config-dir=theirs", "experiment=theirs", "--cfg", "job", folder=tmp_path)
+    assert (said.code, len(said.lines)) == (2, 1), said
+    assert time.process_time() - begin < 30.0
 
 
 def test_a_file_does_not_refer_to_another_place_either(tmp_path: Path) -> None:
