@@ -22,6 +22,8 @@ TEXT_BYTES = 1_000_000
 """Of a yaml file; the largest of ours has 20,000."""
 DOCUMENT_BYTES = 200_000_000
 """Of a JSON document in an artifact."""
+MANIFEST_BYTES = 20_000_000
+"""Of a manifest, which names each file in a hundred."""
 ARTIFACT_BYTES = 16_000_000_000
 """Of one file in an artifact: what a trajectory file may take in memory (gsl/storage/parquet.py)."""
 NETWORK_BYTES = 2_000_000_000
@@ -97,15 +99,15 @@ def _whole(digits: str) -> int:
     return int(digits)
 
 
-def read_json(path: Path) -> Any:
-    """Return what a document of an artifact says.
+def read_json(path: Path, most: float = DOCUMENT_BYTES) -> Any:
+    """Return what a document of an artifact says; `most` is how many bytes it may have.
 
     Raises:
         OSError: There is no such file, or it cannot be read.
         ValueError: It is no JSON, or damaged.
         InputError: It is no plain file, or too large.
     """
-    check_file(path, DOCUMENT_BYTES)
+    check_file(path, most)
     return parse_json(path.read_text(encoding="utf-8"))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gsl.core.budget import ARTIFACT_BYTES, read_json
+from gsl.core.budget import ARTIFACT_BYTES, MANIFEST_BYTES, read_json
 from gsl.errors import ArtifactError, InputError
 from gsl.storage import documents
 from gsl.storage.hashing import contents_hash, file_hash
@@ -148,7 +148,7 @@ def read(folder: Path) -> Manifest:
     if not folder.exists():
         raise ArtifactError(folder, "does not exist")
     try:
-        stored = read_json(folder / NAME)
+        stored = read_json(folder / NAME, MANIFEST_BYTES)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise ArtifactError(folder, f"is no complete artifact: it holds no {NAME}") from error
     except OSError as error:
