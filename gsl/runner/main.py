@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 import signal
-import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from gsl.core.visible import visible
 from gsl.errors import GslError
 from gsl.runner import bounds, journal
 from gsl.runner.clock import Simulated, Wall
@@ -20,6 +18,7 @@ from gsl.runner.episode import Lies, Played, Player
 from gsl.runner.preflight import alone, check_writable, mend
 from gsl.runner.request import due, read_request
 from gsl.runner.robots import PerfectRobot, robot_of
+from gsl.runner.saying import say
 from gsl.runner.senses import RobotError
 from gsl.runner.watch import SIGNALS, Hangs, is_stuck
 
@@ -64,13 +63,6 @@ def _run(folder: Path, asked: argparse.Namespace) -> int:
     except KeyboardInterrupt as error:
         say("; ".join(["runner.py: interrupted", *map(str, error.args), "what was complete is kept"]))
         return 130
-
-
-def say(text: str) -> None:
-    """Tell a person something."""
-    with suppress(OSError):  # a terminal that is gone must not keep the robot from being brought back
-        sys.stdout.write(visible(text) + "\n")
-        sys.stdout.flush()
 
 
 def dry_run(request: Mapping[str, Any]) -> int:
@@ -274,7 +266,7 @@ class Sitting:
 def _typed(question: str) -> str:
     try:
         return input(question).strip().lower()
-    except (EOFError, OSError) as error:
+    except (EOFError, OSError, RuntimeError, ValueError) as error:  # stdin is closed, or no text comes from it
         raise NobodyToAsk("there is nobody to ask; --yes asks nothing") from error
 
 

@@ -210,3 +210,12 @@ def test_a_name_with_line_ends_makes_no_second_line(tmp_path: Path) -> None:
 def test_an_artifact_does_not_hide_among_what_is_cleaned_away(word: str, artifact: Path, tmp_path: Path) -> None:
     said = gsl("import", "source=log.csv", "mapping=plain", word, folder=tmp_path)
     assert said.code == 2 and ("hidden" in said.err), said
+
+
+SAYING = "import sys\nfrom gsl.runner.saying import say\nsay('π0 walks')\nsay('and stands')\n"
+
+
+@pytest.mark.parametrize("how", [">&-", "> /dev/full", "| true", "> out"])
+def test_a_runner_whose_terminal_is_gone_goes_on(how: str, tmp_path: Path) -> None:
+    said = _in_shell(f"sleep 0.1; PYTHONIOENCODING=ascii \"$0\" -c \"{SAYING}\" {how}; echo $? >&2", tmp_path)
+    assert said.stderr == "0\n"
