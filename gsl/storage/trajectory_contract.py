@@ -59,11 +59,17 @@ def _is_count(value: Any) -> bool:
     return isinstance(value, int) and _is_number(value, COLUMNS) and value >= 0
 
 
+def _is_label(value: Any) -> bool:
+    if not isinstance(value, dict):
+        return False
+    return isinstance(value.get("policy"), str | None) and isinstance(value.get("conditions"), dict | None)
+
+
 _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "robot": (lambda value: isinstance(value, str), "a name"),
     "episodes": (
-        lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value),
-        "a list of mappings, one an episode",
+        lambda value: isinstance(value, list) and all(map(_is_label, value)),
+        "a list of mappings, one an episode, with a name as `policy` and effects as `conditions`",
     ),
     "action_noise": (lambda value: _is_number(value, 1e6), "a number"),
     "pi0_falls": (lambda value: _is_number(value, 1.0), "a share"),

@@ -217,5 +217,5 @@ SAYING = "import sys\nfrom gsl.runner.saying import say\nsay('π0 walks')\nsay('
 
 @pytest.mark.parametrize("how", [">&-", "> /dev/full", "| true", "> out"])
 def test_a_runner_whose_terminal_is_gone_goes_on(how: str, tmp_path: Path) -> None:
-    said = _in_shell(f"sleep 0.1; PYTHONIOENCODING=ascii \"$0\" -c \"{SAYING}\" {how}; echo $? >&2", tmp_path)
+    said = _in_shell(f'sleep 0.1; PYTHONIOENCODING=ascii "$0" -c "{SAYING}" {how}; echo $? >&2', tmp_path)
     assert said.stderr == "0\n"

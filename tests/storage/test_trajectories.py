@@ -195,6 +195,42 @@ def test_a_file_that_breaks_the_contract_is_refused_in_one_line(
     assert caught.value.row == row
 
 
+STRANGE = {
+    "episodes": [5, "x", [1], [{"policy": []}], [{"conditions": [1]}]],
+    "control_period": [int("9" * 290), 1e300, "x", [], True],
+    "states": [10**9, -1, 1.5], "action_noise": ["x", []], "cells": ["x", 10**6], "robot": [{}, 5],
+    "pi0_falls": [2.0, {}],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("key, value", [(key, value) for key, values in STRANGE.items() for value in values])
+def test_metadata_of_another_kind_are_one_line(key: str, value: Any, path: Path) -> None:
+    table = pq.read_table(path)
+    metadata = json.loads(table.schema.metadata[b"gsl"]) | {key: value, "choices": 5}
+    pq.write_table(table.replace_schema_metadata({"gsl": json.dumps(metadata)}), path)
+    with pytest.raises(TrajectoryError, match=key) as error:
+        read(path)
+    assert len(str(error.value)) < 500
+
+
+def test_a_file_of_very_many_columns_and_one_that_packs_too_well_are_refused(tmp_path: Path) -> None:
+    column = pa.array(np.zeros(1))
+    pq.write_table(pa.table({f"c{k}": column for k in range(10_001)}), tmp_path / "wide.parquet")
+    with pytest.raises(TrajectoryError, match="has 10,001 columns"):
+        read(tmp_path / "wide.parquet")
+    dictionary = pa.DictionaryArray.from_arrays(pa.array(np.zeros(10_000_000, np.int8)), pa.array([0.0]))
+    pq.write_table(pa.table({f"c{k}": dictionary for k in range(5)}), tmp_path / "bomb.parquet", compression="zstd")
+    with pytest.raises(TrajectoryError, match="no log packs so well"):
+        read(tmp_path / "bomb.parquet")
+
+
+def test_a_number_that_nothing_measures_is_refused(tmp_path: Path, batch: Batch) -> None:
+    first = batch.episodes[0]
+    huge = dataclasses.replace(first, velocity=1e300 * np.ones_like(first.velocity))
+    with pytest.raises(TrajectoryError, match="which nothing measures"):
+        write(tmp_path / "huge.parquet", dataclasses.replace(batch, episodes=(huge,)))
+
+
 def test_a_joint_of_another_robot_is_refused_with_the_likely_one(path: Path) -> None:
     with pytest.raises(TrajectoryError, match=r"position.RKneePitch.*no such joint, did you mean RKneePitchs"):
         read(path, joints=("LKneePitch", "RKneePitchs"))
