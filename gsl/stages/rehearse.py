@@ -23,8 +23,9 @@ from gsl.real_robot.errand import REHEARSAL
 from gsl.runner import bridge
 from gsl.runner.journal import ANSWER, RETURNS, add_return, ends
 from gsl.runner.request import HELD, NAME, read_request
-from gsl.storage.requests import files_of
+from gsl.storage.requests import MODULES, files_of
 
+CACHE = "__pycache__"  # of a folder in which a runner was started; nothing in it is read
 _BODY = ("base.position", "base.orientation", "base.velocity")
 
 
@@ -91,10 +92,12 @@ class Surrogate:
             GslError: It ended with an error.
         """
         (to_us, from_runner), (to_runner, from_us) = os.pipe(), os.pipe()
-        words = [sys.executable, "-I", str((folder / "runner.py").resolve()), f"--robot={bridge.__file__}"]
+        compiled = f"pycache_prefix={log.with_name('.compiled').resolve()}"  # not what is compiled in its folder
+        runner = str((folder / "runner.py").resolve())
+        words = [sys.executable, "-I", "-B", "-X", compiled, runner, f"--robot={bridge.__file__}"]
         words += [f"--log={log.resolve()}", "--yes", "--unpaced", *(f"--episode={name}" for name in episodes)]
         words += [f"--trust={module}" for module in trust]
-        environment = {**os.environ, bridge.PIPES: f"{to_runner},{from_runner}", "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = {**os.environ, bridge.PIPES: f"{to_runner},{from_runner}"}
         with (
             tempfile.TemporaryFile() as said,  # a pipe that nobody empties would stop the runner
             subprocess.Popen(
@@ -152,8 +155,13 @@ class Surrogate:
 
 
 def _check_runner(folder: Path, request: Mapping[str, Any]) -> None:
-    """Refuse to run what gsl did not write."""
-    for name, content in files_of(request).items():
+    """Refuse to run what gsl did not write, and modules beside its own, which would stand in for a library."""
+    files = files_of(request)
+    for path in sorted((folder / MODULES).rglob("*")):
+        ours = path.is_dir() and not path.is_symlink() or path.relative_to(folder).as_posix() in files
+        if not ours and path.parent.name != CACHE:
+            raise ArtifactError(path, "is none of gsl's modules, and is not run here; take it away")
+    for name, content in files.items():
         path = folder / name
         if not path.is_file() or path.read_bytes() != content:
             raise ArtifactError(path, "is not what this gsl writes, and is not run here; make the request anew")

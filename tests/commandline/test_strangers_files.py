@@ -190,6 +190,38 @@ def test_a_request_calls_nothing(target: str, place: Path) -> None:
         assert "policy._target_" in one or "policy = " in one, one
 
 
+@pytest.mark.parametrize("name", ["argparse.py", "numpy/__init__.py", "json.pyc", "gsl/runner/evil.py", "link"])
+def test_a_module_beside_those_of_a_request_is_not_run(name: str, place: Path) -> None:
+    """It would stand in for one of Python's own."""
+    request(place / "asked", "gsl.policies.linear.Linear")
+    path = place / "asked/modules" / name
+    path.parent.mkdir(exist_ok=True)
+    path.symlink_to(place) if name == "link" else path.write_text(MARK)
+    said = refused("rehearse", "request=asked", folder=place)
+    assert "is none of gsl's modules" in said
+
+
+def test_compiled_code_beside_a_request_is_not_read(place: Path) -> None:
+    import py_compile
+
+    request(place / "asked", "gsl.policies.linear.Linear")
+    source = place / "asked/modules/gsl/runner/main.py"
+    whole = source.read_bytes()
+    about = source.stat()
+    source.write_text(MARK + "#" * (about.st_size - len(MARK)))
+    os.utime(source, ns=(about.st_mtime_ns, about.st_mtime_ns))
+    py_compile.compile(str(source))
+    source.write_bytes(whole)
+    os.utime(source, ns=(about.st_mtime_ns, about.st_mtime_ns))
+    assert gsl("rehearse", "request=asked", folder=place).code == 2  # no world is a robot of one joint
+    words = [sys.executable, "-I", "-c", "import sys; sys.path[0:0]=['asked/modules']; import gsl.runner.main"]
+    subprocess.run(words, cwd=place, env=ENVIRONMENT, capture_output=True, check=False)
+    assert (place / "ran").exists()  # Python would have read it
+    (place / "ran").unlink()
+    words[2:2] = ["-X", "pycache_prefix=none"]
+    subprocess.run(words, cwd=place, env=ENVIRONMENT, capture_output=True, check=True)
+
+
 BOMB = "a: &a [x, x]\n" + "".join(
     f"{b}: &{b} [*{a}, *{a}]\n" for a, b in zip("abcdefghijkl", "bcdefghijklm", strict=True)
 )
