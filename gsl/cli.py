@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from gsl.commandline.elsewhere import import_elsewhere
 from gsl.commandline.failure import INTERRUPTED, is_text, leave_quietly, report
 from gsl.commandline.plugins import Commands, is_group
 from gsl.commandline.run_commands import Reference, add_run_commands
@@ -186,6 +187,7 @@ def main() -> None:
     """Run the command line of this process."""
     listen()
     prepare_streams()
+    import_elsewhere()
     try:
         _leave_current_folder()
     except FileNotFoundError:

@@ -70,7 +70,9 @@ def look() -> Iterator[None]:
     """Apply our look to what is drawn inside, and to nothing else."""
     import matplotlib
 
-    with matplotlib.rc_context(_SETTINGS):
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # whatever a file of the user says, equal figures give equal bytes
+        matplotlib.rcParams.update(_SETTINGS)
         yield
 
 

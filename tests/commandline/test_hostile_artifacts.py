@@ -219,3 +219,32 @@ SAYING = "import sys\nfrom gsl.runner.saying import say\nsay('π0 walks')\nsay('
 def test_a_runner_whose_terminal_is_gone_goes_on(how: str, tmp_path: Path) -> None:
     said = _in_shell(f'sleep 0.1; PYTHONIOENCODING=ascii "$0" -c "{SAYING}" {how}; echo $? >&2', tmp_path)
     assert said.stderr == "0\n"
+
+
+PAGE = """
+import sys
+from pathlib import Path
+
+from gsl.commandline.elsewhere import import_elsewhere
+from gsl.report.style import figure, look, save
+
+if sys.argv[1] == "elsewhere":
+    import_elsewhere()
+with look():
+    drawn = figure(2.0, 3.0)
+    drawn.add_subplot().set_title("title")
+save(drawn, Path(sys.argv[2]))
+"""
+
+
+def test_a_file_of_the_current_folder_does_not_steer_figures(tmp_path: Path) -> None:
+    environment = {**ENVIRONMENT, "PYTHONPATH": str(Path(__file__).parents[2])}
+    pictures = []
+    for name, settings in {"plain": None, "theirs": b"text.usetex: True\nfont.size: 30\nba\x1b[2Jd: \xff\n"}.items():
+        if settings:
+            (tmp_path / "matplotlibrc").write_bytes(settings)
+        words = [sys.executable, "-c", PAGE, "elsewhere", f"{name}.png"]
+        said = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        assert (said.returncode, said.stderr) == (0, "")
+        pictures.append((tmp_path / f"{name}.png").read_bytes())
+    assert pictures[0] == pictures[1]
