@@ -33,11 +33,11 @@ def check_declared(path: Path, metadata: pq.FileMetaData) -> None:
     if metadata.num_columns > COLUMNS:
         raise TrajectoryError(path, f"has {metadata.num_columns:,} columns; {COLUMNS:,} are read")
     need = count_bytes(metadata)
+    if need > MOST:
+        problem = f"declares {metadata.num_rows:,} rows, {need / 1e9:.3g} GB of memory; a log this long has to be cut"
+        raise TrajectoryError(path, problem)
     if need > max(FEW, PACKED * (size := path.stat().st_size)):
         problem = (
             f"has {size / 1e6:.3g} MB, which unpack to {need / 1e9:.3g} GB: no log packs so well; collect it again"
         )
-        raise TrajectoryError(path, problem)
-    if need > MOST:
-        problem = f"declares {metadata.num_rows:,} rows, {need / 1e9:.3g} GB of memory; a log this long has to be cut"
         raise TrajectoryError(path, problem)

@@ -104,6 +104,8 @@ def _find(source: str) -> tuple[Path, list[Path]]:
         return path.parent, [path]
     if path.exists():
         raise InputError(f"source = {source}: is no plain file")
+    if path.is_symlink():
+        raise InputError(f"source = {source}: is a link that leads nowhere")
     found = [Path(one) for one in sorted(glob.glob(source, recursive=True))]
     if not found:
         raise InputError(f"source = {source}: there is no such file, folder or pattern")
