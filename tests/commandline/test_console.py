@@ -182,7 +182,7 @@ def test_quiet_shows_no_progress(capsys: pytest.CaptureFixture[str], monkeypatch
 def test_a_terminal_without_colours_gets_none(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    console = on_a_terminal(monkeypatch, 80)
+    console = on_a_terminal(monkeypatch, 200)
     with console.progress(4, "walking") as progress:
         progress.fell(2)
         progress.best("best 20.0 cm/s in simulation")

@@ -9,6 +9,11 @@ import pytest
 from commands import SMALL, Said, done, gsl, started
 from page_reader import Page, check_alone, words
 
+from gsl.commandline.rerun import rebuild
+from gsl.stages.effort import links
+from gsl.storage.artifact import Artifact
+from gsl.storage.manifest import read
+
 pytestmark = pytest.mark.slow
 
 NAMED = (*SMALL, "name=chain")
@@ -135,6 +140,13 @@ def test_iterate_runs_the_whole_chain_and_says_what_it_cost(whole: tuple[Path, S
     assert metrics["real_episodes"] == measured["real_episodes"] + collected["real_episodes"]
     made = {path.name for path in (folder / "runs/whole/iterate").iterdir()}
     assert {"policies.json", "learning_curve.png", "joint_trace.png", "walk.png", "table.md"} < made
+
+
+def test_a_whole_iteration_builds_the_links_that_were_planned(whole: tuple[Path, Said]) -> None:
+    run = whole[0] / "runs/whole"
+    iterate, _ = rebuild(Artifact(run / "iterate", read(run / "iterate")), ())
+    built = [path for path in run.rglob("manifest.json") if path.parent.name != "iterate"]
+    assert len(links(iterate)) == len(built) == 8
 
 
 def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[Path, Said]) -> None:
