@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from browser import check_seen
 from commands import SMALL, Said, done, gsl, started
 from page_reader import Page, check_alone, words
 
@@ -166,6 +167,7 @@ def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[
     for section in ("Learning curves", "What grounding changes", "Joint by joint", "Footfalls", "Real data", "Lineage"):
         assert section in said
     assert "../iteration_01/evaluate" in said and "gsl iterate" in said
+    check_seen(run / "iterate/report.html", f"{100.0 * metrics['returned']['value']:.1f}")
 
 
 def test_open_names_the_page_where_there_is_no_display_and_says_what_has_none(
