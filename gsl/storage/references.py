@@ -20,6 +20,7 @@ MAKERS = {
     "optimize": "optimize",
 }
 """Commands that make an artifact of a run, by the name that it has there."""
+ALIKE = 0.8  # evaluat is evaluate; evaluate_none is not
 ALTERNATIVES = 3  # of the same name further down in a run: those of its first iterations
 
 
@@ -125,7 +126,9 @@ def _place(reference: str, runs: Path) -> Path:
 def _alternatives(reference: str, runs: Path) -> str:
     run, _, stage = reference.rpartition("/")
     inside = [name_run(one.folder, runs) for one in _artifacts(runs)]
-    if deeper := [name for name in inside if run and name.startswith(f"{run}/") and name.endswith(f"/{stage}")]:
+    last = {name: name.rpartition("/")[2] for name in inside if run and name.startswith(f"{run}/")}
+    if meant := difflib.get_close_matches(stage, sorted({*last.values()}), n=1, cutoff=ALIKE):
+        deeper = [name for name in last if last[name] == meant[0]]
         return f", did you mean {' or '.join(deeper[:ALTERNATIVES])}?"
     maker = f"; gsl {MAKERS[stage]} name={run} makes it" if run and stage in MAKERS else ""
     names = {path.name for path in runs.iterdir() if not path.name.startswith(".")} if runs.is_dir() else set()
