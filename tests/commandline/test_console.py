@@ -170,12 +170,14 @@ def test_progress_without_a_terminal_is_a_line_every_ten_seconds_at_most(
 def test_quiet_shows_no_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     console, now = on_a_terminal(monkeypatch, 80), 0.0
     monkeypatch.setattr(time, "monotonic", lambda: now)
-    monkeypatch.setattr(Console, "quiet", True)
+    assert call(["-q", "--version"]) == 0
+    capsys.readouterr()
     with console.plan("stage", [Part(1.0, 4)]), console.live_table("rounds", ["round"]) as table:
         with console.progress(4, "walking") as progress:
             now += 60.0
             progress.advance(4)
         table.row(1)
+    Console.quiet = False
     assert capsys.readouterr() == ("", "")
 
 
