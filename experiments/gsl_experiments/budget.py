@@ -111,13 +111,13 @@ class Budget:
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
         keys = self.recipes
-        ledger.announce({key: method for (_, method, _), key in keys.items()}, self._seconds)
+        duration = ledger.announce({key: method for (_, method, _), key in keys.items()}, self._seconds)
         ledger.judge({key: {"trial": k, "method": name, "trajectories": n} for (k, name, n), key in keys.items()})
         missing: dict[int, list[tuple[int, str, int]]] = {}
         for item, key in keys.items():
             if not ledger.take(key):
                 missing.setdefault(item[0], []).append(item)
-        for item, points in in_order(self, folder, missing, console):
+        for item, points in in_order(self, folder, missing, console, duration):
             ledger.add(keys[item], [point._asdict() for point in points])
         points = [Point(**row) for row in ledger.figures]
         self.tell(folder, points, ledger.close(folder / DATA))

@@ -9,22 +9,25 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from gsl.core.console import Console
-from gsl.core.interfaces import REAL, SIM, Grounding, World
+from gsl.core.interfaces import REAL, SIM, Grounding, Search, World
 from gsl.core.layout import check_alike
 from gsl.core.seeds import seed_of_round
 from gsl.core.setting import component, setting
 from gsl.core.unit import Unit
 from gsl.core.words import several
+from gsl.core.workload import Part
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, evidence_of, is_learned
 from gsl.report.study_page import write_study_page
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.diagnosis_plan import flown
+from gsl.stages.effort import links
 from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
-from gsl.stages.values import rank
+from gsl.stages.values import Values, rank
 from gsl.storage.artifact import Artifact
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.gymnasium import try_out
+from gsl_experiments import effort
 from gsl_experiments.answer import answer_comparison
 from gsl_experiments.comparison import Summary, summaries
 from gsl_experiments.comparison_table import markdown
@@ -76,7 +79,8 @@ class Compare:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Run all trials; write every trial's figures and the tables."""
-        found, made = self.carried_out(folder, console)
+        searches = isinstance(self.iterate.optimizer, Search)
+        found, made = self.carried_out(folder, console, (lambda: effort.seconds(self)) if searches else None)
         summary = summaries(found)
         text = "\n".join(filter(None, (markdown(summary, found, Unit.of(self.iterate.task)), foretelling(found))))
         sizes = f"{sizes_of(self.preset_name)} {trials_of(self.first, self.trials)}."
@@ -119,14 +123,14 @@ class Compare:
         try_out({**named, **{f"worlds.{name}": one for name, one in self.worlds.items()}})
         ledger = Ledger(home / DATA, self.parents(), Trial, console)
         keys = self.recipes
-        ledger.announce({key: cell.method for (_, cell), key in keys.items()}, seconds)
+        duration = ledger.announce({key: cell.method for (_, cell), key in keys.items()}, seconds)
         iterations = list(range(1, self.iterate.iterations + 1))
         ledger.judge({key: {"number": k, **cell._asdict(), "iteration": iterations} for (k, cell), key in keys.items()})
         missing: dict[int, list[tuple[int, Cell]]] = {}
         for (number, cell), key in keys.items():
             if not ledger.take(key):
                 missing.setdefault(number, []).append((number, cell))
-        for item, trials in in_order(self, folder, missing, console):
+        for item, trials in in_order(self, folder, missing, console, duration, self._links):
             ledger.add(keys[item], [trial._asdict() for trial in trials])
         return [Trial.read(row) for row in ledger.figures], ledger.close(folder / DATA)
 
@@ -145,6 +149,13 @@ class Compare:
     @property
     def _simulators(self) -> Mapping[str, World]:
         return self.simulators or {"": self.iterate.sim}
+
+    def _links(self, item: tuple[int, Cell]) -> list[Part]:
+        """Return the links of a trial of a cell, those that others share as well."""
+        cell = item[1]
+        sim, real, method = self._simulators[cell.simulator], self.worlds[cell.world], self.methods[cell.method]
+        ranked = [Part(steps=Values.count)] * 2 if self.rank else []
+        return [*links(replace(self.iterate, sim=sim, real=real, grounding=method, beside=False)), *ranked]
 
     def results(self, home: Path, item: tuple[int, Cell], console: Console) -> Iterator[Trial]:
         """Yield a trial of a cell, iteration by iteration."""

@@ -114,8 +114,8 @@ class Ledger:
         """The rows of all trials so far, by trial, without recipe and maker."""
         return _figures(self._rows())
 
-    def announce(self, wanted: Mapping[str, str], seconds: Callable[[], float] | None = None) -> None:
-        """Say how many of a study's results are there, and how long the others will take.
+    def announce(self, wanted: Mapping[str, str], seconds: Callable[[], float] | None = None) -> float:
+        """Say how many of a study's results are there, and how long the others will take; return that [s], or 0.
 
         Args:
             wanted: By recipe, whose results they are.
@@ -136,14 +136,15 @@ class Ledger:
             problem = "are of another version of gsl and not taken; a copy of that file, given as known=, is"
             self._console.status(f"{others} of this study's {len(wanted)} results in {self._path} {problem}")
         missing = Counter(name for key, name in wanted.items() if key not in known | here)
-        if missing and seconds is not None:
-            which = ", ".join(f"{name} ({count})" for name, count in missing.items())
-            some = f"{missing.total()} of {len(wanted)} results, {which}"
-            share = missing.total() / len(wanted)
-            whose = some if share < 1.0 else "all of its results"
-            self._console.status(
-                f"{duration_told(seconds() * share)} for {whose}; a study that was stopped goes on where it was"
-            )
+        if not missing or seconds is None:
+            return 0.0
+        which = ", ".join(f"{name} ({count})" for name, count in missing.items())
+        some = f"{missing.total()} of {len(wanted)} results, {which}"
+        share = missing.total() / len(wanted)
+        whose = some if share < 1.0 else "all of its results"
+        rest = seconds() * share
+        self._console.status(f"{duration_told(rest)} for {whose}; a study that was stopped goes on where it was")
+        return rest
 
     def judge(self, wanted: Mapping[str, Mapping[str, Any]]) -> None:
         """Refuse trials that are there and say something else than their settings, before anything is written.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import pickle
 import socket
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from gsl.core.console import Console, Silent
+from gsl.core.workload import Part
 from gsl.errors import GslError
 from gsl.rollout.cluster import find_cluster
 from gsl.rollout.parallel import Workers, arriving
@@ -36,14 +37,29 @@ class Task(NamedTuple):
 
 
 def in_order(
-    study: Study, folder: Path, trials: Mapping[int, Sequence[Any]], console: Console
-) -> Iterator[tuple[Any, list[Any]]]:
-    """Yield each part of all trials with its results: one after the other, or on a cluster trials side by side."""
+    study: Study, folder: Path, trials: Mapping[int, Sequence[Any]], console: Console, seconds: float = 0.0,
+    links: Callable[[Any], Sequence[Part]] = lambda _: (),
+) -> Iterator[tuple[Any, list[Any]]]:  # fmt: skip
+    """Yield each part of all trials with its results: one after the other, or on a cluster trials side by side.
+
+    Args:
+        study: Whose trials.
+        folder: In which its artifact is being built.
+        trials: Parts by the number of the trial.
+        console: Where progress is shown.
+        seconds: About how long all of it takes [s], 0 if nobody knows.
+        links: Returns the links of a part of a trial, if anybody knows them.
+    """
     if find_cluster() is not None:
         yield from side_by_side(study, folder, trials, -1, console)
         return
-    for item in (item for items in trials.values() for item in items):
-        yield item, list(study.results(folder.parent, item, console))
+    items = [item for items in trials.values() for item in items]
+    with console.plan("result", [Part(seconds / len(items))] * len(items)):
+        for item in items:
+            with console.plan("stage", links(item)):
+                results = list(study.results(folder.parent, item, console))
+            console.finish()
+            yield item, results
 
 
 def side_by_side(

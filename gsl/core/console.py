@@ -6,12 +6,20 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from typing import Protocol
 
+from gsl.core.workload import Part
+
 
 class Progress(Protocol):
     """How far a long loop is."""
 
-    def advance(self, steps: int = 1) -> None:
-        """Say that `steps` more are done."""
+    def advance(self, steps: int = 1, *, worked: bool = True) -> None:
+        """Say that `steps` more are done; without work if they were done before."""
+
+    def fell(self, count: int) -> None:
+        """Say that the robot fell so often."""
+
+    def best(self, text: str) -> None:
+        """Say the best value so far, in words."""
 
 
 class LiveTable(Protocol):
@@ -31,6 +39,15 @@ class Console(Protocol):
         self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
     ) -> None:
         """Show a table of results."""
+
+    def plan(self, noun: str, parts: Sequence[Part]) -> AbstractContextManager[None]:
+        """Within, the work, or a part of the plan around, consists of parts that `noun` names."""
+
+    def begin(self, name: str) -> None:
+        """Say which part of the plan begins."""
+
+    def finish(self, *, worked: bool = True) -> None:
+        """Say that a part of the plan is done; without work if it was done before."""
 
     def progress(self, total: int, description: str) -> AbstractContextManager[Progress]:
         """Show how far a loop of `total` steps is."""
@@ -54,6 +71,17 @@ class Silent:
         """Show nothing."""
 
     @contextmanager
+    def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:
+        """Plan nothing."""
+        yield
+
+    def begin(self, name: str) -> None:
+        """Say nothing."""
+
+    def finish(self, *, worked: bool = True) -> None:
+        """Say nothing."""
+
+    @contextmanager
     def progress(self, total: int, description: str) -> Iterator[Progress]:
         """Yield progress that is shown nowhere."""
         yield _Unseen()
@@ -70,7 +98,13 @@ class Silent:
 
 
 class _Unseen:
-    def advance(self, steps: int = 1) -> None:
+    def advance(self, steps: int = 1, *, worked: bool = True) -> None:
+        pass
+
+    def fell(self, count: int) -> None:
+        pass
+
+    def best(self, text: str) -> None:
         pass
 
     def row(self, *cells: object) -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,16 +13,18 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from gsl.core.console import LiveTable, Progress
 from gsl.core.interruption import checkpoint
 from gsl.core.visible import visible
-from gsl.core.words import duration
-from gsl.report.tables import LineTable, RichLiveTable, draw_table, fitting, total
+from gsl.core.workload import Part, Workload
+from gsl.report.tables import GrowingTable, LineTable, draw_table, fitting, total
 
 if TYPE_CHECKING:
     import rich.console
+    import rich.live
 
 _log = logging.getLogger("gsl")
 
 SECONDS_BETWEEN_LINES = 10.0
 WIDTH_WITHOUT_TERMINAL = 200
+BAR = 60  # characters
 
 
 @contextmanager
@@ -54,9 +55,12 @@ class Console:
 
     def __init__(self, *, json: bool = False) -> None:
         self.json = json
-        self._live: RichLiveTable | None = None
+        self._live: rich.live.Live | None = None
+        self._growing: GrowingTable | None = None
         self._lines: LineTable | None = None
         self._part = ""
+        self._work = Workload(self._note_progress)
+        self._said = self._work.clock()
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
@@ -129,40 +133,79 @@ class Console:
         return exit_code
 
     @contextmanager
-    def progress(self, total: int, description: str) -> Iterator[Progress]:
-        """Show how far a loop of `total` steps is: a bar on a terminal, else a line every ten seconds."""
-        description = visible(description)
-        if self._live is not None:
-            yield _Lines(total, description, self._live.caption, seconds=0.5)
-        elif self.quiet or not self._stderr.is_terminal:
-            yield _Lines(total, description, self.status, seconds=SECONDS_BETWEEN_LINES)
-        else:
-            from rich.progress import Progress as Bars
-            from rich.progress import TimeElapsedColumn
+    def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:
+        """Within, the work, or a part of the plan around, consists of parts that `noun` names."""
+        with self._work.plan(noun, parts), self._watch():
+            yield
 
-            with Bars(*Bars.get_default_columns(), TimeElapsedColumn(), console=self._stderr, transient=True) as bars:
-                task = bars.add_task(description, total=total)
-                yield _Bar(lambda steps: bars.advance(task, steps))
+    def begin(self, name: str) -> None:
+        """Say which part of the plan begins."""
+        self._work.begin(visible(name))
+
+    def finish(self, *, worked: bool = True) -> None:
+        """Say that a part of the plan is done; without work if it was done before."""
+        self._work.finish(worked=worked)
+
+    @contextmanager
+    def progress(self, total: int, description: str) -> Iterator[Progress]:
+        """Show how far a loop of `total` steps is: live on a terminal, else in a line every ten seconds at most."""
+        with self._work.loop(total, visible(description)) as loop, self._watch():
+            yield loop
 
     @contextmanager
     def live_table(self, title: str, columns: Sequence[str]) -> Iterator[LiveTable]:
         """Show a growing table on a terminal, else each row as a line; the final table is for `table`."""
-        title = visible(self._title(title))
-        if self.quiet or not self._stderr.is_terminal or self._live is not None:
-            self._lines = LineTable(title, columns, self.status)
-            try:
-                yield self._lines
-            finally:
-                self._lines = None
+        title, nested = visible(self._title(title)), self._growing is not None
+        try:
+            with self._watch():
+                if self._live is None or nested:
+                    self._lines = LineTable(title, columns, self.status)
+                    yield self._lines
+                else:
+                    self._growing = GrowingTable(title, columns)
+                    yield self._growing
+        finally:
+            self._lines = None
+            self._growing = self._growing if nested else None
+
+    @contextmanager
+    def _watch(self) -> Iterator[None]:
+        """Within, a terminal shows how far the work is."""
+        if self._live is not None or self.quiet or not self._stderr.is_terminal or self._stderr.is_dumb_terminal:
+            yield
             return
         from rich.live import Live
 
-        with Live(console=self._stderr, transient=True) as live:
-            self._live = RichLiveTable(title, columns, live)
+        with Live(console=self._stderr, transient=True, get_renderable=self._draw_progress) as self._live:
             try:
-                yield self._live
+                yield
             finally:
                 self._live = None
+
+    def _draw_progress(self) -> rich.console.Group:
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
+        shown: list[rich.console.RenderableType] = []
+        if self._growing is not None:
+            shown.append(self._growing.draw(self._stderr.width))
+        if words := self._work.text():
+            below = Table.grid()
+            below.add_row(ProgressBar(total=1.0, completed=self._work.share, width=min(BAR, self._stderr.width)))
+            below.add_row(Text(self._title(words)))
+            shown.append(below)
+        return Group(*shown)
+
+    def _note_progress(self) -> None:
+        checkpoint()
+        now = self._work.clock()
+        if self._live is None and not self.quiet and now - self._said >= SECONDS_BETWEEN_LINES:
+            self._said = now
+            if self._lines is not None:
+                self._lines.interrupted = True
+            self._stderr.print(self._title(self._work.text()), markup=False, highlight=False, soft_wrap=True)
 
     def _title(self, title: str) -> str:
         return f"{self._part}: {title}" if self._part else title
@@ -174,32 +217,6 @@ class Console:
     @cached_property
     def _stderr(self) -> rich.console.Console:
         return _rich_console(sys.stderr.isatty(), stderr=True)
-
-
-class _Bar:
-    def __init__(self, draw: Callable[[int], None]) -> None:
-        self.draw = draw
-
-    def advance(self, steps: int = 1) -> None:
-        checkpoint()
-        self.draw(steps)
-
-
-class _Lines:
-    """Progress as lines of text, not more often than every so many seconds."""
-
-    def __init__(self, total: int, description: str, say: Callable[[str], None], *, seconds: float) -> None:
-        self.total, self.description, self.say, self.seconds = total, description, say, seconds
-        self.done, self.said = 0, time.monotonic()
-        self.begun = self.said
-
-    def advance(self, steps: int = 1) -> None:
-        checkpoint()
-        self.done += steps
-        if time.monotonic() - self.said >= self.seconds:
-            self.said = time.monotonic()
-            left = (self.total - self.done) * (self.said - self.begun) / self.done if self.done else 0.0
-            self.say(f"{self.description}: {self.done} of {self.total}, {duration(left)} left")
 
 
 def _visible_cells(cells: Sequence[object]) -> list[object]:

@@ -197,7 +197,7 @@ def _draw_standing(axes: Axes, standing: Sequence[Point]) -> None:
     if fallen:
         axes.plot(*zip(*fallen, strict=True), "o", color=REAL, markerfacecolor="white", label="fell later", zorder=5)
         for place, value in fallen:
-            _say(axes, "fell later", place, value, 9, REAL)
+            _say(axes, "fell later", place, value, 9, REAL, side="right")  # the bar of the confirmation is beside it
 
 
 def _draw_falls(axes: Axes, fallen: Sequence[Point]) -> None:
@@ -215,8 +215,8 @@ def _draw_confirmed(axes: Axes, confirmed: Point) -> None:
     axes.plot([place], [confirmed.real], "D", color=INK, markersize=6, label="measured again", zorder=6)
 
 
-def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -> None:
-    """Write something above a point."""
+def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str, side: str = "center") -> None:
+    """Write something above a point, with its middle or its right end there."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=3.0, foreground="white")]
@@ -224,7 +224,7 @@ def _say(axes: Axes, text: str, x: float, y: float, above: float, colour: str) -
         "path_effects": halo,
         "xytext": (0, above),
         "textcoords": "offset points",
-        "ha": "center",
+        "ha": side,
         "fontsize": 9.5,
     }
     axes.annotate(text, (x, y), color=colour, zorder=7, **place)

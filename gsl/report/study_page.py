@@ -26,8 +26,8 @@ def write_study_page(folder: Path, answer: Answer, files: Sequence[str], picture
         pictures: Its figures.
     """
     drawn = section("Pictures", *(svg(one, "figure of the study") for one in pictures))
-    texts = [(folder / name).read_text(encoding="utf-8") for name in files]
-    write_page(folder, answer, [drawn, *(section("Tables", *read_markdown(text)) for text in texts)])
+    texts = {Path(name).stem.capitalize(): (folder / name).read_text(encoding="utf-8") for name in files}
+    write_page(folder, answer, [drawn, *(section(title, *read_markdown(text)) for title, text in texts.items())])
 
 
 def read_markdown(text: str) -> Iterator[Part]:

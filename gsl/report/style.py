@@ -115,11 +115,14 @@ def label_ends(axes: Axes, x: float, ends: Sequence[tuple[float, str, str]], *, 
         x: In data units.
         ends: Height in data units, text and colour of each.
         gap: Least distance of two labels, in shares of the axes' height, of which half is kept below the lowest.
+            As long as there is room they stay beside the axes.
     """
     low, high = axes.get_ylim()
     order = sorted(range(len(ends)), key=lambda index: ends[index][0])
-    free = spread([(ends[index][0] - low) / (high - low) for index in order], gap)
-    places = [max(place, (0.5 + index) * gap) for index, place in enumerate(free)]
+    places = spread([(ends[index][0] - low) / (high - low) for index in order], gap)
+    for index, place in enumerate(places):
+        highest = 1.0 - (len(places) - 1 - index) * gap
+        places[index] = max(min(place, highest), (0.5 + index) * gap)
     for index, place in zip(order, places, strict=True):
         height, text, colour = ends[index]
         axes.annotate(

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Literal
 from gsl.core.visible import visible
 
 if TYPE_CHECKING:
-    import rich.live
     import rich.table
 
 CELL = 13
@@ -40,29 +39,21 @@ class LineTable:
         return ("  " + "  ".join(padded)).rstrip()
 
 
-class RichLiveTable:
-    """A table that grows while a person watches, with what is going on as its caption."""
+class GrowingTable:
+    """A table that grows while a person watches."""
 
-    def __init__(self, title: str, columns: Sequence[str], live: rich.live.Live) -> None:
-        self._title, self._columns, self._live = title, columns, live
+    def __init__(self, title: str, columns: Sequence[str]) -> None:
+        self._title, self._columns = title, columns
         self._rows: list[Sequence[object]] = []
-        self._caption = ""
-        self._draw()
 
     def row(self, *cells: object) -> None:
         """Add one row."""
         self._rows.append([visible(str(cell)) for cell in cells])
-        self._draw()
 
-    def caption(self, text: str) -> None:
-        """Say below the table what is going on."""
-        self._caption = text
-        self._draw()
-
-    def _draw(self) -> None:
-        """Draw it anew: which columns there is room for depends on what is in them."""
-        widths = fitting(self._columns, self._rows, self._live.console.width)
-        self._live.update(draw_table(self._columns, self._rows, widths, self._title, self._caption), refresh=True)
+    def draw(self, width: int) -> rich.table.Table:
+        """Return it with the columns that there is room for."""
+        rows = [*self._rows]
+        return draw_table(self._columns, rows, fitting(self._columns, rows, width), self._title)
 
 
 def draw_table(
@@ -70,7 +61,6 @@ def draw_table(
     rows: Sequence[Sequence[object]],
     widths: Sequence[int],
     title: str | None = None,
-    caption: str = "",
 ) -> rich.table.Table:
     """Return a table as rich draws it, of as many columns as `widths`.
 
@@ -82,11 +72,9 @@ def draw_table(
 
     table = Table(
         title=None if title is None else Text(title),
-        caption=Text(caption) if caption else None,
         box=box.SIMPLE_HEAD,
         show_header=any(columns),
         title_justify="left",
-        caption_justify="left",
     )
     for index, (column, width) in enumerate(zip(columns, widths, strict=False)):
         numbers = bool(rows) and all(_is_number(row[index]) for row in rows)

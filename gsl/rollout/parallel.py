@@ -68,7 +68,11 @@ def trajectories(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progr
 
 def episodes(scenario: Scenario, jobs: Sequence[Job], *, workers: int, progress: Progress) -> list[Episode]:
     """Return value, fall and length of all jobs, in their order."""
-    return in_parallel(_episode, scenario, jobs, workers, progress)
+    done = dict[int, Episode]()
+    for index, episode in arriving(_episode, scenario, jobs, workers, progress):
+        done[index] = episode
+        progress.fell(episode.fell)
+    return [done[index] for index in range(len(jobs))]
 
 
 def in_parallel(function: Any, shared: Any, jobs: Sequence[Any], workers: int, progress: Progress) -> list[Any]:

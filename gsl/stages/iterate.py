@@ -29,6 +29,7 @@ from gsl.rollout.rollout import Scenario
 from gsl.stages.chain import Budget
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.diagnosis_plan import EXCITATION, DiagnosisPlan, flown
+from gsl.stages.effort import foresee
 from gsl.stages.train_forward import TrainForward
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
@@ -103,7 +104,11 @@ class Iterate:
         self.chain.check(self.grounding)
         try_out({"sim": self.sim, "real": self.real})
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
-        with console.live_table(in_unit("grounded simulation learning", self.task.unit), rounds.columns) as table:
+        parts, told = foresee(self)
+        if told:
+            console.status(told)
+        title = in_unit("grounded simulation learning", self.task.unit)
+        with console.plan("stage", parts), console.live_table(title, rounds.columns) as table:
             start = self.chain.pretrained(home / "pretrained", self.seed, console) if self.pretrained else None
             grounding = self._diagnose(home, rounds, console)
             chain = self.chain

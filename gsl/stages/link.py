@@ -17,7 +17,9 @@ COMMAND = "gsl iterate"
 def build_link(stage: Stage, out: Path, console: Console) -> Artifact:
     """Build one link; what a chain built otherwise in its place, or is damaged, is replaced, nobody else's work is."""
     command, before = f"{COMMAND} ({stage.kind})", _before(out)
+    console.begin(stage.kind)
     made = build(stage, config=describe(stage), out=out, command=command, force=bool(before), console=console)
+    console.finish(worked=not made.unchanged)
     if before and not made.unchanged:
         console.status(f"{out.as_posix()}: in the place of {before}")
     console.status(f"{out.as_posix()}: {headline(made)}{' (unchanged)' if made.unchanged else ''}")

@@ -14,6 +14,7 @@ from gsl.core.interfaces import SIM, Grounding, Learner, Policy, Search, Task, W
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.step_metrics import note_step
+from gsl.core.unit import Unit
 from gsl.grounding.effects import innermost
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
 from gsl.grounding.preparation import parents_of, without_margins
@@ -124,7 +125,7 @@ class Optimize:
         total = optimizer.generations * optimizer.candidates * self.rollouts
         if log.read(0) is None and (line := estimate(scenario, first, total, self.workers)):
             console.status(line)
-        error = optimizer.race if isinstance(optimizer, Racing) else 0.0
+        error, highest = optimizer.race if isinstance(optimizer, Racing) else 0.0, -np.inf
         with console.progress(total, "optimising in simulation") as progress:
             for index in range(optimizer.generations):
                 candidates = check_candidates(search.ask(), len(first))
@@ -133,7 +134,8 @@ class Optimize:
                     generation = self._evaluate(scenario, candidates, index, progress, error)
                     log.append(generation)
                 else:
-                    progress.advance(len(candidates) * self.rollouts)
+                    progress.advance(len(candidates) * self.rollouts, worked=False)
+                    progress.fell(sum(generation.falls))
                 search.tell(generation.values)
                 best = generation.winner
                 means = generation.means or generation.values
@@ -145,6 +147,8 @@ class Optimize:
                     falls=sum(generation.falls),
                     falls_of_best=generation.falls[best],
                 )
+                highest = max(highest, generation.values[best])
+                progress.best(f"best {Unit.of(self.task).shown(highest)} in simulation")
                 yield Winner(self._record(index, candidates[best], means[best]), generation.values[best])
 
     def _learn(self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Console) -> Iterator[Winner]:

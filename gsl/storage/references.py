@@ -20,6 +20,8 @@ MAKERS = {
     "optimize": "optimize",
 }
 """Commands that make an artifact of a run, by the name that it has there."""
+ALIKE = 0.8  # evaluat is evaluate; evaluate_none is not
+ALTERNATIVES = 3  # of the same name further down in a run: those of its first iterations
 
 
 def resolve(reference: str | Path, *, kind: str | tuple[str, ...] | None = None, runs: Path = RUNS) -> Path:
@@ -123,10 +125,14 @@ def _place(reference: str, runs: Path) -> Path:
 
 def _alternatives(reference: str, runs: Path) -> str:
     run, _, stage = reference.rpartition("/")
+    inside = [name_run(one.folder, runs) for one in _artifacts(runs)]
+    last = {name: name.rpartition("/")[2] for name in inside if run and name.startswith(f"{run}/")}
+    if meant := difflib.get_close_matches(stage, sorted({*last.values()}), n=1, cutoff=ALIKE):
+        deeper = [name for name in last if last[name] == meant[0]]
+        return f", did you mean {' or '.join(deeper[:ALTERNATIVES])}?"
     maker = f"; gsl {MAKERS[stage]} name={run} makes it" if run and stage in MAKERS else ""
     names = {path.name for path in runs.iterdir() if not path.name.startswith(".")} if runs.is_dir() else set()
-    names |= {name_run(one.folder, runs) for one in _artifacts(runs)}
-    close = difflib.get_close_matches(reference, sorted(names), n=1, cutoff=0.85 if maker else 0.6)
+    close = difflib.get_close_matches(reference, sorted({*names, *inside}), n=1, cutoff=0.85 if maker else 0.6)
     return f", did you mean {close[0]}?" if close else maker
 
 

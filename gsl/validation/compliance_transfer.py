@@ -99,7 +99,7 @@ class ComplianceReport:
             f"{group}: stiffness {self._describe(group, 'stiffness')}, strength {self._describe(group, 'torque')}"
             for group in self.sim.groups
         ]
-        return f"Compliance transferred, 1 where the grounded simulator yields as the robot does. {'; '.join(parts)}."
+        return f"Compliance transferred, 0 as stiff as the simulator, 1 as the robot: {'; '.join(parts)}."
 
     def means(self) -> dict[str, dict[str, dict[str, float]]]:
         """Return the mean over each group's joints, by group, quantity and robot."""

@@ -10,6 +10,7 @@ from contextlib import suppress
 import pytest
 
 from gsl.cli import call
+from gsl.core.workload import Part
 from gsl.report.console import Console
 from gsl.report.tables import fitting
 
@@ -75,7 +76,7 @@ def test_a_terminal_gets_a_bar_and_a_growing_table(
         with console.progress(2, "optimizing") as progress:
             progress.advance(2)
     printed = capsys.readouterr()
-    assert "100%" in printed.err
+    assert "100 % done" in printed.err
     assert "0.5" in printed.err
     assert printed.out == ""
 
@@ -143,15 +144,54 @@ def test_tables_of_a_part_are_progress(capsys: pytest.CaptureFixture[str]) -> No
     assert "errors" not in out and "results" in out
 
 
-def test_progress_without_a_terminal_says_how_long_it_takes(
+def test_progress_without_a_terminal_is_a_line_every_ten_seconds_at_most(
+    capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 0.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    console = Console()
+    with caplog.at_level(logging.INFO, logger="gsl"), console.plan("stage", [Part(30.0, 60), Part(30.0, 30)]):
+        for name, steps in {"collect": 60, "optimize": 30}.items():
+            console.begin(name)
+            with console.progress(steps, "walking") as progress:
+                for _ in range(steps):
+                    now += 0.5
+                    progress.advance()
+            console.finish()
+    assert capsys.readouterr().err.splitlines() == [
+        "17 % done, 50 s left; stage 1 of 2 (collect), walking: 20 of 60, 2.0 a second",
+        "33 % done, 40 s left; stage 1 of 2 (collect), walking: 40 of 60, 2.0 a second",
+        "50 % done, 30 s left; stage 1 of 2 (collect), walking: 60 of 60, 2.0 a second",
+        "83 % done, 8 s left; stage 2 of 2 (optimize), walking: 20 of 30, 2.0 a second",
+    ]
+    assert caplog.messages == []  # nothing of it enters the log of an artifact
+
+
+def test_quiet_shows_no_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    console, now = on_a_terminal(monkeypatch, 80), 0.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    assert call(["-q", "--version"]) == 0
+    capsys.readouterr()
+    with console.plan("stage", [Part(1.0, 4)]), console.live_table("rounds", ["round"]) as table:
+        with console.progress(4, "walking") as progress:
+            now += 60.0
+            progress.advance(4)
+        table.row(1)
+    Console.quiet = False
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_terminal_without_colours_gets_none(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    clock = iter([0.0, 1.0, 20.0, 20.0, 25.0, 40.0, 40.0])
-    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
-    with Console().progress(8, "walking") as progress:
-        for _ in range(4):
-            progress.advance()
-    assert capsys.readouterr().err.splitlines() == ["walking: 2 of 8, 60 s left", "walking: 4 of 8, 40 s left"]
+    console = on_a_terminal(monkeypatch, 200)
+    with console.progress(4, "walking") as progress:
+        progress.fell(2)
+        progress.best("best 20.0 cm/s in simulation")
+        progress.advance(2)
+    said = capsys.readouterr().err
+    assert "50 % done" in said and "best 20.0 cm/s in simulation, 2 falls" in said
+    assert not re.search(r"\x1b\[[\d;]*3\d[\d;]*m", said)
 
 
 def test_quiet_leaves_results_warnings_and_errors(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from browser import check_seen
 from commands import done, gsl
 
 from gsl.core.console import Silent
@@ -86,6 +87,8 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
         if what != "table4":  # where falls are tolerated
             assert sum(policy[3] == 0 for policy in one["tried"][1:]) == one["stable"]
         assert all((policy[2] is not None) == ("gat" in one["method"]) for policy in one["tried"])
+    if what == "table2":
+        check_seen(folder / "report.html", *KEPT[what], "Sizes: preset=toy")
     learned = {
         path.parent.parent.name: json.loads(path.read_text())["trajectories"]
         for path in folder.parent.rglob("sgat/*/**/train_forward/metrics.json")

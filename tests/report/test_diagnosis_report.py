@@ -5,10 +5,12 @@ from __future__ import annotations
 import copy
 import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import diagnosis_document as made
 import pytest
+from browser import check_seen
 from page_reader import Page, check_alone, words
 
 from gsl.report.console import Console
@@ -42,6 +44,13 @@ def test_the_page_is_whole_and_needs_nothing_else(kind: str) -> None:
     assert UNSAID.search(page.text) is None
     assert len(text.encode()) < 200_000
     assert report_html(DOCUMENTS[kind]()) == text
+
+
+@pytest.mark.parametrize("kind", ["causes", "25 joints"])
+def test_a_browser_shows_a_diagnosis_at_any_width(kind: str, tmp_path: Path) -> None:
+    text = report_html(DOCUMENTS[kind]())
+    (tmp_path / "report.html").write_text(text, encoding="utf-8")
+    check_seen(tmp_path / "report.html", *words(text).split("Caveats")[0].split("Where is the gap?")[0].split()[:20])
 
 
 def test_long_records_of_many_joints_stay_small() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from browser import CUT_OR_COVERED, PHONE, browser, check_seen
 from page_reader import Page, check_alone, words
 
 from gsl.core.unit import Unit
@@ -106,25 +107,38 @@ def test_a_hostile_name_is_shown_and_never_markup(tmp_path: Path) -> None:
 
 
 def test_a_browser_shows_the_joint_that_is_chosen_without_an_error(tmp_path: Path) -> None:
-    playwright = pytest.importorskip("playwright.sync_api")
     joint_page(tmp_path, "LKneePitch", "RKneePitch")
-    wrong: list[str] = []
-    with playwright.sync_playwright() as started:
-        try:
-            browser = started.chromium.launch()
-        except playwright.Error:
-            pytest.skip("no browser is installed")
-        page = browser.new_page()
-        page.on("console", lambda message: wrong.append(message.text))
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("request", lambda sent: wrong.extend([] if sent.url.startswith("file:") else [sent.url]))
-        page.goto((tmp_path / "report.html").as_uri())
-        shown = page.locator("[data-of]:visible")
-        assert [one.get_attribute("data-of") for one in shown.all()] == ["LKneePitch"]
-        page.select_option("select", "RKneePitch")
-        assert [one.get_attribute("data-of") for one in shown.all()] == ["RKneePitch"]
-        browser.close()
-    assert wrong == []
+    visible = "[...document.querySelectorAll('[data-of]')].filter(one => one.offsetHeight).map(one => one.dataset.of)"
+    choose = (
+        "{ const one = document.querySelector('select'); one.value = 'RKneePitch'; "
+        "one.dispatchEvent(new Event('change')); }"
+    )
+    with browser() as shown:
+        shown.open(tmp_path / "report.html", PHONE)
+        assert shown.value(visible) == ["LKneePitch"]
+        shown.value(choose)
+        assert shown.value(visible) == ["RKneePitch"]
+        assert shown.wrong == []
+
+
+def test_a_browser_is_heard_when_something_is_wrong(tmp_path: Path) -> None:
+    place = tmp_path / "bad.html"
+    text = "<text x='0' y='9'>one</text><text x='2' y='9'>another</text><text x='95' y='30'>too far</text>"
+    place.write_text(
+        f"<p style='width: 2000px'>wide</p><svg width='100' height='50'>{text}</svg>"
+        "<script>console.error('oh'); missing()</script><img src='http://localhost:9/x.png'>"
+    )
+    with browser() as shown:
+        shown.open(place, PHONE)
+        assert shown.value("document.documentElement.scrollWidth") > PHONE
+        assert {"one covers another", "cut: too far"} <= {*shown.value(CUT_OR_COVERED)}
+        said = "\n".join(shown.wrong)
+        assert "oh" in said and "missing is not defined" in said and "localhost:9" in said
+
+
+def test_a_browser_shows_an_evaluation_at_any_width(tmp_path: Path) -> None:
+    written(tmp_path)
+    check_seen(tmp_path / "report.html", "generation_01 reaches 21.0 cm/s", "20.0 to 22.0", "1 of 3")
 
 
 def test_a_study_shows_the_tables_and_sentences_of_its_file(tmp_path: Path) -> None:
@@ -141,6 +155,7 @@ def test_a_study_shows_the_tables_and_sentences_of_its_file(tmp_path: Path) -> N
     assert "Why? ? Therefore. And so. Pictures" in words(page) and "what is seen" in words(page)
     assert Page(page).tags["table"] == 2
     check_alone(page)
+    check_seen(tmp_path / "report.html", "3.1", "One line and its end.", "what is seen")
 
 
 def test_what_the_check_measured_is_what_grounding_changes() -> None:

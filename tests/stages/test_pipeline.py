@@ -6,8 +6,14 @@ import json
 from pathlib import Path
 
 import pytest
+from browser import check_seen
 from commands import SMALL, Said, done, gsl, started
 from page_reader import Page, check_alone, words
+
+from gsl.commandline.rerun import rebuild
+from gsl.stages.effort import links
+from gsl.storage.artifact import Artifact
+from gsl.storage.manifest import read
 
 pytestmark = pytest.mark.slow
 
@@ -137,6 +143,13 @@ def test_iterate_runs_the_whole_chain_and_says_what_it_cost(whole: tuple[Path, S
     assert {"policies.json", "learning_curve.png", "joint_trace.png", "walk.png", "table.md"} < made
 
 
+def test_a_whole_iteration_builds_the_links_that_were_planned(whole: tuple[Path, Said]) -> None:
+    run = whole[0] / "runs/whole"
+    iterate, _ = rebuild(Artifact(run / "iterate", read(run / "iterate")), ())
+    built = [path for path in run.rglob("manifest.json") if path.parent.name != "iterate"]
+    assert len(links(iterate)) == len(built) == 8
+
+
 def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[Path, Said]) -> None:
     run = whole[0] / "runs/whole"
     metrics = json.loads((run / "iterate/metrics.json").read_text())
@@ -154,6 +167,7 @@ def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[
     for section in ("Learning curves", "What grounding changes", "Joint by joint", "Footfalls", "Real data", "Lineage"):
         assert section in said
     assert "../iteration_01/evaluate" in said and "gsl iterate" in said
+    check_seen(run / "iterate/report.html", f"{100.0 * metrics['returned']['value']:.1f}")
 
 
 def test_open_names_the_page_where_there_is_no_display_and_says_what_has_none(

@@ -65,6 +65,10 @@ def test_the_likely_name_is_suggested(runs: Path) -> None:
         resolve("quick-start/optimise")
     with pytest.raises(ArtifactError, match="did you mean quick-start/optimize?"):
         resolve("quikc-start/optimize")
+    with pytest.raises(ArtifactError, match=r"mean study/iteration_01/optimize or study/iteration_02/optimize\?$"):
+        resolve("study/optimize", kind="optimize")
+    with pytest.raises(ArtifactError, match=r"mean study/iteration_01/optimize or study/iteration_02/optimize\?$"):
+        resolve("study/optimise")
     with pytest.raises(ArtifactError, match="; gsl train-forward name=mine makes it$"):
         resolve("mine/train_forward")
     with pytest.raises(ArtifactError, match="no such run"):

@@ -1,0 +1,183 @@
+"""How far work is that consists of parts, whose loops have steps, and how long the rest of it will take."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from gsl.core.words import duration, falls
+
+PRIOR = 0.05  # of the whole work: so much of it has to be done until the clock counts as much as the plan
+
+
+class Part(NamedTuple):
+    """A part of planned work: about how long it takes [s], 0 if nobody knows, and how many steps its loops have."""
+
+    seconds: float = 0.0
+    steps: int = 0
+
+
+@dataclass
+class Plan:
+    """Parts that are done one after the other; none where nobody knows how many there are."""
+
+    noun: str
+    parts: Sequence[Part]
+    name: str = ""
+    at: int = 0
+    steps: int = 0
+
+    @property
+    def seconds(self) -> float:
+        """About how long all of it takes [s]; 0 if nobody knows."""
+        return sum(part.seconds for part in self.parts)
+
+    def share(self, inside: float) -> float:
+        """Return how much is done, 0 to 1, if so much of the present part is."""
+        if not self.parts:
+            return 0.0
+        costs = [part.seconds for part in self.parts] if self.seconds else [1.0] * len(self.parts)
+        return min(1.0, (sum(costs[: self.at]) + inside * sum(costs[self.at : self.at + 1])) / sum(costs))
+
+    def inside(self) -> float:
+        """Return how much of the present part its steps are, 0 to 1."""
+        total = self.parts[self.at].steps if self.at < len(self.parts) else 0
+        return min(1.0, self.steps / total) if total else 0.0
+
+    def words(self) -> str:
+        """Return at which part the work is."""
+        many = f" of {len(self.parts)}" if self.parts else ""
+        number = min(self.at + 1, len(self.parts) or self.at + 1)
+        return f"{self.noun} {number}{many}" + (f" ({self.name})" if self.name else "")
+
+
+class Loop:
+    """A loop of so many steps."""
+
+    def __init__(self, work: Workload, total: int, description: str) -> None:
+        self._work, self._total, self._description = work, total, description
+        self._begun, self._done, self._worked, self._falls = work.clock(), 0, 0, 0
+
+    def advance(self, steps: int = 1, *, worked: bool = True) -> None:
+        """Note that `steps` more are done; without work if they were done before."""
+        self._done += steps
+        self._worked += steps * worked
+        self._work.step(steps, worked=worked)
+
+    def fell(self, count: int) -> None:
+        """Note that the robot fell so often."""
+        self._falls += count
+
+    def best(self, text: str) -> None:
+        """Note the best value so far, in words."""
+        self._work.best = text
+
+    def words(self) -> list[str]:
+        """Return how far it is, and how fast."""
+        passed = self._work.clock() - self._begun
+        rate = self._worked / passed if passed > 0.0 else 0.0
+        speed = f"{rate:.1f} a second" if rate >= 1.0 else f"{1.0 / rate:.1f} s each" if rate else ""
+        return [f"{self._description}: {self._done} of {self._total}", speed]
+
+    def falls(self) -> str:
+        """Return how often the robot fell, nothing if it did not."""
+        return falls(self._falls) if self._falls else ""
+
+
+class Workload:
+    """Where nested work is; `changed` is called whenever that changes."""
+
+    def __init__(self, changed: Callable[[], None], clock: Callable[[], float] | None = None) -> None:
+        self.clock, self.best = clock or time.monotonic, ""
+        self._changed = changed
+        self._plans: list[Plan] = []
+        self._loop: Loop | None = None
+        self._alone = False
+        self._share = self._free = self._begun = self._last = 0.0
+
+    @contextmanager
+    def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:
+        """Within, the work, or the present part of the plan around, consists of such parts."""
+        if not self._plans:
+            self._share = self._free = 0.0
+            self._begun = self._last = self.clock()
+            self.best = ""
+        self._plans.append(Plan(noun, parts))
+        try:
+            yield
+        finally:
+            self._plans.pop()
+
+    def begin(self, name: str) -> None:
+        """Name the part that begins."""
+        if self._plans and not self._alone:
+            self._plans[-1].name = name
+            self._changed()
+
+    def finish(self, *, worked: bool = True) -> None:
+        """Note that a part is done; without work if it was done before."""
+        if self._plans and not self._alone:
+            plan = self._plans[-1]
+            plan.at, plan.steps, plan.name = plan.at + 1, 0, ""
+            self._move(worked=worked)
+
+    @contextmanager
+    def loop(self, total: int, description: str) -> Iterator[Loop]:
+        """Within, the present part is a loop, or the whole work is if there is no plan."""
+        if not self._plans:
+            self._alone = True
+            try:
+                with self.plan("", [Part(0.0, total)]), self.loop(total, description) as loop:
+                    yield loop
+            finally:
+                self._alone = False
+            return
+        before, self._loop = self._loop, Loop(self, total, description)
+        try:
+            yield self._loop
+        finally:
+            self._loop = before
+
+    def step(self, steps: int, *, worked: bool) -> None:
+        """Note steps of the present loop."""
+        self._plans[-1].steps += steps
+        self._move(worked=worked)
+
+    @property
+    def share(self) -> float:
+        """How much of all is done, 0 to 1."""
+        return self._share
+
+    def left(self) -> float | None:
+        """Return how long the rest takes [s], None if that cannot be said yet."""
+        seconds = self._plans[0].seconds if self._plans else 0.0
+        prior = PRIOR if seconds else 0.0
+        weight = self._share - self._free + prior
+        if weight <= 0.0:
+            return None
+        whole = (self._last - self._begun + prior * seconds) / weight
+        return max(0.0, whole * (1.0 - self._share) - (self.clock() - self._last))
+
+    def text(self) -> str:
+        """Return in a line where the work is, how much is done, how fast it goes and what has come out."""
+        plans, loop, left = [*self._plans], self._loop, self.left()
+        if not plans:
+            return ""
+        whole = [f"{100.0 * self._share:.0f} % done"] if plans[0].parts else []
+        whole += [] if left is None else [f"{duration(left)} left"]
+        places = [*(plan.words() for plan in plans if plan.noun), *(loop.words() if loop else ())]
+        outcome = [self.best, loop.falls() if loop else ""]
+        return "; ".join(filter(None, (", ".join(filter(None, words)) for words in (whole, places, outcome))))
+
+    def _move(self, *, worked: bool) -> None:
+        inside = self._plans[-1].inside()
+        for plan in reversed(self._plans):
+            inside = plan.share(inside)
+        moved = max(0.0, inside - self._share)
+        self._share += moved
+        self._free += 0.0 if worked else moved
+        self._last = self.clock()
+        self._changed()

@@ -1,0 +1,93 @@
+"""How far work is: the share that is done never falls, and the time left comes from what was worked."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from gsl.core.workload import Part, Workload
+
+
+class Clock:
+    """A clock that stands still between its ticks."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def work() -> tuple[Workload, Clock, list[float]]:
+    clock, shares = Clock(), list[float]()
+    load = Workload(lambda: shares.append(load.share), clock)
+    return load, clock, shares
+
+
+def test_a_share_is_of_all_parts_by_their_time_and_never_falls() -> None:
+    load, _, shares = work()
+    with load.plan("stage", [Part(10.0, 4), Part(30.0, 2)]):
+        for loops in ((3, 3), (1, 1)):  # the first part has more steps than were foreseen
+            for steps in loops:
+                with load.loop(steps, "walking") as loop:
+                    for _ in range(steps):
+                        loop.advance()
+            load.finish()
+    assert shares[:4] == pytest.approx([0.0625, 0.125, 0.1875, 0.25])
+    assert shares[-1] == 1.0 and all(after >= before for before, after in itertools.pairwise(shares))
+    assert shares[-3:] == pytest.approx([0.625, 1.0, 1.0])
+
+
+def test_a_plan_within_a_part_is_that_part() -> None:
+    load, _, shares = work()
+    with load.plan("result", [Part(), Part()]):
+        with load.plan("stage", [Part(1.0), Part(3.0)]):
+            load.begin("collect")
+            assert "result 1 of 2, stage 1 of 2 (collect)" in load.text()
+            load.finish()
+            load.finish()
+        load.finish()
+        with load.plan("stage", []):  # nobody knows how many
+            load.finish()
+            assert "result 2 of 2, stage 2" in load.text()
+        load.finish()
+    assert [*dict.fromkeys(shares)] == pytest.approx([0.0, 0.125, 0.5, 1.0])
+
+
+def test_the_time_left_is_that_of_the_plan_until_the_clock_knows_better() -> None:
+    load, clock, _ = work()
+    with load.plan("stage", [Part(100.0, 100)]), load.loop(100, "walking") as loop:
+        assert load.left() == pytest.approx(100.0)
+        for _ in range(50):
+            clock.now += 3.0  # thrice as slow as foreseen
+            loop.advance()
+        assert load.left() == pytest.approx(150.0, rel=0.1)
+        clock.now += 20.0  # while a step goes on
+        assert load.left() == pytest.approx(130.0, rel=0.1)
+
+
+def test_what_was_done_before_is_no_pace() -> None:
+    load, clock, _ = work()
+    with load.loop(100, "walking") as loop:
+        assert load.left() is None
+        loop.advance(80, worked=False)
+        assert load.left() is None
+        clock.now += 10.0
+        loop.advance(10)
+        assert load.left() == pytest.approx(10.0)
+        assert load.text() == "90 % done, 10 s left; walking: 90 of 100, 1.0 a second"
+        clock.now += 10.0
+        assert "2.0 s each" in load.text()
+
+
+def test_each_work_begins_anew() -> None:
+    load, clock, _ = work()
+    for _ in range(2):
+        with load.loop(2, "walking") as loop:
+            loop.best("best 1.0 m")
+            loop.fell(1)
+            clock.now += 1.0
+            loop.advance()
+            assert load.text() == "50 % done, 1 s left; walking: 1 of 2, 1.0 a second; best 1.0 m, 1 fall"
+    assert load.text() == ""
