@@ -18,6 +18,7 @@ from gsl.core.transitions import usable
 from gsl.diagnosis.diagnose import diagnose, prepare
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
+from gsl.diagnosis.log.beside import find_beside
 from gsl.diagnosis.log.files import check_log, clock_caveat, log_parents, on_ground, read_logs, share_clock
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Record
@@ -118,6 +119,8 @@ class CrossValidate:
             console.status(f"warning: {caveat}")
         groups = self._groups(log)
         if self.gat is not None:
+            if (column := next(find_beside(log), None)) is not None:
+                raise ConfigError("gat", f"learns positions alone, and the log has {column}; gat=null leaves it out")
             for group in groups:
                 lengths = [usable(one) for one in self._rest(log, group).episodes]
                 self.gat.check(lengths, f"the trajectories without {self.by} {', '.join(map(str, group))}")

@@ -14,6 +14,7 @@ from gsl.core.split import split
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
 from gsl.core.words import several
+from gsl.diagnosis.log.beside import find_beside
 from gsl.errors import TrajectoryError
 from gsl.models.choice import Choice
 from gsl.robots.catalogue import names, robot
@@ -56,6 +57,10 @@ def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
     """
     batch = _of_role(path, other)
     _check_joints(path, batch)
+    if (column := next(find_beside(batch), None)) is not None:
+        raise TrajectoryError(
+            path, "models of actions learn positions alone; learn a servo: train-servo", column=column
+        )
     if len(batch) < FEWEST:
         raise TrajectoryError(path, f"holds {several(len(batch), 'episode')}; {FEWEST} are the least: {WHY}")
     return split_batch(batch, share, seed)

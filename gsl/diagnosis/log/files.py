@@ -11,6 +11,7 @@ import numpy as np
 
 from gsl.core.body import Robot
 from gsl.core.trajectory import Batch
+from gsl.diagnosis.log.beside import has_beside
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.settings import LogSettings
 from gsl.errors import ArtifactError, InputError, TrajectoryError
@@ -21,7 +22,6 @@ CLOCKS, APART = "clocks", "unsynchronised"  # of a log's metadata, as gsl import
 MOVES = 1e-4  # a command that changes less is constant [rad]
 LATE = 0.5  # of a control period, by which a row may come early or late
 FASTER, SLOW = 10.0, 0.05  # times the slope of the positions that velocities may be; slopes below are noise [rad/s]
-BESIDE = {"velocity_command": "desired velocity", "torque_command": "feed-forward torque"}  # by column
 BEYOND = 0.35  # measured past a joint's limits by more than this is another unit or another robot [rad]
 
 
@@ -131,11 +131,10 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
     least = LogSettings().warm_up + LogSettings().scored
     if longest < least:
         raise InputError(f"{name}: too short, its longest trajectory lasts {longest:.2g} s; {least:g} s are needed")
-    if all(np.ptp(episode.action, axis=0).max() < MOVES for episode in batch.episodes):
+    if all(np.ptp(episode.action, axis=0).max() < MOVES for episode in batch.episodes) and not has_beside(batch):
         raise InputError(
             f"{name}: no command ever changes, so nothing shows; play a motion, see `gsl collect task=excite`"
         )
-    _check_kinds(batch, name)
     _check_units(batch, robot, name)
     _check_velocities(batch, name)
 
@@ -183,18 +182,6 @@ def _check_velocities(batch: Batch, name: str) -> None:
                 f"{name}: velocity.{joint} is {own / max(size, SLOW):.3g} times the slope of position.{joint}; "
                 "velocities are in rad/s, are these degrees?"
             )
-
-
-def _check_kinds(batch: Batch, name: str) -> None:
-    """Refuse commands beside the positions that are not zero: a replay of positions alone would take them for a gap."""
-    for group, kind in BESIDE.items():
-        for number, episode in enumerate(batch.episodes):
-            for joint in batch.joints:
-                values = np.asarray(episode.sensors.get(f"{group}.{joint}", 0.0))
-                if (sizes := np.abs(values[np.isfinite(values)])).any():  # the last row may be blank
-                    problem = f"{group}.{joint} reaches {sizes.max():.3g} in episode {number}"
-                    why = f"replays follow desired positions, a {kind} beside them is not taken yet"
-                    raise InputError(f"{name}: {problem}; {why}: use motions in which it is 0")
 
 
 def _check_units(batch: Batch, robot: Robot, name: str) -> None:

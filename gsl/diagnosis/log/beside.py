@@ -1,0 +1,33 @@
+"""Commands beside the positions in a log: a desired speed and a feed-forward torque for each joint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gsl.core.body import Robot
+from gsl.core.trajectory import Batch, Trajectory
+
+BESIDE = ("velocity_command", "torque_command")  # groups of columns, in the order of `read_beside`
+
+
+def find_beside(batch: Batch) -> Iterator[str]:
+    """Yield the columns of such commands that are not 0 everywhere, episode by episode."""
+    for episode in batch.episodes:
+        for group in BESIDE:
+            for joint in batch.joints:
+                if np.any(episode.sensors.get(f"{group}.{joint}", np.zeros(1))[: len(episode)]):
+                    yield f"{group}.{joint}"
+
+
+def has_beside(batch: Batch) -> bool:
+    """Whether there is such a command that is not 0."""
+    return next(find_beside(batch), None) is not None
+
+
+def read_beside(episode: Trajectory, robot: Robot) -> np.ndarray:
+    """Return desired speeds [rad/s], then feed-forward torques [N·m], shape (T, 2 n_motors); 0 if not logged."""
+    none, joints = np.zeros(len(episode)), robot.controlled
+    groups = [[episode.sensors.get(f"{group}.{joint}", none)[: len(none)] for joint in joints] for group in BESIDE]
+    return np.hstack([np.stack(columns, axis=1)[:, robot.drive] for columns in groups])
