@@ -58,9 +58,7 @@ def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
     batch = _of_role(path, other)
     _check_joints(path, batch)
     if (column := next(find_beside(batch), None)) is not None:
-        raise TrajectoryError(
-            path, "models of actions learn positions alone; learn a servo: train-servo", column=column
-        )
+        raise TrajectoryError(path, "models of actions know positions alone; use gsl train-servo", column=column)
     if len(batch) < FEWEST:
         raise TrajectoryError(path, f"holds {several(len(batch), 'episode')}; {FEWEST} are the least: {WHY}")
     return split_batch(batch, share, seed)

@@ -175,9 +175,8 @@ def test_lanes_have_the_bits_of_one_robot_alone(count: int, beside: bool, learne
     if learned:
         plant = lawful(plant, some_law(plant))
     many = [window(sweep(NAO, 20) + 0.1 * rng.standard_normal(n)) for _ in range(count)]
-    many = [
-        with_beside(one, 0.1 * rng.standard_normal((*one.commands.shape[:2], 2 * n))) for one in many if beside
-    ] or many
+    if beside:
+        many = [with_beside(one, 0.1 * rng.standard_normal((*one.commands.shape[:2], 2 * n))) for one in many]
     held = Held.of(plant, STEP, PERIOD)
     told = held.replay(Windows(*(np.concatenate(parts) for parts in zip(*many, strict=True))))
     np.testing.assert_array_equal(told, [alone(held, one) for one in many])

@@ -11,14 +11,15 @@ from scipy.integrate import solve_ivp
 from gsl.core.body import lump
 from gsl.core.plant import GRAVITY, Plant, nominal
 from gsl.robots.nao import nao
-from gsl.robots.pendulum import ARM_MASS, ARMATURE, bench, pendulum
+from gsl.robots.pendulum import ARM_MASS, ARMATURE, pendulum
 from gsl.worlds.engine import Engine
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.physics import Physics
 from gsl.worlds.servo_state import COMMANDS
 from gsl.worlds.start import resting
 
-PERIOD, TICKS, MASS, LENGTH, START = 0.02, 60, 0.49, 0.10, 0.2
+PERIOD, TICKS, START = 0.02, 60, 0.2
+MASS, LENGTH = 0.49, 0.10  # of Rhoban's bench [kg], [m]
 INERTIA = (MASS + ARM_MASS / 3.0) * LENGTH**2 + ARMATURE
 WEIGHT = (MASS + 0.5 * ARM_MASS) * GRAVITY * LENGTH
 SERVOS = {  # kp [N·m/rad], kd [N·m·s/rad], delay [s]
@@ -100,7 +101,3 @@ def test_commands_of_zero_change_no_bit_in_bullet() -> None:
     wide = np.hstack([targets, np.zeros((20, 2 * n))])
     plant = replace(nominal(robot), robot=robot)
     assert in_bullet(plant, wide, start, 0.002).tobytes() == in_bullet(plant, targets, start, 0.002).tobytes()
-
-
-def test_the_bench_is_the_one_of_the_equation() -> None:
-    assert bench.__kwdefaults__ == {"mass": MASS, "length": LENGTH, "arm_mass": ARM_MASS}
