@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.core.interfaces import SIM
+from gsl.core.other_commands import find_other_commands
 from gsl.core.split import split
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
 from gsl.core.words import several
-from gsl.diagnosis.log.beside import find_beside
 from gsl.errors import TrajectoryError
 from gsl.models.choice import Choice
 from gsl.robots.catalogue import names, robot
@@ -57,7 +57,7 @@ def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
     """
     batch = _of_role(path, other)
     _check_joints(path, batch)
-    if (column := next(find_beside(batch), None)) is not None:
+    if (column := next(find_other_commands(batch), None)) is not None:
         raise TrajectoryError(path, "models of actions know positions alone; use gsl train-servo", column=column)
     if len(batch) < FEWEST:
         raise TrajectoryError(path, f"holds {several(len(batch), 'episode')}; {FEWEST} are the least: {WHY}")

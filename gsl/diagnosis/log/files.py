@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.other_commands import OTHER_COMMANDS, has_other_commands
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.log.beside import has_beside
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.settings import LogSettings
 from gsl.errors import ArtifactError, InputError, TrajectoryError
 from gsl.storage.importers.formats import readable
 from gsl.storage.trajectories import data_file, read, suggest_import
+from gsl.storage.trajectory_contract import UNITS
 
 CLOCKS, APART = "clocks", "unsynchronised"  # of a log's metadata, as gsl import writes them
 MOVES = 1e-4  # a command that changes less is constant [rad]
@@ -131,11 +132,13 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
     least = LogSettings().warm_up + LogSettings().scored
     if longest < least:
         raise InputError(f"{name}: too short, its longest trajectory lasts {longest:.2g} s; {least:g} s are needed")
-    if all(np.ptp(episode.action, axis=0).max() < MOVES for episode in batch.episodes) and not has_beside(batch):
+    still = all(np.ptp(episode.action, axis=0).max() < MOVES for episode in batch.episodes)
+    if still and not has_other_commands(batch):
         raise InputError(
             f"{name}: no command ever changes, so nothing shows; play a motion, see `gsl collect task=excite`"
         )
     _check_units(batch, robot, name)
+    _check_beside(batch, robot, name)
     _check_velocities(batch, name)
 
 
@@ -182,6 +185,18 @@ def _check_velocities(batch: Batch, name: str) -> None:
                 f"{name}: velocity.{joint} is {own / max(size, SLOW):.3g} times the slope of position.{joint}; "
                 "velocities are in rad/s, are these degrees?"
             )
+
+
+def _check_beside(batch: Batch, robot: Robot, name: str) -> None:
+    """Refuse desired speeds and feed-forward torques far beyond what the joints can do."""
+    for group, limit in zip(OTHER_COMMANDS, ("max_velocity", "effort"), strict=True):
+        for joint in batch.joints:
+            columns = [one.sensors[key][:-1] for one in batch.episodes if (key := f"{group}.{joint}") in one.sensors]
+            reach, most = max((float(np.abs(values).max()) for values in columns), default=0.0), robot.joint(joint)
+            if reach > FASTER * getattr(most, limit):
+                problem = f"{group}.{joint} reaches {reach:.4g}, the joint's limit is {getattr(most, limit):.3g}"
+                hint = "another unit? A value that stands for none? Leave that signal out of the mapping"
+                raise InputError(f"{name}: {problem} {UNITS[group]}; {hint}")
 
 
 def _check_units(batch: Batch, robot: Robot, name: str) -> None:

@@ -13,9 +13,9 @@ from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Robot
+from gsl.core.other_commands import has_other_commands, read_other_commands
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
-from gsl.diagnosis.log.beside import has_beside, read_beside
 from gsl.errors import GslError
 from gsl.worlds.held import Windows
 from gsl.worlds.servo_state import COMMANDS
@@ -108,7 +108,7 @@ def to_records(batch: Batch, robot: Robot, *, walking: bool = False) -> tuple[Re
     labels = batch.metadata.get("episodes") or []
     labels = labels if len(labels) == len(batch) else [{}] * len(batch)
     order = [batch.joints.index(joint) for joint in robot.controlled]
-    wide = has_beside(batch)
+    wide = has_other_commands(batch)
     return tuple(
         _to_record(label, episode, order, robot, batch.control_period, walking=walking, wide=wide)
         for label, episode in zip(labels, batch.episodes, strict=True)
@@ -126,7 +126,7 @@ def _to_record(
     feet = _columns(episode, "foot_force", ("left", "right"))[: ticks + 1] > LOADED if steps else None
     sensors = {column: values[: ticks + 1] for column, values in episode.sensors.items()}
     targets = episode.action[:ticks][:, order][:, robot.drive]
-    beside = read_beside(episode, robot)[:ticks] if wide else None
+    beside = read_other_commands(episode, robot)[:ticks] if wide else None
     name = str(label.get("policy", ""))
     return Record(name, targets, position, slope(position, period), base, feet, sensors, label, beside)
 

@@ -177,7 +177,10 @@ def timings(joints: Sequence[int], rows: int) -> Iterator[Fault]:
 
 def gain_grid(joints: Sequence[int], plant: Plant) -> Iterator[Fault]:
     """Yield gains that are far off: both, or either, or each in the other's place."""
-    exchanged = (plant.servo.kd / plant.servo.kp)[list(joints)]
+    joints = [k for k in joints if min(plant.servo.kp[k], plant.servo.kd[k]) > 0.0]
+    if not joints:
+        return
+    exchanged = (plant.servo.kd / plant.servo.kp)[joints]
     yield gains(exchanged.tolist(), (1.0 / exchanged).tolist(), joints)
     for factor in FACTORS:
         ones = [factor] * len(joints)
