@@ -177,10 +177,8 @@ def timings(joints: Sequence[int], rows: int) -> Iterator[Fault]:
 
 def gain_grid(joints: Sequence[int], plant: Plant) -> Iterator[Fault]:
     """Yield gains that are far off: both, or either, or each in the other's place."""
-    joints = [k for k in joints if min(plant.servo.kp[k], plant.servo.kd[k]) > 0.0]
-    if not joints:
-        return
-    exchanged = (plant.servo.kd / plant.servo.kp)[joints]
+    kp, kd = plant.servo.kp[list(joints)], plant.servo.kd[list(joints)]
+    exchanged = np.divide(kd, kp, out=np.ones_like(kp), where=(kp > 0.0) & (kd > 0.0))
     yield gains(exchanged.tolist(), (1.0 / exchanged).tolist(), joints)
     for factor in FACTORS:
         ones = [factor] * len(joints)
