@@ -11,6 +11,7 @@ import numpy as np
 
 from gsl.commandline.film import Cast, Subject, assemble, read_settings
 from gsl.core.body import Robot
+from gsl.core.other_commands import read_other_commands
 from gsl.core.plant import nominal
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
@@ -78,6 +79,9 @@ def _add_ghost(cast: Cast, console: Console) -> Cast:
     if walks(shot.trajectory) or not len(shot.trajectory):
         console.status("no ghost: a log on the ground has none of its own; beside=REF shows a second log")
         return cast
+    if any(column.startswith("kp_command.") for column in shot.trajectory.sensors):
+        console.status("no ghost: the log has gains of its own; beside=REF shows a second log")
+        return cast
     ghost = replay_in_the_air(cast.robot, cast.joints, shot.trajectory)
     return replace(cast, shots=(shot, Shot("plain model", "with the same commands", ghost, SIMULATION)))
 
@@ -92,7 +96,10 @@ def replay_in_the_air(robot: Robot, joints: Sequence[str], trajectory: Trajector
         start[robot.controlled.index(name)] = trajectory.position[0, k]
     held = Held.of(nominal(robot), fitting_step(BulletWorld.step, period), period)
     settle = max(round(BulletWorld.settle / period), 1)
-    [answer] = held.play([targets[:, robot.drive]], [start[robot.drive]], settle)
+    sent, others = targets[:, robot.drive], read_other_commands(trajectory, robot)
+    if others.any():
+        sent, settle = np.hstack([sent, others]), 1  # a speed or a torque is not held before the log begins
+    [answer] = held.play([sent], [start[robot.drive]], settle)
     columns = [robot.motors.index(name) for name in joints]
     position = answer[:, columns]
     return replace(trajectory, position=position, velocity=np.gradient(position, period, axis=0))

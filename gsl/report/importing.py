@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.other_commands import OTHER_COMMANDS
 from gsl.core.series import Lag
 from gsl.storage.importers.assembly import Episode
 from gsl.storage.importers.suspicions import (
@@ -117,7 +118,8 @@ def _stuck(found: Sequence[Episode]) -> Iterator[str]:
             told = f"at one end in {share} of the rows while its command moves: saturated, or a stop?"
             yield f"{channel['column']}: {told}"
     for k, joint in enumerate(found[0].joints):
-        if all(np.ptp(one) < MOVES for one in _commands(found, k)):
+        others = [one.trajectory.sensors.get(f"{group}.{joint}", 0.0) for one in found for group in OTHER_COMMANDS]
+        if all(np.ptp(one) < MOVES for one in [*_commands(found, k), *others]):
             yield f"action.{joint}: hardly ever changes, so that nothing can be learned of this joint"
 
 

@@ -13,6 +13,7 @@ from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.log.files import check_joints, log_parents, read_logs
+from gsl.diagnosis.log.gains import with_logged_gains
 from gsl.diagnosis.wiring.audit import Audit as Found
 from gsl.diagnosis.wiring.audit import audit
 from gsl.report.diagnosis import report_html
@@ -62,9 +63,10 @@ def audit_log(batch: Batch, sim: BulletWorld, name: str) -> Found:
     """Audit a log that a diagnosis, too, would take.
 
     Raises:
-        InputError: It is of another robot.
+        InputError: It is of another robot, or its gains vary.
     """
     check_joints(batch, lump(sim.plant.robot), name)
+    sim = with_logged_gains(sim, [one.sensors for one in batch.episodes], name)
     return audit(batch, sim.plant, sim.step, checkpoint)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from gsl.core.body import lump
 from gsl.core.console import Console
 from gsl.core.labels import alike
+from gsl.core.other_commands import find_other_commands
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.core.transitions import usable
@@ -19,6 +20,7 @@ from gsl.diagnosis.diagnose import diagnose, prepare
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.log.files import check_log, clock_caveat, log_parents, on_ground, read_logs, share_clock
+from gsl.diagnosis.log.gains import with_logged_gains
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Record
 from gsl.diagnosis.options import Clocks, Duels, Most, Nulls, Options, PhaseReporter, Tolerance, Without
@@ -112,12 +114,17 @@ class CrossValidate:
         """Write the table and every fold."""
         log = read_logs(self.real)
         check_log(log, lump(self.sim.plant.robot), self.real)
+        sim = with_logged_gains(self.sim, [one.sensors for one in log.episodes], self.real)
+        if sim is not self.sim:
+            return replace(self, sim=sim).run(folder, console)
         if on_ground(log):
             raise InputError(f"{self.real}: whole replays are for logs in the air")
         if caveat := clock_caveat(log, self.clocks):
             console.status(f"warning: {caveat}")
         groups = self._groups(log)
         if self.gat is not None:
+            if (column := next(find_other_commands(log), None)) is not None:
+                raise ConfigError("gat", f"learns positions alone, and the log has {column}; gat=null leaves it out")
             for group in groups:
                 lengths = [usable(one) for one in self._rest(log, group).episodes]
                 self.gat.check(lengths, f"the trajectories without {self.by} {', '.join(map(str, group))}")

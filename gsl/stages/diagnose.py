@@ -18,6 +18,7 @@ from gsl.core.trajectory import Batch
 from gsl.diagnosis.design.next_experiment import write_next_experiment
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.log.files import check_log, clock_caveat, log_parents, on_ground, read_logs, share_clock
+from gsl.diagnosis.log.gains import with_logged_gains
 from gsl.diagnosis.options import Clocks, Duels, Most, Nulls, Options, PhaseReporter, Tolerance, Without
 from gsl.diagnosis.simulate.simulator import compare_with_bullet
 from gsl.diagnosis.verdict.document import document
@@ -81,7 +82,12 @@ class Diagnose:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json, report.html, the diagnosed world and the next experiment."""
-        wiring = audit_log(read_logs(self.real), self.sim, self.real) if self.audit else None
+        log = read_logs(self.real)
+        sim = with_logged_gains(self.sim, [one.sensors for one in log.episodes], self.real)
+        if sim is not self.sim:
+            console.status("note: the simulator's servos get the gains of the log")
+            return replace(self, sim=sim).run(folder, console)
+        wiring = audit_log(log, self.sim, self.real) if self.audit else None
         if wiring and wiring.spoils:
             return write_wiring(wiring, folder, real=self.real, sim=self.sim.robot, command=self._command())
         measured = real_returns(self.policies, self.sim, trust=self.trust) if self.policies else None

@@ -16,6 +16,7 @@ from gsl.core.described import describe
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.diagnosis.log.files import log_parents, read_motions
+from gsl.diagnosis.log.gains import with_logged_gains
 from gsl.diagnosis.options import Options, Without
 from gsl.diagnosis.search.reference import Nominal
 from gsl.diagnosis.simulate.calibration import no_shifts
@@ -61,6 +62,9 @@ class Identify:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json and the identified world."""
         log = read_motions(self.real, lump(self.sim.plant.robot))
+        sim = with_logged_gains(self.sim, [one.sensors for one in log.records], self.real)
+        if sim is not self.sim:
+            return replace(self, sim=sim).run(folder, console)
         options = Options(self.without, threads=threads(self.workers))
         problem = Nominal(self.sim.plant, self.sim.step).problem(log, options, lambda phase: checkpoint())
         with console.progress(self.evaluations, "fitting all parameters at once") as progress:

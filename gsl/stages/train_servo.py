@@ -15,6 +15,7 @@ from gsl.core.console import Console
 from gsl.core.described import describe
 from gsl.core.setting import component, setting
 from gsl.diagnosis.log.files import check_log, log_parents, on_ground, read_logs, read_motions
+from gsl.diagnosis.log.gains import with_logged_gains
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Tolerance
 from gsl.errors import ConfigError, InputError
@@ -74,6 +75,9 @@ class TrainServo:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the checkpoint, the world that it makes and what it has learned as curves."""
         exp = read_motions(self.real, lump(self.sim.plant.robot), self.held_out)
+        sim = with_logged_gains(self.sim, [one.sensors for one in exp.records], self.real)
+        if sim is not self.sim:
+            return replace(self, sim=sim).run(folder, console)
         if len(exp.held_out) < 2:
             raise InputError(f"{self.real}: one window is held out; a servo needs two, to stop by and to check by")
         exp = exp.with_model_error(np.full(len(exp.joints), self.tolerance))

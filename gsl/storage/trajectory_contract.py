@@ -24,6 +24,8 @@ UNITS: Mapping[str, str] = {
     "torque": "N·m",
     "velocity_command": "rad/s",
     "torque_command": "N·m",
+    "kp_command": "N·m/rad",
+    "kd_command": "N·m·s/rad",
     "voltage": "V",
     "temperature": "°C",
     "gyro": "rad/s",
@@ -36,7 +38,7 @@ UNITS: Mapping[str, str] = {
 INTEGERS = ("episode", "step")
 BOOLEANS = ("enabled", "fell", "terminated")
 BLANK_AT_THE_END = ("action", "grounded_action", "reward", "next_state")
-JOINT_SENSORS = ("torque", "temperature", "velocity_command", "torque_command")
+JOINT_SENSORS = ("torque", "temperature", "velocity_command", "torque_command", "kp_command", "kd_command")
 SENSORS = (
     *("voltage", "enabled", "foot_force.left", "foot_force.right"),
     *(f"{group}.{axis}" for group in ("gyro", "acceleration", "base.position", "base.velocity") for axis in "xyz"),

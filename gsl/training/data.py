@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.core.interfaces import SIM
+from gsl.core.other_commands import find_other_commands
 from gsl.core.split import split
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
@@ -56,6 +57,8 @@ def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
     """
     batch = _of_role(path, other)
     _check_joints(path, batch)
+    if (column := next(find_other_commands(batch), None)) is not None:
+        raise TrajectoryError(path, "models of actions know positions alone; use gsl train-servo", column=column)
     if len(batch) < FEWEST:
         raise TrajectoryError(path, f"holds {several(len(batch), 'episode')}; {FEWEST} are the least: {WHY}")
     return split_batch(batch, share, seed)

@@ -38,7 +38,7 @@ class Path(NamedTuple):
     """Eight windows in lanes, T control periods and S physics steps long, for n motors.
 
     Attributes:
-        state: Of the servos; its commands are those of the whole window, shape (T + COMMANDS - 1, n).
+        state: Of the servos; its commands are those of the whole window, shape (T + COMMANDS - 1, n) or (..., 3 n).
         begin: Clock at the beginning [s], shape (1,).
         mobility, free: See `Frozen`, shapes (T, n, n) and (T, n).
         motion: Positions [rad] and velocities [rad/s] before each physics step and after the last one, (S + 1, 2, n).
@@ -90,9 +90,9 @@ def cube(first: int, second: int, third: int) -> np.ndarray:
 @compile_kernel
 def load(data: Frozen, some: np.ndarray) -> Loaded:
     """Return windows in lanes; lanes that are left over get the last window once more."""
-    periods, n = data.free.shape[1:]
+    (periods, n), (ticks, columns) = data.free.shape[1:], data.commands.shape[1:]
     into = Loaded(
-        zeros_in_lanes(periods + COMMANDS - 1, n), zeros_in_lanes(2, n), zeros_in_lanes(1, 1),
+        zeros_in_lanes(ticks, columns), zeros_in_lanes(2, n), zeros_in_lanes(1, 1),
         cube(periods, n, n), zeros_in_lanes(periods, n),
     )  # fmt: skip
     for lane in range(LANES):

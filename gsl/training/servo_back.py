@@ -25,7 +25,7 @@ from gsl.training.gradient import (
 )
 from gsl.training.replay_path import ERROR, OUTPUT, RATE, WANTED, Moment
 from gsl.worlds.drive_train import ROTOR_SHARE
-from gsl.worlds.servo import compute_current, compute_gain, delay_command, output_torque, supply_share
+from gsl.worlds.servo import command_beside, compute_current, compute_gain, delay_command, output_torque, supply_share
 from gsl.worlds.servo_state import (
     BENT,
     FRICTION,
@@ -202,12 +202,27 @@ def feedback_back(rows: np.ndarray, state: ServoState, now: Moment, adjoint: Adj
         kept = error - min(rows[ROW.deadband, i], max(-rows[ROW.deadband, i], error))
         numbers[BY_KP, i] += by_u * gain * kept
         numbers[BY_KD, i] += by_v * seen[RATE, i]
+        if state.commands.shape[1] > seen.shape[1]:
+            _beside_back(rows, state.commands, i, seen.shape[1], now, by_u, numbers)
         numbers[BY_DEADBAND, i] -= where(error > 0.0, by_error, -by_error)
         start = (now.elapsed - rows[ROW.delay, i]) / now.period
         by_target = _filter_back(rows, held, i, by_error, now.step)
         numbers[BY_DELAY, i] += by_target * slope_by_delay(state.commands, i, start, length) / now.period
         adjoint.error[i] = by_error
         encoder_back(rows, i, now.number, by_v, 1, now.step, sensed)
+
+
+@compile_kernel
+def _beside_back(
+    rows: np.ndarray, commands: np.ndarray, i: int, motors: int, now: Moment, by_u: float, numbers: np.ndarray
+) -> None:
+    """Add what motor i's desired speed and feed-forward torque make of kd and of the delay."""
+    start, length, kd = (now.elapsed - rows[ROW.delay, i]) / now.period, now.step / now.period, rows[ROW.kd, i]
+    speed, _ = command_beside(rows, commands, i, motors, now.elapsed, now.step, now.period)
+    later = kd * slope_by_delay(commands, motors + i, start, length)
+    later += slope_by_delay(commands, 2 * motors + i, start, length)
+    numbers[BY_KD, i] += by_u * kd * speed
+    numbers[BY_DELAY, i] += by_u * later / now.period
 
 
 @compile_kernel

@@ -96,7 +96,8 @@ class Engine:
 
         Args:
             reading: Where the robot is and how it moves; forces are what follows, not what is set.
-            commands: Targets so far, newest first [rad], shape (k, n_motors); the oldest one stands for all before.
+            commands: Commands so far, newest first, see `ServoState`: targets [rad], shape (k, n_motors), or others
+                beside them as well, shape (k, 3 n_motors); the oldest one stands for all before.
             clock: Time since the episode began [s], negative before it.
             heights: Of an uneven ground, its middle where the robot is, see `ground.random_heights`.
             outside: Torques on the motors, in place of those that `run` is given.
@@ -141,10 +142,10 @@ class Engine:
         self._ground = lay(b, client, plane, self.plant.contact, heights, x, y) if physics.floating else ()
 
     def run(self, targets: np.ndarray, load: np.ndarray | None = None) -> None:
-        """Hold motor `targets` [rad], shape (n_motors,), for one control period.
+        """Hold commands for one control period.
 
         Args:
-            targets: Of the motors.
+            targets: Of the motors [rad], shape (n_motors,), or as wide as the commands that `load` was given.
             load: What they bear besides their servos [N·m], shape (substeps, n_motors), where the plant's torques are
                 noisy.
         """

@@ -30,8 +30,8 @@ class Windows(NamedTuple):
     """Pieces of logs to replay, W of them, T control periods each.
 
     Attributes:
-        commands: Motor targets, newest first, the last of the window to the oldest before it [rad],
-            shape (W, T + COMMANDS - 1, n_motors).
+        commands: Newest first, the last of the window to the oldest before it, see `ServoState`: targets [rad],
+            shape (W, T + COMMANDS - 1, n_motors), or other commands beside them, three times as wide.
         motion: Positions [rad] and velocities [rad/s] at the beginning, shape (W, 2, n_motors).
         clock: Time since the episode began, at the beginning [s], shape (W,).
     """
@@ -176,7 +176,7 @@ def _side_by_side(
     periods, n = told.shape[1], told.shape[2]
     numbers, speaking = zeros_in_lanes(2, n), zeros_in_lanes(2, n)
     motion, encoders = side_by_side(numbers), side_by_side(speaking)
-    asked, since = zeros_in_lanes(periods + COMMANDS - 1, n), zeros_in_lanes(1, 1)
+    asked, since = zeros_in_lanes(periods + COMMANDS - 1, windows.commands.shape[2]), zeros_in_lanes(1, 1)
     _fill(windows, first, numbers, asked, since)
     commands, clock, steps = side_by_side(asked), side_by_side(since)[0], np.array([0, 1])
     memory, layers = side_by_side(zeros_in_lanes(MEMORY, n)), side_by_side(zeros_in_lanes(LAYERS, HIDDEN))
@@ -267,6 +267,7 @@ def _fill(windows: Windows, first: int, motion: np.ndarray, commands: np.ndarray
         for i in range(motion.shape[1]):
             for k in range(2):
                 motion[k, i, lane] = windows.motion[w, k, i]
+        for i in range(commands.shape[1]):
             for k in range(len(commands)):
                 commands[k, i, lane] = windows.commands[w, k, i]
 

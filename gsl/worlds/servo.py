@@ -4,9 +4,13 @@ The same for one robot and for robots side by side (`lanes`): then what changes 
 
     target <- command(t - delay), smoothed, rounded
     e = dead(target + offset - q)                     q as the encoder tells it
-    u = clip(kp (1 - fade t) e - kd dq/dt)            driving torque falls to zero at the no-load speed, braking not
+    u = clip(kp (1 - fade t) e + kd (speed(t - delay) - dq/dt) + torque(t - delay))
+                                                      driving torque falls to zero at the no-load speed, braking not
     rotor inertia                                     see rotor.py; beyond play or a spring the rotor is a second mass
     torque = u (1 - duty_loss |u| / limit) - viscous dq/dt - dry friction - hard stops
+
+A desired speed and a feed-forward torque are zero unless the commands have columns of them. They come with the target
+and are as late; smoothing and rounding are of the target alone. With kp = 0 a servo follows a speed or bears a torque.
 
 A learned law, if there is one, adds to u and to the torque (gsl/core/servo_law.py).
 
@@ -135,6 +139,9 @@ def compute_wanted_torque(
     parameters = servos.rows
     error -= min(parameters[ROW.deadband, i], max(-parameters[ROW.deadband, i], error))
     u, output = compute_gain(parameters, state, i, elapsed) * error - parameters[ROW.kd, i] * v, 0.0 * v
+    if state.commands.shape[1] > motion.shape[1]:
+        speed, feed = command_beside(parameters, state.commands, i, motion.shape[1], elapsed, step, period)
+        u += parameters[ROW.kd, i] * speed + feed
     if parameters[GROUP, i] != NOBODY:
         since = elapsed - parameters[ROW.delay, i]
         for k in range(LAGS):
@@ -187,8 +194,8 @@ def delay_command(commands: np.ndarray, i: int, start: float, length: float) -> 
     """Mean of a delayed, held command over one physics step: continuous in the delay.
 
     Args:
-        commands: Newest first [rad], shape (COMMANDS, n_motors).
-        i: Motor.
+        commands: Newest first, see `ServoState`.
+        i: Column.
         start: Beginning of the step after the delayed arrival of the newest command [control periods], often negative.
         length: Of the step [control periods].
     """
@@ -197,6 +204,16 @@ def delay_command(commands: np.ndarray, i: int, start: float, length: float) -> 
         return commands[0, i]
     newer = min(1.0, max(0.0, (start + length + index - 1) / length))
     return (1.0 - newer) * commands[index, i] + newer * commands[index - 1, i]
+
+
+@compile_kernel
+def command_beside(
+    parameters: np.ndarray, commands: np.ndarray, i: int, motors: int, elapsed: float, step: float, period: float
+) -> tuple[float, float]:
+    """Return the desired speed [rad/s] and the feed-forward torque [N·m] of motor i, as late as its target is."""
+    start, length = (elapsed - parameters[ROW.delay, i]) / period, step / period
+    speed = delay_command(commands, motors + i, start, length)
+    return speed, delay_command(commands, 2 * motors + i, start, length)
 
 
 @compile_kernel

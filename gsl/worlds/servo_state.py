@@ -37,7 +37,9 @@ class ServoState(NamedTuple):
     """What changes in time, all of it in place.
 
     Attributes:
-        commands: Targets of the last control periods, newest first [rad], shape (COMMANDS, n_motors).
+        commands: Targets of the last control periods, newest first [rad], shape (COMMANDS, n_motors), or, where logs
+            have other commands beside them, desired speeds [rad/s] and feed-forward torques [N·m] in further columns,
+            shape (COMMANDS, 3 n_motors).
         memory: Bristle deflection [rad]; rotor angle [rad] and speed [rad/s] as seen at the output; filtered target
             [rad]; at the last physics step: output speed [rad/s], motor torque, torque through the gear, friction
             [N·m]; bristle of the learned law [rad]; shape (MEMORY, n_motors).
@@ -77,7 +79,8 @@ def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: fl
     """Return the state of servos in motion, their bristles slack, gaps centred and filters settled.
 
     Args:
-        commands: Targets so far, newest first [rad], shape (k, n_motors); the oldest one is taken to be older still.
+        commands: Commands so far, newest first, shape (k, n_motors) or (k, 3 n_motors), see `ServoState`; the oldest
+            one is taken to be older still.
         motion: Positions [rad] and velocities [rad/s] at the output, shape (2, n_motors).
         step: Physics period [s].
         clock: Time since the episode began [s].

@@ -92,19 +92,24 @@ def test_a_folder_of_files_is_one_log(tmp_path: Path) -> None:
         read_logs(str(tmp_path))
 
 
-@pytest.mark.parametrize(
-    ("group", "kind"), [("velocity_command", "desired velocity"), ("torque_command", "feed-forward torque")]
-)
-def test_commands_beside_the_positions_are_refused_unless_they_are_zero(group: str, kind: str) -> None:
+@pytest.mark.parametrize(("group", "unit"), [("velocity_command", "rad/s"), ("torque_command", "N·m")])
+def test_commands_beside_the_positions_are_taken_unless_no_joint_could_follow_them(group: str, unit: str) -> None:
     def beside(value: float) -> Batch:
         def with_column(episode: Trajectory) -> Trajectory:
             values = np.full(len(episode.time), value)
             values[-1] = np.nan  # after the last action there is no command
-            column = {f"{group}.LKneePitch": values}
-            return replace(episode, sensors={**(episode.sensors or {}), **column})
+            return replace(episode, sensors={**episode.sensors, f"{group}.LKneePitch": values})
 
         return changed(log(), with_column)
 
     check_log(beside(0.0), NAO, "log")
-    with pytest.raises(GslError, match=f"{group}.LKneePitch reaches 1.5 in episode 0; .* a {kind} beside them"):
-        check_log(beside(-1.5), NAO, "log")
+    check_log(beside(-1.5), NAO, "log")
+    with pytest.raises(GslError, match=f"{group}.LKneePitch reaches 1.6e\\+04, the joint's limit is .* {unit}; "):
+        check_log(beside(-16000.0), NAO, "log")
+
+
+def test_a_log_whose_targets_rest_is_no_log_without_commands_where_there_are_others() -> None:
+    def by_torque(episode: Trajectory) -> Trajectory:
+        return replace(constant(episode), sensors={"torque_command.LKneePitch": np.sin(0.1 * np.arange(101))})
+
+    check_log(changed(log(), by_torque), NAO, "log")

@@ -83,3 +83,17 @@ def test_a_stiffness_that_ranges_over_several_sizes_is_stepped_in_logarithms() -
     found = {one.effect: one for one in library(nao(), floating=True)}
     assert found["ground_compliance"].ratios.all()
     assert not found["command_latency"].ratios.any() and not found["stribeck_friction"].ratios.any()
+
+
+def test_a_torque_beside_the_targets_does_what_a_shift_of_the_targets_does(walk: Log) -> None:
+    simulator, sent = Walking(plant(), 0.002, 0.02), walk.pieces.windows.commands
+    shift = 0.01 * np.sin(np.arange(sent.shape[2]))
+    torque = np.broadcast_to(simulator.plant.servo.kp * shift, sent.shape)
+
+    def replayed(commands: np.ndarray) -> np.ndarray:
+        windows = walk.pieces.windows._replace(commands=commands)
+        return simulator.simulate({}, NONE, replace(walk.pieces, windows=windows))
+
+    beside = replayed(np.concatenate([sent, 0.0 * sent, torque], axis=2))
+    assert np.abs(beside - replayed(sent)).max() > 1e-3
+    np.testing.assert_allclose(beside, replayed(sent + shift), atol=1e-5)

@@ -33,6 +33,23 @@ def test_the_example_of_the_page_runs(tmp_path: Path) -> None:
     assert batch.metadata["episodes"][0].items() >= {"motion": "ramp", "kp": 16}.items()
 
 
+def test_a_servo_of_more_than_positions_is_imported_as_the_page_maps_it(tmp_path: Path) -> None:
+    (chosen,) = (block for block in blocks("yaml") if "torque_command" in block)
+    (tmp_path / "mit.yaml").write_text(chosen)
+    names = [
+        "t",
+        *(f"{part}_{joint}" for part in ("q_des", "v_des", "tau_ff", "kp", "kd", "q") for joint in ("hip", "knee")),
+    ]
+    time = 0.01 * np.arange(200)
+    rows = np.column_stack([time, *(np.sin(time + k) for k in range(len(names) - 1))])
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header=",".join(names), comments="")
+    done("import", "source=log.csv", "mapping=mit.yaml", "name=arm", folder=tmp_path)
+    (episode,) = read(tmp_path / "runs/arm/import/trajectories.parquet").episodes
+    for place, column in enumerate(("velocity_command.hip", "velocity_command.knee", "torque_command.hip"), start=2):
+        np.testing.assert_allclose(episode.sensors[column], np.sin(time + place), atol=1e-6)
+    assert {"kp_command.hip", "kd_command.knee"} <= episode.sensors.keys()
+
+
 def test_a_bag_without_its_library_says_what_to_install(tmp_path: Path) -> None:
     try:
         import rosbags  # noqa: F401

@@ -86,6 +86,9 @@ def test_motors_in_an_array_of_messages_are_named_by_number(tmp_path: Path, plug
     order = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]  # the motor of each joint, legs FL, FR, RL, RR
     first = np.array([0.0, *MEASURED[0], *0.01 * np.arange(3, 13)])
     np.testing.assert_allclose(go2.episodes[0].position[0], first[order], atol=1e-6)
+    sent = {"velocity": 0.0, "torque": 0.0, "kp": 20.0, "kd": 1.5}
+    for kind, value in sent.items():
+        np.testing.assert_allclose(go2.episodes[0].sensors[f"{kind}_command.FL_hip_joint"], value, atol=1e-6)
     signals["action"]["column"] = "motor_cmd[{joint}].Q"
     chosen = mapping(tmp_path, joints={"hip": 1, "knee": 2}, time="time", signals=signals)
     line = refused("import", "source=bag", chosen, folder=tmp_path)

@@ -390,6 +390,19 @@ def test_commands_beside_the_positions_are_columns_that_hold_as_commands_do(tmp_
     assert batch.metadata["units"]["velocity_command"] == "rad/s"
 
 
+@pytest.mark.parametrize("name", ["velocity_command", "torque_command"])
+def test_a_servo_that_follows_no_position_has_a_target_that_nothing_pulls_to(tmp_path: Path, name: str) -> None:
+    csv(tmp_path / "log.csv", {"t": TIME, **joint_columns("sent", ACTION), **joint_columns("q", POSITION)})
+    chosen = mapping(tmp_path / "m.yaml", signals={name: "sent_{joint}", "position": "q_{joint}"})
+    said = done("import", f"source={tmp_path / 'log.csv'}", chosen, "name=log", folder=tmp_path)
+    assert "hardly ever changes" not in said.err
+    (episode,) = read(tmp_path / "runs/log/import/trajectories.parquet").episodes
+    np.testing.assert_allclose(episode.action, np.repeat(POSITION[:1], len(ACTION) - 1, axis=0), atol=1e-6)
+    for k, joint in enumerate(JOINTS):
+        assert not episode.sensors[f"kp_command.{joint}"].any()
+        np.testing.assert_allclose(episode.sensors[f"{name}.{joint}"], ACTION[:, k], atol=1e-6)
+
+
 def test_a_log_without_them_says_nothing_of_them(tmp_path: Path) -> None:
     csv(tmp_path / "log.csv", plain())
     done("import", f"source={tmp_path / 'log.csv'}", mapping(tmp_path / "m.yaml"), folder=tmp_path)

@@ -269,5 +269,5 @@ def test_commands_of_other_kinds_are_refused_as_what_they_are(tmp_path: Path, un
     np.savez(tmp_path / "log.npz", **ARRAYS)
     chosen = mapping(tmp_path, {"column": "des_dof_pos", "unit": unit})
     line = refused("import", "source=log.npz", chosen, folder=tmp_path)
-    assert f"is a command of {kind}; servos here follow positions, others are not taken yet" in line
-    assert {"speed": "velocity_command", "torque": "torque_command"}[kind] in line
+    name = {"speed": "velocity_command", "torque": "torque_command"}[kind]
+    assert f"is a command of {kind}; it is signals: {{{name}: ...}}, beside an action or without any" in line

@@ -109,6 +109,27 @@ def test_derivatives_by_the_numbers_are_those_of_differences(name: str, told: Pi
         assert off(gradient.numbers[row], direction, cost, ahead=ahead) < TOLERANCE.get(name, 2e-4), number
 
 
+@pytest.mark.parametrize("name", ["nominal", "command"])
+def test_commands_beside_the_targets_are_part_of_the_derivatives(name: str, told: Pieces) -> None:
+    plant, rng = with_fields(NAO, BASES[name] | {"delay": 0.013}), np.random.default_rng(4)
+    wide = np.concatenate(
+        [told.windows.commands, rng.standard_normal((*told.windows.commands.shape[:2], 2 * N))], axis=2
+    )
+    added, data = (
+        some_law(plant),
+        freeze(plant, replace(told, windows=told.windows._replace(commands=wide)), FLOOR, PERIOD),
+    )
+    gradient = gradient_of(plant, data, added)[1]
+    for number in ("kp", "kd", "delay", "viscous"):
+
+        def cost(change: np.ndarray, number: str = number) -> float:
+            value = getattr(plant.servo, number)
+            other = value * np.exp(change) if number in FACTORS else value + change
+            return gradient_of(plant.with_servo(**{number: other}), data, added)[0]
+
+        assert off(gradient.numbers[NAMES.index(number)], rng.standard_normal(N), cost) < 2e-4, number
+
+
 def test_windows_add_up_and_each_counts_as_alone(told: Pieces) -> None:
     plant = with_fields(NAO, BASES["friction"])
     added, data = some_law(plant), freeze(plant, told, FLOOR, PERIOD)

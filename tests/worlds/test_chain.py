@@ -167,17 +167,35 @@ def test_what_diverges_is_not_a_number_and_disturbs_no_other_window() -> None:
 
 
 @pytest.mark.parametrize("learned", [False, True])
-@pytest.mark.parametrize("count", [1, 2 * LANES - 3])
-def test_lanes_have_the_bits_of_one_robot_alone(count: int, learned: bool) -> None:
+@pytest.mark.parametrize(("count", "beside"), [(1, False), (2 * LANES - 3, False), (LANES + 1, True)])
+def test_lanes_have_the_bits_of_one_robot_alone(count: int, beside: bool, learned: bool) -> None:
     """Against the same kernel with floats, with all that a servo can have, a law included."""
     rng, n = np.random.default_rng(3), len(NAO.motors)
     plant = with_fields(NAO, EVERYTHING)
     if learned:
         plant = lawful(plant, some_law(plant))
     many = [window(sweep(NAO, 20) + 0.1 * rng.standard_normal(n)) for _ in range(count)]
+    if beside:
+        many = [with_beside(one, 0.1 * rng.standard_normal((*one.commands.shape[:2], 2 * n))) for one in many]
     held = Held.of(plant, STEP, PERIOD)
     told = held.replay(Windows(*(np.concatenate(parts) for parts in zip(*many, strict=True))))
     np.testing.assert_array_equal(told, [alone(held, one) for one in many])
+
+
+def with_beside(one: Windows, others: np.ndarray) -> Windows:
+    """The window with desired speeds and feed-forward torques beside its targets."""
+    return one._replace(commands=np.concatenate([one.commands, others], axis=2))
+
+
+@pytest.mark.parametrize("learned", [False, True])
+def test_commands_of_zero_beside_the_targets_change_no_bit(learned: bool) -> None:
+    plant, one = with_fields(NAO, EVERYTHING), window(sweep(NAO, 30))
+    plant = lawful(plant, some_law(plant)) if learned else plant
+    zero = with_beside(one, np.zeros((*one.commands.shape[:2], 2 * len(NAO.motors))))
+    for accurate in (False, True):
+        held = Held.of(plant, STEP, PERIOD, accurate)
+        assert held.replay(zero).tobytes() == held.replay(one).tobytes()
+    assert alone(held, zero).tobytes() == alone(held, one).tobytes()
 
 
 def alone(held: Held, one: Windows) -> np.ndarray:

@@ -10,18 +10,19 @@ from typing import Any
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.other_commands import OTHER_COMMANDS, has_other_commands
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.settings import LogSettings
 from gsl.errors import ArtifactError, InputError, TrajectoryError
 from gsl.storage.importers.formats import readable
 from gsl.storage.trajectories import data_file, read, suggest_import
+from gsl.storage.trajectory_contract import UNITS
 
 CLOCKS, APART = "clocks", "unsynchronised"  # of a log's metadata, as gsl import writes them
 MOVES = 1e-4  # a command that changes less is constant [rad]
 LATE = 0.5  # of a control period, by which a row may come early or late
 FASTER, SLOW = 10.0, 0.05  # times the slope of the positions that velocities may be; slopes below are noise [rad/s]
-BESIDE = {"velocity_command": "desired velocity", "torque_command": "feed-forward torque"}  # by column
 BEYOND = 0.35  # measured past a joint's limits by more than this is another unit or another robot [rad]
 
 
@@ -131,12 +132,13 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
     least = LogSettings().warm_up + LogSettings().scored
     if longest < least:
         raise InputError(f"{name}: too short, its longest trajectory lasts {longest:.2g} s; {least:g} s are needed")
-    if all(np.ptp(episode.action, axis=0).max() < MOVES for episode in batch.episodes):
+    still = all(np.ptp(episode.action, axis=0).max() < MOVES for episode in batch.episodes)
+    if still and not has_other_commands(batch):
         raise InputError(
             f"{name}: no command ever changes, so nothing shows; play a motion, see `gsl collect task=excite`"
         )
-    _check_kinds(batch, name)
     _check_units(batch, robot, name)
+    _check_beside(batch, robot, name)
     _check_velocities(batch, name)
 
 
@@ -185,16 +187,16 @@ def _check_velocities(batch: Batch, name: str) -> None:
             )
 
 
-def _check_kinds(batch: Batch, name: str) -> None:
-    """Refuse commands beside the positions that are not zero: a replay of positions alone would take them for a gap."""
-    for group, kind in BESIDE.items():
-        for number, episode in enumerate(batch.episodes):
-            for joint in batch.joints:
-                values = np.asarray(episode.sensors.get(f"{group}.{joint}", 0.0))
-                if (sizes := np.abs(values[np.isfinite(values)])).any():  # the last row may be blank
-                    problem = f"{group}.{joint} reaches {sizes.max():.3g} in episode {number}"
-                    why = f"replays follow desired positions, a {kind} beside them is not taken yet"
-                    raise InputError(f"{name}: {problem}; {why}: use motions in which it is 0")
+def _check_beside(batch: Batch, robot: Robot, name: str) -> None:
+    """Refuse desired speeds and feed-forward torques far beyond what the joints can do."""
+    for group, limit in zip(OTHER_COMMANDS, ("max_velocity", "effort"), strict=True):
+        for joint in batch.joints:
+            columns = [one.sensors[key][:-1] for one in batch.episodes if (key := f"{group}.{joint}") in one.sensors]
+            reach, most = max((float(np.abs(values).max()) for values in columns), default=0.0), robot.joint(joint)
+            if reach > FASTER * getattr(most, limit):
+                problem = f"{group}.{joint} reaches {reach:.4g}, the joint's limit is {getattr(most, limit):.3g}"
+                hint = "another unit? A value that stands for none? Leave that signal out of the mapping"
+                raise InputError(f"{name}: {problem} {UNITS[group]}; {hint}")
 
 
 def _check_units(batch: Batch, robot: Robot, name: str) -> None:

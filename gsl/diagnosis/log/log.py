@@ -157,7 +157,7 @@ def _sort(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[int, ...
     """Return records in an order of their own, by name and content, and their places before."""
 
     def key(k: int) -> tuple[str, bytes, bytes]:
-        return _name(records[k]), records[k].targets.tobytes(), records[k].position.tobytes()
+        return _name(records[k]), records[k].commands.tobytes(), records[k].position.tobytes()
 
     order = tuple(sorted(range(len(records)), key=key))
     return tuple(records[k] for k in order), order
@@ -170,7 +170,7 @@ def _name(record: Record) -> str:
 
 def _command(record: Record) -> bytes:
     """Return what is the same for repeats of one motion."""
-    return np.round(record.targets, 6).tobytes()
+    return np.round(record.commands, 6).tobytes()
 
 
 def _hold_out(records: Sequence[Record], pieces: Pieces, asked: Sequence[int], block: int) -> tuple[np.ndarray, bool]:

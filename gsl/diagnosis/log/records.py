@@ -13,6 +13,7 @@ from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Robot
+from gsl.core.other_commands import has_other_commands, read_other_commands
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
 from gsl.errors import GslError
@@ -39,6 +40,8 @@ class Record:
         feet: Whether the left and the right foot carry load, shape (T + 1, 2), if it was logged.
         sensors: Further columns of the log by name, each of shape (T + 1,).
         about: What the log says of the trajectory: its label.
+        beside: Desired speeds [rad/s], then feed-forward torques [N·m], that came with the targets, shape
+            (T, 2 n_motors); None where no trajectory of the log has any.
     """
 
     name: str
@@ -49,6 +52,12 @@ class Record:
     feet: np.ndarray | None = None
     sensors: Mapping[str, np.ndarray] = field(default_factory=dict)
     about: Mapping[str, Any] = field(default_factory=dict)
+    beside: np.ndarray | None = None
+
+    @property
+    def commands(self) -> np.ndarray:
+        """All that the servos were sent, shape (T, n_motors), or (T, 3 n_motors) with what came beside the targets."""
+        return self.targets if self.beside is None else np.hstack([self.targets, self.beside])
 
     @property
     def conditions(self) -> Mapping[str, Any]:
@@ -81,6 +90,7 @@ class Record:
         return replace(
             self,
             targets=self.targets[first:last],
+            beside=None if self.beside is None else self.beside[first:last],
             position=self.position[rows],
             velocity=self.velocity[rows],
             sensors={key: values[rows] for key, values in self.sensors.items()},
@@ -98,15 +108,17 @@ def to_records(batch: Batch, robot: Robot, *, walking: bool = False) -> tuple[Re
     labels = batch.metadata.get("episodes") or []
     labels = labels if len(labels) == len(batch) else [{}] * len(batch)
     order = [batch.joints.index(joint) for joint in robot.controlled]
+    wide = has_other_commands(batch)
     return tuple(
-        _to_record(label, episode, order, robot, batch.control_period, walking=walking)
+        _to_record(label, episode, order, robot, batch.control_period, walking=walking, wide=wide)
         for label, episode in zip(labels, batch.episodes, strict=True)
     )
 
 
 def _to_record(
-    label: Mapping[str, Any], episode: Trajectory, order: Sequence[int], robot: Robot, period: float, *, walking: bool
-) -> Record:
+    label: Mapping[str, Any], episode: Trajectory, order: Sequence[int], robot: Robot, period: float, *,
+    walking: bool, wide: bool,
+) -> Record:  # fmt: skip
     ticks = usable(episode)
     position = episode.position[: ticks + 1, order]
     base = _base(episode, period)[: ticks + 1] if walking else None
@@ -114,8 +126,9 @@ def _to_record(
     feet = _columns(episode, "foot_force", ("left", "right"))[: ticks + 1] > LOADED if steps else None
     sensors = {column: values[: ticks + 1] for column, values in episode.sensors.items()}
     targets = episode.action[:ticks][:, order][:, robot.drive]
+    beside = read_other_commands(episode, robot)[:ticks] if wide else None
     name = str(label.get("policy", ""))
-    return Record(name, targets, position, slope(position, period), base, feet, sensors, label)
+    return Record(name, targets, position, slope(position, period), base, feet, sensors, label, beside)
 
 
 def _base(episode: Trajectory, period: float) -> np.ndarray:
@@ -205,6 +218,13 @@ class Pieces:
         """Return what the first joints were commanded in each control period [rad], shape (W, T, joints)."""
         return self.windows.commands[:, : self.real.shape[1], :joints][:, ::-1]
 
+    def beside(self, joints: int) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return desired speeds [rad/s] and feed-forward torques [N·m] as `targets` are, None if there are none."""
+        commands, motors = self.windows.commands[:, : self.real.shape[1]][:, ::-1], self.windows.motion.shape[2]
+        if commands.shape[2] == motors:
+            return None
+        return commands[..., motors : motors + joints], commands[..., 2 * motors : 2 * motors + joints]
+
     def take(self, index: np.ndarray) -> Pieces:
         """Return some of the windows."""
         windows = type(self.windows)(*(part[index] for part in self.windows))
@@ -242,7 +262,8 @@ def cut_pieces(records: Sequence[Record], robot: Robot, period: float, *, warm_u
     commands, motion, real, index, tick, base = [], [], [], [], [], []
     conditions = tuple(record.conditions for record in records) if any(r.conditions for r in records) else ()
     for number, record in enumerate(records):
-        padded = np.vstack([np.repeat(record.targets[:1], COMMANDS, axis=0), record.targets])
+        sent = record.commands
+        padded = np.vstack([np.repeat(sent[:1], COMMANDS, axis=0), sent])
         works = record.driven
         for start in range(0, len(record) - length + 1, scored):
             if not works[start : start + length].all():

@@ -110,7 +110,7 @@ def _repeats(records: Sequence[Record], held: Sequence[int], how: FloorSettings)
     for index, record in enumerate(records):
         if len(record) > 2 * how.settled:
             apart = repr((record.conditions, index in held)).encode()
-            groups[np.round(record.targets, 6).tobytes() + apart].append(record)
+            groups[np.round(record.commands, 6).tobytes() + apart].append(record)
     return list(groups.values())
 
 
@@ -220,8 +220,9 @@ def compare(pieces: Pieces, noise: NoiseFloor, joints: int, settings: FloorSetti
         joints: How many, the first channels.
         settings: What counts as rest and as shaking.
     """
-    commands = pieces.windows.commands[:, : pieces.real.shape[1], :joints]
-    resting = np.ptp(commands, axis=1) < settings.still
+    commands = np.ptp(pieces.windows.commands[:, : pieces.real.shape[1]], axis=1)
+    moving = commands.reshape(len(pieces), -1, pieces.windows.motion.shape[2]).max(axis=1)[:, :joints]
+    resting = moving < settings.still
     real = pieces.real[:, pieces.warm_up :]
     at_rest = [_calmest(real[rests, :, joint], settings.usual) for joint, rests in enumerate(resting.T)]
     shaking = np.array([_shakes(x, noise.resolution, settings) for x in at_rest])

@@ -122,4 +122,6 @@ def _torque(plant: Plant, record: Record) -> np.ndarray:
     """Return what servos ask for at each command [N·m], latency and friction apart, shape (T, n_motors)."""
     servo, drive = change(plant, record.conditions).servo, plant.robot.drive
     error = record.targets + servo.offset - record.position[:-1][:, drive]
-    return np.clip(servo.kp * error - servo.kd * record.velocity[:-1][:, drive], -servo.limit, servo.limit)
+    speed, feed = (0.0, 0.0) if record.beside is None else np.hsplit(record.beside, 2)
+    wanted = servo.kp * error + servo.kd * (speed - record.velocity[:-1][:, drive]) + feed
+    return np.clip(wanted, -servo.limit, servo.limit)

@@ -95,7 +95,7 @@ def play(
     positions = [np.zeros(0)] * len(records)
     for group in group_alike([record.conditions for record in records]):
         held = Held.of(change(plant, records[group[0]].conditions), step, period)
-        paths = held.play([records[k].targets for k in group], [starts[k] for k in group], settle)
+        paths = held.play([records[k].commands for k in group], [starts[k] for k in group], settle)
         for k, path in zip(group, paths, strict=True):
             positions[k] = path
     return positions

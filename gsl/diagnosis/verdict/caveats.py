@@ -94,9 +94,11 @@ def _joints(findings: Findings) -> Iterator[str]:
     if log.comparison.shaking.any():
         names = _names(log.channels, log.comparison.shaking)
         yield f"These joints shake while their commands rest and are judged by the spectrum: {names}."
-    asked = np.array([np.ptp(record.targets, axis=0) for record in log.records]).max(axis=0)[: len(log.joints)]
+    sent = np.array([np.ptp(record.commands, axis=0) for record in log.records]).max(axis=0)
+    sent = sent.reshape(-1, log.records[0].targets.shape[1])[:, : len(log.joints)]
+    asked = sent[0]
     moved = np.array([np.ptp(record.position, axis=0) for record in log.records]).max(axis=0)
-    if (still := asked < log.settings.floor.still).any():
+    if (still := (sent < log.settings.floor.still).all(axis=0)).any():
         names = _names(log.joints, still)
         yield f"These joints are never commanded to move, so hardly anything can be said of them: {names}."
     if (stuck := (asked > how.asked) & (moved < how.stuck * asked)).any():

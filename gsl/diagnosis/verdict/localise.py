@@ -84,10 +84,13 @@ def find_regimes(log: Log, plant: Plant, settings: LocaliseSettings | None = Non
         settings: Where regimes begin and end.
     """
     how, cut, n = settings or LocaliseSettings(), log.pieces, len(log.joints)
-    kp, limit, no_load = _servos(cut, plant, n)
+    kp, kd, limit, no_load = _servos(cut, plant, n)
     real = cut.real[..., :n]
     speed = _smooth(np.gradient(real, log.period, axis=1))
-    wanted = np.abs(kp * (cut.targets(n) - real)) / limit
+    wanted = kp * (cut.targets(n) - real)
+    if (beside := cut.beside(n)) is not None:
+        wanted += kd * (beside[0] - speed) + beside[1]
+    wanted = np.abs(wanted) / limit
     share = np.abs(speed) / no_load
     tick = cut.tick[:, None] + np.arange(real.shape[1])
     length = np.array([len(log.records[k]) for k in cut.record])[:, None]
@@ -109,11 +112,11 @@ def find_regimes(log: Log, plant: Plant, settings: LocaliseSettings | None = Non
 
 
 def _servos(cut: Pieces, plant: Plant, joints: int) -> np.ndarray:
-    """Return kp, torque limit and no-load speed in each window, shape (3, W, 1, n_joints)."""
-    rows = np.empty((3, len(cut), 1, joints))
+    """Return kp, kd, torque limit and no-load speed in each window, shape (4, W, 1, n_joints)."""
+    rows = np.empty((4, len(cut), 1, joints))
     for conditions, index in cut.alike:
         servo = change(plant, conditions).servo
-        rows[:, index, 0] = np.array([servo.kp, servo.limit, servo.no_load_speed])[:, None, :joints]
+        rows[:, index, 0] = np.array([servo.kp, servo.kd, servo.limit, servo.no_load_speed])[:, None, :joints]
     return rows
 
 

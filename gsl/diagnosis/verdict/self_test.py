@@ -56,9 +56,11 @@ def relog(
         settings: How a record begins.
     """
     how, n = settings or VerdictSettings(), len(log.joints)
-    paths = [record.targets for record in log.records]
-    starts = [path[0] + how.start * rng.standard_normal(path.shape[1]) for path in paths]
-    played = play(log.records, plant, starts, step=step, period=log.period, settle=how.settle)
+    alone, drive = log.records[0].beside is None, log.robot.drive
+    paths = [record.targets[0] if alone else record.position[0, drive] for record in log.records]
+    starts = [path + how.start * rng.standard_normal(len(path)) for path in paths]
+    settle = how.settle if alone else 1  # a speed or a torque that is held for long takes the joints elsewhere
+    played = play(log.records, plant, starts, step=step, period=log.period, settle=settle)
     noisy = [path[:, :n] + log.comparison.floor * rng.standard_normal((len(path), n)) for path in played]
     return tuple(
         replace(record, position=position, velocity=slope(position, log.period))

@@ -177,7 +177,8 @@ def timings(joints: Sequence[int], rows: int) -> Iterator[Fault]:
 
 def gain_grid(joints: Sequence[int], plant: Plant) -> Iterator[Fault]:
     """Yield gains that are far off: both, or either, or each in the other's place."""
-    exchanged = (plant.servo.kd / plant.servo.kp)[list(joints)]
+    kp, kd = plant.servo.kp[list(joints)], plant.servo.kd[list(joints)]
+    exchanged = np.divide(kd, kp, out=np.ones_like(kp), where=(kp > 0.0) & (kd > 0.0))
     yield gains(exchanged.tolist(), (1.0 / exchanged).tolist(), joints)
     for factor in FACTORS:
         ones = [factor] * len(joints)

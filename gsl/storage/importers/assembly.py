@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gsl.core.labels import alike
+from gsl.core.other_commands import OTHER_COMMANDS
 from gsl.core.series import SAME, hold, interpolate, pieces
 from gsl.core.trajectory import Trajectory
 from gsl.effects.effect import together
@@ -22,6 +23,7 @@ from gsl.storage.signals.glitches import find_glitches, mend
 
 ARRAYS = (*COMMANDS, "position", "velocity")
 MOST_ROWS, FINER = 100_000, 20  # rows that any resampling may make, and for each row of a larger log
+SENT = ("action", *OTHER_COMMANDS)  # one of them there has to be
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,10 @@ def episodes(raw: Raw, mapping: LogMapping) -> list[Episode]:
     Raises:
         InputError: Its commands and positions do not overlap in time.
     """
-    stamps, commands = raw.signals["position"].stamps, raw.signals["action"].stamps
+    stamps, sent = raw.signals["position"].stamps, [raw.signals[name] for name in SENT if name in raw.signals]
+    if not sent:
+        raise InputError(f"{raw.name}: has no command, neither {' nor '.join(SENT)}")
+    commands = sent[0].stamps
     if len(stamps) < 2:
         raise InputError(f"{raw.name}: has {len(stamps)} row of positions; an episode takes two at least")
     if commands[0] >= stamps[-1] or (commands[-1] < stamps[0] and len(commands) > 1):
@@ -96,7 +101,12 @@ def _trajectory(raw: Raw, stamps: np.ndarray, mapping: LogMapping) -> Trajectory
     }
     velocity = values["velocity"] if "velocity" in values else np.gradient(values["position"], time, axis=0)
     grounded = values["grounded_action"][:-1] if "grounded_action" in values else None
-    return Trajectory(time, values["action"][:-1], values["position"], velocity, grounded, sensors=columns)
+    if "action" in values:
+        action = values["action"][:-1]
+    else:  # nothing pulls the joints towards a position
+        action = np.repeat(values["position"][:1], len(at) - 1, axis=0)
+        columns |= {f"kp_command.{joint}": np.zeros(len(at)) for joint in raw.joints}
+    return Trajectory(time, action, values["position"], velocity, grounded, sensors=columns)
 
 
 def _mend(one: Trajectory, mapping: LogMapping) -> Trajectory:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BeforeValidator
 
+from gsl.core.other_commands import OTHER_COMMANDS
 from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
 from gsl.effects.effect import build
@@ -114,7 +115,7 @@ class Mapping:
         if names is not None and (not names or len(set(names)) != len(names) or not all(names)):
             raise ConfigError("joints", "must be different names", given=", ".join(names) or "[]")
         for name in ("action", "position"):
-            if name not in self.signals:
+            if name not in self.signals and not (name == "action" and set(OTHER_COMMANDS) & set(self.signals)):
                 raise ConfigError(f"signals.{name}", "has no value; say in which column it is")
         for pattern in self.files.values() if isinstance(self.files, dict) else filter(None, [self.files]):
             if not pattern or pattern.startswith("/") or ".." in pattern.split("/"):
@@ -185,8 +186,7 @@ def _of_other_kind(unit: str) -> str:
             factor(unit, wanted)
         except ValueError:
             continue
-        beside = f"beside a position it is signals: {{{name}: ...}}"
-        return f"is a command of {kind}; servos here follow positions, others are not taken yet; {beside}"
+        return f"is a command of {kind}; it is signals: {{{name}: ...}}, beside an action or without any"
     return ""
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from gsl.core.other_commands import OTHER_COMMANDS
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.storage.importers.units import factor
@@ -14,7 +15,7 @@ from gsl.storage.importers.units import factor
 Columns = str | int | list[str | int] | dict[str, str | int]
 Values = float | dict[str, float]
 
-BESIDE = ("velocity_command", "torque_command")  # of a servo that takes more than a position
+BESIDE = (*OTHER_COMMANDS, "kp_command", "kd_command")  # of a servo that takes more than a position
 PER_JOINT = ("action", "grounded_action", "position", "velocity", "torque", "temperature", *BESIDE)
 COMMANDS = ("action", "grounded_action")
 FLAGS = ("enabled",)

@@ -15,6 +15,8 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
     "rad/s": {**{f"{name}/s": factor for name, factor in _ANGLES.items()}, "rpm": TURN / 60.0},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
     "N·m": {"Nm": 1.0, "mNm": 1e-3, "kgcm": GRAVITY / 100.0},
+    "N·m/rad": {"Nm/rad": 1.0, "Nm/deg": 1.0 / DEGREE},
+    "N·m·s/rad": {"Nms/rad": 1.0, "Nms/deg": 1.0 / DEGREE},
     "V": {"V": 1.0, "mV": 1e-3},
     "°C": {"degC": 1.0},
     "m/s²": {"m/s²": 1.0, "g": GRAVITY},

@@ -1,0 +1,105 @@
+"""Logs of servos with desired speeds, feed-forward torques and gains are replayed as they were sent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from swinging_arm import FEW, NOISE, PERIOD, arm, motions
+
+from gsl.core.plant import nominal
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.diagnosis.diagnose import diagnose
+from gsl.diagnosis.log.gains import with_logged_gains
+from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.simulate.calibration import no_shifts
+from gsl.diagnosis.simulate.simulator import compare_with_bullet, simulator_of
+from gsl.effects.effect import apply_all, build
+from gsl.errors import GslError
+from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.held import Held
+
+pytestmark = pytest.mark.slow
+
+STEP = 0.002
+GROUPS = ("velocity_command", "torque_command")
+
+
+def log(effects: Mapping[str, Any]) -> Batch:
+    """What the arm with effects logs of commands of all three kinds."""
+    robot, rng = arm(), np.random.default_rng(1)
+    held = Held.of(apply_all(nominal(robot), build(effects)), STEP, PERIOD)
+    return Batch(
+        tuple(played(held, targets, rng) for targets in motions().values()),
+        robot.controlled,
+        PERIOD,
+        {"episodes": [{"policy": name} for name in motions()], "world": {"step": STEP}},
+    )
+
+
+def played(held: Held, targets: np.ndarray, rng: np.random.Generator) -> Trajectory:
+    time = PERIOD * np.arange(len(targets) + 1)
+    waves = [size * np.sin(speed * time[:, None] + rng.uniform(0, 6, 2)) for size, speed in ((1.5, 7.0), (0.8, 11.0))]
+    others = np.hstack(waves)
+    path = held.play([np.hstack([targets, others[:-1]])], [targets[0]], settle=1)[0]
+    position = path + NOISE * rng.standard_normal(path.shape)
+    names = [f"{group}.{joint}" for group in GROUPS for joint in arm().controlled]
+    return Trajectory(time, targets, position, 0.0 * position, sensors=dict(zip(names, others.T, strict=True)))
+
+
+def residual(batch: Batch) -> float:
+    """Root mean square of what a replay in the nominal arm leaves [floors]."""
+    cut = cut_log(batch, arm())
+    simulator = simulator_of(cut, nominal(arm()), STEP)
+    z = cut.residual(simulator.simulate({}, no_shifts(2), cut.pieces))
+    return float(np.sqrt(np.mean(z**2)))
+
+
+def test_a_replay_leaves_noise_where_it_sends_what_was_sent() -> None:
+    batch = log({})
+    assert residual(batch) < 1.3
+    without = replace(batch, episodes=tuple(replace(one, sensors={}) for one in batch.episodes))
+    assert residual(without) > 10.0
+
+
+def test_bullet_replays_the_same_commands() -> None:
+    cut = cut_log(log({}), arm())
+    simulator = simulator_of(cut, nominal(arm()), STEP)
+    assert compare_with_bullet(cut, simulator, {}, no_shifts(2))["chain_rms_mrad"] < 2.0
+
+
+def test_a_latency_delays_all_commands_and_is_named() -> None:
+    result = diagnose(log({"command_latency": {"delay": 0.03}}), nominal(arm()), STEP, FEW, lambda phase: None)
+    assert result.selection.chosen.names == ("command_latency",), result.verdict
+    assert result.selection.chosen.parameters[0][0] == pytest.approx(0.03, rel=0.05)
+
+
+SIM = BulletWorld("pendulum", {}, floating=False)
+KP, KD = (float(values[0]) for values in (SIM.plant.servo.kp, SIM.plant.servo.kd))
+
+
+def columns(kp: np.ndarray, kd: np.ndarray) -> list[Mapping[str, np.ndarray]]:
+    return [{"kp_command.joint": np.append(kp, np.nan), "kd_command.joint": np.append(kd, np.nan)}]
+
+
+@pytest.mark.parametrize("gains", [(2.0 * KP, 0.5 * KD), (0.0, KD)])
+def test_the_servos_get_the_gains_of_the_log(gains: tuple[float, float]) -> None:
+    told = columns(*(np.full(9, gain) for gain in gains))
+    sim = with_logged_gains(SIM, told, "log")
+    np.testing.assert_allclose([sim.plant.servo.kp[0], sim.plant.servo.kd[0]], gains)
+    assert with_logged_gains(sim, told, "log") is sim
+
+
+def test_a_log_without_gains_or_with_those_of_the_simulator_changes_nothing() -> None:
+    for told in ([{}], columns(np.full(9, KP), np.full(9, KD))):
+        assert with_logged_gains(SIM, told, "log") is SIM
+
+
+def test_gains_that_vary_or_are_below_zero_are_refused_in_one_line() -> None:
+    with pytest.raises(GslError, match=r"log: kp_command\.joint varies from 0 to 8; replays take .* constant"):
+        with_logged_gains(SIM, columns(np.arange(9.0), np.full(9, KD)), "log")
+    with pytest.raises(GslError, match=r"log: kd_command\.joint is -1; a gain is not below 0"):
+        with_logged_gains(SIM, columns(np.full(9, KP), np.full(9, -1.0)), "log")
