@@ -36,8 +36,8 @@ def account(artifact: Artifact) -> list[Told]:
     """Return the results of an artifact; where no table tells them, its metrics by name."""
     tell = _TELLERS.get(artifact.manifest.kind, _of_others)
     try:
-        told = tell(artifact.folder, artifact.metrics, unit_of(artifact))
-        return [told] if isinstance(told, Told) else told
+        result = tell(artifact.folder, artifact.metrics, unit_of(artifact))
+        return [result] if isinstance(result, Told) else result
     except (InputError, OSError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, StopIteration):
         return [_plain(artifact)]
 
@@ -66,18 +66,18 @@ def _import(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 
 def _of_states(metrics: Mapping[str, Any], what: str) -> Told | None:
     """Return how a model of states does on held-out steps; none for one of joints."""
-    found = metrics["heldout"]
-    if "space" not in metrics or not {"r2", "action_r2"} & found.keys():
+    heldout = metrics["heldout"]
+    if "space" not in metrics or not {"r2", "action_r2"} & heldout.keys():
         return None
-    each = [(f"state.{name}", value) for name, value in found.get("r2_by_variable", {}).items()]
-    rows = [*each, ("all", found["r2"])] if "r2" in found else [("actions", found["action_r2"])]
+    each = [(f"state.{name}", value) for name, value in heldout.get("r2_by_variable", {}).items()]
+    rows = [*each, ("all", heldout["r2"])] if "r2" in heldout else [("actions", heldout["action_r2"])]
     shown = [(name, f"{100.0 * value:.1f} %") for name, value in rows]
     return Told(f"{what} ({metrics['family']}) on held-out trajectories", ("of", "variance explained"), shown)
 
 
 def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    if told := _of_states(metrics, "forward model"):
-        return told
+    if table := _of_states(metrics, "forward model"):
+        return table
     names = {
         "one_step_deg": "one tick [°]",
         "one_step_no_change_deg": "no change, one tick [°]",
@@ -99,8 +99,8 @@ def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told
 
 
 def _train_inverse(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    if told := _of_states(metrics, "inverse model"):
-        return told
+    if table := _of_states(metrics, "inverse model"):
+        return table
     measured = metrics["heldout"]
     title = f"inverse model ({metrics['method']}, {metrics['family']}) on held-out simulated trajectories"
     row = (_number(measured["recovered_action_deg"]), _worst(measured["recovered_action_by_joint_deg"]))
@@ -110,8 +110,13 @@ def _train_inverse(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told
 def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     groups = {"all": metrics, **metrics["groups"]}
     rows = [
-        (name, f"{one['floors_before']:.2f}", f"{one['floors_after']:.2f}", "yes" if one["learned"] else "no")
-        for name, one in groups.items()
+        (
+            name,
+            f"{figures['floors_before']:.2f}",
+            f"{figures['floors_after']:.2f}",
+            "yes" if figures["learned"] else "no",
+        )
+        for name, figures in groups.items()
     ]
     titles = ("joints", "simulator", "with the learned servo", "learned")
     below = f"what it has learned: {folder.as_posix()}/servo.png"
@@ -121,9 +126,9 @@ def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 def _optimize(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
     document = read_json(folder / "policies.json")
     rows = [
-        (str(one["generation"]), str(one["name"]), unit.bare(one["value_sim"]))
-        for one in document["policies"]
-        if one["generation"]
+        (str(policy["generation"]), str(policy["name"]), unit.bare(policy["value_sim"]))
+        for policy in document["policies"]
+        if policy["generation"]
     ]
     titles = ("generation", "policy", in_unit("in simulation", unit.name))
     problems = _problems(folder)
@@ -143,10 +148,10 @@ def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
 def evaluation_table(document: Mapping[str, Any], unit: Unit) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return titles and rows of what evaluation.json holds."""
     phases = {"policies": "", "check": ", checked", "confirmation": ", fresh"}
-    found = [(one, f"{one['name']}{purpose}") for phase, purpose in phases.items() for one in document[phase]]
-    told = list(dict.fromkeys(name for one, _ in found for name in one["outcome"]))
-    rows = [tuple(cells(one | {"interval": _bounds(one["interval"])}, name, unit, told)) for one, name in found]
-    return tuple(columns(told, unit)), rows
+    named = [(row, f"{row['name']}{purpose}") for phase, purpose in phases.items() for row in document[phase]]
+    outcomes = list(dict.fromkeys(name for row, _ in named for name in row["outcome"]))
+    rows = [tuple(cells(row | {"interval": _bounds(row["interval"])}, name, unit, outcomes)) for row, name in named]
+    return tuple(columns(outcomes, unit)), rows
 
 
 def _bounds(interval: list[float | None]) -> list[float]:
@@ -162,10 +167,10 @@ def describe_choice(metrics: Mapping[str, Any], unit: Unit) -> str:
         return f"no {better}: {metrics['best']} is returned; {spent}"
     gain, after, before = metrics["gain"], metrics["returned"], metrics["baseline"]
     bounds = unit.interval(gain["interval"], sign=True)
-    values = f"{unit.shown(after['value'])}, {unit.ended(after)}; π0 {unit.shown(before['value'])}"
-    told = f"on fresh episodes {values}; gain {unit.shown(gain['value'], sign=True)}, 95 % interval {bounds}"
+    values = f"{unit.format(after['value'])}, {unit.describe_ends(after)}; π0 {unit.format(before['value'])}"
+    worth = f"on fresh episodes {values}; gain {unit.format(gain['value'], sign=True)}, 95 % interval {bounds}"
     doubt = "" if gain["interval"][0] > 0.0 else ", not surely a gain" if gain["value"] > 0.0 else ": worse than π0"
-    return f"{metrics['best']} is returned: {told}{doubt}; {spent}"
+    return f"{metrics['best']} is returned: {worth}{doubt}; {spent}"
 
 
 def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:

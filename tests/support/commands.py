@@ -78,13 +78,13 @@ def started(*arguments: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
 
 def session(leader: int) -> list[int]:
     """Return the processes of a session that are still running, zombies left out."""
-    found = []
+    processes = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
             state, *_, owner = path.read_text().rpartition(")")[2].split()[:4]
             if int(owner) == leader and state != "Z":
-                found.append(int(path.parent.name))
-    return found
+                processes.append(int(path.parent.name))
+    return processes
 
 
 def eventually(condition: Callable[[], object], *, seconds: float = 60.0) -> bool:

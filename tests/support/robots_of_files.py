@@ -50,8 +50,8 @@ def as_bullet_reads(path: Path) -> Iterator[Told]:
         import pybullet
 
         client = pybullet.connect(pybullet.DIRECT)
-        told = Told(pybullet, client, path)
+        reading = Told(pybullet, client, path)
     try:
-        yield told
+        yield reading
     finally:
         pybullet.disconnect(client)

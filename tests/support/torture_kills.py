@@ -119,9 +119,9 @@ def again(folder: Path, words: tuple[str, ...], wanted: dict[str, str], counts: 
         path.unlink() if path.is_file() else shutil.rmtree(path, ignore_errors=True)
 
 
-def _bad(wrong: bool, words: tuple[str, ...], told: str) -> bool:
+def _bad(wrong: bool, words: tuple[str, ...], problem: str) -> bool:
     if wrong:
-        sys.stderr.write(f"! {' '.join(words)[:200]}: {told[-400:]}\n")
+        sys.stderr.write(f"! {' '.join(words)[:200]}: {problem[-400:]}\n")
     return wrong
 
 
