@@ -85,7 +85,7 @@ def test_a_toy_goes_from_end_to_end(toy: Path) -> None:
     results = json.loads((toy / "runs/toy/blind_reveal/results.json").read_text())
     assert results.keys() == {"gsl", "everything", "one_step", "rules", "training_error"}
     assert results["gsl"]["cases"] == 2
-    assert all(one["longest_seconds"] > 0.0 for one in results.values())
+    assert all(case["longest_seconds"] > 0.0 for case in results.values())
     assert "| top-1, medium and strong |" in (toy / "runs/toy/blind_reveal/results.md").read_text()
 
 
