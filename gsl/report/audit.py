@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
+
+from gsl.report.tables import Table
 
 HEADLINES = {
     "clean": "The wiring is in order",
     "unclear": "The wiring fits, but a shift by rows and a latency look alike here",
     "wiring": "It is wiring",
 }
-
-Table = tuple[str, tuple[str, ...], Sequence[tuple[str, ...]], str]
 
 
 def audit_table(document: Mapping[str, Any]) -> Table:
@@ -21,10 +21,10 @@ def audit_table(document: Mapping[str, Any]) -> Table:
     ]
     below = list(document["remarks"])
     if not rows:
-        return HEADLINES[document["verdict"]], ("", ""), [("audit", document["summary"])], "\n".join(below)
+        return Table(HEADLINES[document["verdict"]], ("", ""), [("audit", document["summary"])], "\n".join(below))
     below.append("Mend this first: a diagnosis would take it for physics.")
     columns = ("kind", "what is wrong", "what to do", "gap / noise")
-    return HEADLINES[document["verdict"]], columns, rows, "\n".join(below)
+    return Table(HEADLINES[document["verdict"]], columns, rows, "\n".join(below))
 
 
 def _sentence(finding: Mapping[str, Any]) -> str:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator
 
 from gsl.report.diagnosis_limits import limits_sentence
 from gsl.report.diagnosis_next import steps
@@ -31,42 +30,34 @@ from gsl.report.diagnosis_words import (
     share,
     value,
 )
+from gsl.report.tables import Table
 
 CAUSES, JOINTS, CAVEATS = 8, 5, 3  # rows at most
 
 
-class Told(NamedTuple):
-    """A table with its title and what is said below it: the arguments of the console's `table`."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    caption: str | None = None
-
-
-def summary_lines(document: Document) -> list[Told]:
+def summary_lines(document: Document) -> list[Table]:
     """Return what a terminal shows: what was found, where, and what to do next."""
     where = _where(document)
     return [_causes(document), *([where] if where.rows else []), _next(document)]
 
 
-def _causes(document: Document) -> Told:
+def _causes(document: Document) -> Table:
     summary = "\n".join(filter(None, [str(document.get("summary") or ""), *policy_lines(document)])) or None
     if verdict(document) == "wiring":
         findings = [
             (read_word(finding, "kind"), read_word(finding, "sentence")) for finding in entries(document, "wiring")
         ]
-        return Told(headline(document), ("kind", "what is wrong"), findings)
+        return Table(headline(document), ("kind", "what is wrong"), findings)
     rows = [*_list_causes(document)]
     if not rows:
         alike = [("either", alternatives(group)) for group in entries(document, "inseparable")]
         alike += [("nearest", nearest(document))] if nearest(document) else []
-        return Told(headline(document), ("", ""), [*alike, *_shrinkage(document)], summary)
+        return Table(headline(document), ("", ""), [*alike, *_shrinkage(document)], summary)
     columns = ("cause", "parameter", "value", "95 % interval", "probability", "of the rest, back without it")
     caption = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
     more = [f"and {len(rows) - CAUSES} more, in the report"] if len(rows) > CAUSES else []
     lines = "\n".join([*more, *filter(None, [summary]), *caption])
-    return Told(headline(document), columns, rows[:CAUSES], lines or None)
+    return Table(headline(document), columns, rows[:CAUSES], lines or None)
 
 
 def _list_causes(document: Document) -> Iterator[tuple[str, ...]]:
@@ -84,7 +75,7 @@ def _shrinkage(document: Document) -> list[tuple[str, str]]:
     return [(key, sentence) for key, sentence in sentences.items() if sentence]
 
 
-def _where(document: Document) -> Told:
+def _where(document: Document) -> Table:
     worst = places(document)
     rows = [
         (
@@ -99,10 +90,10 @@ def _where(document: Document) -> Told:
     columns = ("joint", "share of the excess", "95 % interval", "gap / noise", "most when")
     more = f" (and {len(worst) - JOINTS} more joints)" if len(worst) > JOINTS else ""
     shrinks = shrinkage_sentence(document) if entries(document, "causes") else None
-    return Told(f"where the gap is{more}", columns, rows, shrinks)
+    return Table(f"where the gap is{more}", columns, rows, shrinks)
 
 
-def _next(document: Document) -> Told:
+def _next(document: Document) -> Table:
     files = {"report": "report", "world_file": "corrected simulator"}
     rows = [(words, str(document[key])) for key, words in files.items() if document.get(key)]
     doubts = [str(caveat) for caveat in entries(document, "caveats")]
@@ -111,4 +102,4 @@ def _next(document: Document) -> Told:
     lines += [
         text for step in steps(document) for text in (step.why, *(f"    {line}" for line in step.command.splitlines()))
     ]
-    return Told("what next", ("", ""), rows or [("report", "report.html")], "\n".join(lines))
+    return Table("what next", ("", ""), rows or [("report", "report.html")], "\n".join(lines))

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 STEP, SECONDS = 0.1, 0.5  # of the answer to a step [rad], [s]
 SETTLE = 50  # control periods at rest before it
-SLOPE = 1.0  # of the ramps whose following error tells friction, at most this share of the fastest speed
 
 
 def servo_curves(path: Path, plant: Plant, model: ServoModel, step: float, period: float) -> None:
