@@ -61,19 +61,26 @@ def _files(folder: Path) -> list[Path]:
 
 
 @contextlib.contextmanager
+def ending(process: subprocess.Popen[str]) -> Iterator[None]:
+    """End a process that leads a session, and its workers, with the block."""
+    try:
+        yield
+    finally:
+        for number in session(process.pid):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(number, 9)
+        process.communicate()
+
+
+@contextlib.contextmanager
 def started(*arguments: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
     """Start a command line as a process that leads a session of its own; its workers end with the block."""
     process = subprocess.Popen(
         [sys.executable, "-m", "gsl", *arguments], cwd=folder, env=ENVIRONMENT, start_new_session=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    try:
+    with ending(process):
         yield process
-    finally:
-        for number in session(process.pid):
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(number, 9)
-        process.communicate()
 
 
 def session(leader: int) -> list[int]:
