@@ -44,7 +44,9 @@ def read_motion() -> Log:
     place = ROOT / "data/real_logs/so101_arm/repeat3_2026-02-03/multisine"
     commanded, measured = (pd.read_csv(place / name) for name in ("control.csv.gz", "state_motor.csv.gz"))
     rows = min(len(commanded), len(measured))
-    action, position = (np.array(one["positions"].map(json.loads).to_list())[:rows] for one in (commanded, measured))
+    action, position = (
+        np.array(table["positions"].map(json.loads).to_list())[:rows] for table in (commanded, measured)
+    )
     return Log(1e-6 * measured["timestamp"].to_numpy()[:rows], action, position)
 
 
@@ -135,7 +137,7 @@ def unitree(folder: Path, log: Log, storage: str) -> tuple[str, ...]:
             for topic, (name, here, speed) in motors.items():
                 motor, q, dq = store.types[f"unitree_go/msg/{name}"], np.zeros(20), np.zeros(20)
                 q[list(MOTORS)], dq[list(MOTORS)] = here, speed
-                message = store.types[kinds[topic]]([motor(1, *one, 0.0) for one in zip(q, dq, strict=True)])
+                message = store.types[kinds[topic]]([motor(1, *motion, 0.0) for motion in zip(q, dq, strict=True)])
                 bag.write(places[topic], START + round(1e9 * at), store.serialize_cdr(message, kinds[topic]))
     return (f"source={folder / 'bag'}", "mapping=unitree_go2", "~mapping.signals.torque")
 
@@ -233,7 +235,7 @@ def lerobot_3(folder: Path, log: Log) -> tuple[str, ...]:
 
 CHIRP = (npz, npy, pace, matlab, hdf5, csv, parquet, json_lines, mcap, rosbag2, rosbag1)
 MOTION = (lerobot_2, lerobot_3)
-FORMATS: Mapping[str, Callable[[Path, Log], tuple[str, ...]]] = {one.__name__: one for one in (*CHIRP, *MOTION)}
+FORMATS: Mapping[str, Callable[[Path, Log], tuple[str, ...]]] = {write.__name__: write for write in (*CHIRP, *MOTION)}
 
 
 def write(folder: Path, name: str) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from gsl.rollout.rollout import Scenario
 from gsl.storage.trajectories import write
 from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld
-from gsl_benchmarks.loop import LearnedWorld, loops, untrained
+from gsl_benchmarks.loop import LearnedWorld, loops, make_untrained
 
 FIGURES: Mapping[str, tuple[str, float | None]] = {
     "loop_ratio": ("control loop / bare physics steps", 1.30),
@@ -49,7 +49,7 @@ EPISODES = 30  # in the file whose writing is measured
 
 def run_bench(console: Console) -> None:
     """Measure everything, and print a table or exactly the figures as JSON."""
-    figures = measured(console)
+    figures = measure(console)
     rows = [judge(name, figures[name]) for name in FIGURES]
     title = f"CPU time of π0 in nao_ideal, {os.cpu_count()} cores"
     console.table(title, ("figure", "is", "measured", "target", ""), rows)
@@ -57,14 +57,14 @@ def run_bench(console: Console) -> None:
         console.result(figures)
 
 
-def measured(console: Console) -> dict[str, float]:
+def measure(console: Console) -> dict[str, float]:
     """Return all figures by name."""
     world = BulletWorld(robot="nao", effects={})
     scenario = Scenario(world, Walk(), WalkEngine(), SIM, NoGrounding())
     console.status("control loops without grounding")
     bare = loops(scenario, REPEATS)
     console.status("control loops with an MLP grounding")
-    grounded = loops(untrained(scenario), REPEATS)
+    grounded = loops(make_untrained(scenario), REPEATS)
     console.status("control loops with a learned servo")
     learned = loops(replace(scenario, world=LearnedWorld(world)), REPEATS)
     console.status(f"{ROLLOUTS} rollouts in one process and in {WORKERS}")
@@ -117,11 +117,11 @@ def _clocks() -> dict[int, float]:
     """CPU time so far [s] of each worker, by process number."""
     import joblib
 
-    found: dict[int, float] = {}
-    while len(found) < WORKERS:
+    seconds: dict[int, float] = {}
+    while len(seconds) < WORKERS:
         tasks = (joblib.delayed(_clock)() for _ in range(2 * WORKERS))
-        found = dict(joblib.Parallel(n_jobs=WORKERS, batch_size=1)(tasks))
-    return found
+        seconds = dict(joblib.Parallel(n_jobs=WORKERS, batch_size=1)(tasks))
+    return seconds
 
 
 def _clock() -> tuple[int, float]:

@@ -24,7 +24,7 @@ from gsl.storage.hashing import file_hash
 from gsl.storage.records import Records
 from gsl.storage.trajectories import read
 from gsl.worlds.bullet import BulletWorld
-from gsl_benchmarks.blind.answer import Question, answered, answered_by_baselines
+from gsl_benchmarks.blind.answer import Question, answer_by_baselines, answer_question
 from gsl_benchmarks.blind.files import (
     ANSWERS,
     BASELINES,
@@ -36,7 +36,7 @@ from gsl_benchmarks.blind.files import (
     SEALS,
     answers_below,
     document,
-    found,
+    find,
     read_case,
     seals_of,
 )
@@ -75,7 +75,7 @@ class BlindAnswer:
 
     def parents(self) -> Mapping[str, Path]:
         """Return the seals of the data, which hold the hash of every file of it."""
-        return {"data": found(self.data, SEALS, "blind_make")}
+        return {"data": find(self.data, SEALS, "blind_make")}
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write an answer for each case, and the hash of all."""
@@ -93,7 +93,7 @@ class BlindAnswer:
         sealed = {"schema_version": VERSION, "data": file_hash(seals), "answers": hashes, "total": total(hashes)}
         documents.write_json(folder / SEAL, sealed)
         (folder / ANSWERED).unlink()  # its order is that in which the answers came
-        words = [one["verdict"] for one in answers]
+        words = [answer["verdict"] for answer in answers]
         return {
             "cases": len(answers),
             "verdicts": {word: words.count(word) for word in sorted(set(words))},
@@ -135,7 +135,7 @@ def _leaders(cases: Sequence[Path]) -> dict[Path, Path]:
     asked = {case: document(case / CASE) for case in cases}
     first: dict[str, Path] = {}
     leaders = {}
-    for case in sorted(cases, key=lambda one: (bool(asked[one].get("without")), one)):
+    for case in sorted(cases, key=lambda path: (bool(asked[path].get("without")), path)):
         log = read(case / LOG)
         digest = hashlib.sha256(
             documents.text([asked[case]["sim"], (case / REFERENCE).exists(), on_ground(log)]).encode()
@@ -164,16 +164,16 @@ def _answer(frozen: bytes, task: _Task) -> tuple[dict[str, str], dict[str, float
     question, without = _question(task.case)
     asked = replace(options, without=tuple(without))
     files, seconds = [], {}
-    for name, (told, took) in (answered_by_baselines(question, asked, _quiet) if baselines else {}).items():
+    for name, (answer, took) in (answer_by_baselines(question, asked, _quiet) if baselines else {}).items():
         (task.folder / BASELINES / name).mkdir(parents=True, exist_ok=True)
         files.append(task.folder / BASELINES / name / f"{task.case.name}.json")
-        documents.write_json(files[-1], told)
+        documents.write_json(files[-1], answer)
         seconds[name] = took
     begin = time.perf_counter()
-    told = answered(question, asked, known_nulls=task.nulls, tick=_quiet)
+    answer = answer_question(question, asked, known_nulls=task.nulls, tick=_quiet)
     seconds[OURS] = time.perf_counter() - begin
     files.append(_file(task.folder, task.case))
-    documents.write_json(files[-1], told)
+    documents.write_json(files[-1], answer)
     return {path.relative_to(task.folder).as_posix(): file_hash(path) for path in files}, seconds
 
 

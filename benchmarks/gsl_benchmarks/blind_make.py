@@ -22,8 +22,8 @@ from gsl_benchmarks.blind.label import WALK
 from gsl_benchmarks.blind.make import Workshop, rng_of
 from gsl_benchmarks.blind.mix import Mix, Slot, slots, walk_slots
 from gsl_benchmarks.blind.on_foot import Track
-from gsl_benchmarks.blind.programmes import drawn_programmes
-from gsl_benchmarks.blind.seals import VERSION, files_below, nonce_of, sealed
+from gsl_benchmarks.blind.programmes import draw_programmes
+from gsl_benchmarks.blind.seals import VERSION, files_below, hash_label, nonce_of
 from gsl_benchmarks.blind.walks import Walks
 
 
@@ -70,9 +70,7 @@ class BlindMake:
         """Write the cases and their seals into the folder, and the labels into another one."""
         secret = self._secret(folder)
         world, orders = self.sim, self._orders(folder, secret)
-        drawn = drawn_programmes(
-            self.excitation, self.programmes, world.period, rng_of(secret, self.seed, "programmes")
-        )
+        drawn = draw_programmes(self.excitation, self.programmes, world.period, rng_of(secret, self.seed, "programmes"))
         workshop = Workshop(world.plant, world.step, world.period, tuple(drawn))
         shared = (
             workshop,
@@ -80,11 +78,11 @@ class BlindMake:
             {key: value for key, value in describe(world).items() if key != "_target_"},
         )
         with console.progress(len(orders), "making cases") as progress:
-            made = in_parallel(_made, shared, orders, self.workers, progress)
+            made = in_parallel(_make, shared, orders, self.workers, progress)
         labels = {order.name: label for order, label in zip(orders, made, strict=True)}
         nonces = {name: nonce_of(secret, name) for name in labels}
         seals = {
-            name: {"label": sealed(nonces[name], label), "files": files_below(folder / CASES / name)}
+            name: {"label": hash_label(nonces[name], label), "files": files_below(folder / CASES / name)}
             for name, label in labels.items()
         }
         documents.write_json(folder / SEALS, {"schema_version": VERSION, "cases": seals})
@@ -117,13 +115,13 @@ class BlindMake:
 
     def _keep(self, labels: Mapping[str, Any]) -> None:
         """Write the labels; those of another benchmark stay."""
-        path, told = Path(self.labels) / LABELS, documents.text({"schema_version": VERSION, "cases": labels}, indent=2)
-        if path.exists() and path.read_text(encoding="utf-8").strip() != told:
+        path, text = Path(self.labels) / LABELS, documents.text({"schema_version": VERSION, "cases": labels}, indent=2)
+        if path.exists() and path.read_text(encoding="utf-8").strip() != text:
             raise GslError(f"{path}: holds the labels of another benchmark; choose another labels=")
         documents.write_json(path, {"schema_version": VERSION, "cases": labels})
 
 
-def _made(frozen: bytes, order: _Order) -> dict[str, Any]:
+def _make(frozen: bytes, order: _Order) -> dict[str, Any]:
     """Make and write one case; return its label."""
     workshop, track, world = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
     place = track if order.slot.kind == WALK else workshop

@@ -13,9 +13,9 @@ from gsl.storage import documents
 from gsl.storage.hashing import file_hash
 from gsl.storage.step_metrics import read_steps
 from gsl_benchmarks.blind.figures import figures
-from gsl_benchmarks.blind.files import ANSWERS, BASELINES, LABELS, SEAL, SEALS, answers_below, document, found, seals_of
+from gsl_benchmarks.blind.files import ANSWERS, BASELINES, LABELS, SEAL, SEALS, answers_below, document, find, seals_of
 from gsl_benchmarks.blind.label import WALK, Label
-from gsl_benchmarks.blind.mark import Mark, marked
+from gsl_benchmarks.blind.mark import Mark, mark_answer
 from gsl_benchmarks.blind.results import OURS, markdown, results
 from gsl_benchmarks.blind.seals import check_label
 
@@ -35,9 +35,9 @@ class BlindReveal:
     def parents(self) -> Mapping[str, Path]:
         """Return the seals of data and answers, and the labels."""
         return {
-            "data": found(self.data, SEALS, "blind_make"),
-            "answers": found(self.answers, SEAL, "blind_answer"),
-            "labels": found(self.labels, LABELS, "blind_make"),
+            "data": find(self.data, SEALS, "blind_make"),
+            "answers": find(self.answers, SEAL, "blind_answer"),
+            "labels": find(self.labels, LABELS, "blind_make"),
         }
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
@@ -55,14 +55,14 @@ class BlindReveal:
         seals = f"data {file_hash(files['data'])[:16]}, answers {document(files['answers'], total=str)['total'][:16]}"
         about = f"{len(labels)} cases; every seal holds ({seals})."
         (folder / TABLE).write_text(markdown(marks, about), encoding="utf-8")
-        judged = [one for one in figures(marks[OURS]) if one.met is not None]
-        met = sum(bool(one.met) for one in judged)
+        judged = [figure for figure in figures(marks[OURS]) if figure.met is not None]
+        met = sum(bool(figure.met) for figure in judged)
         return {
             "headline": f"{met} of {len(judged)} thresholds are met in {len(labels)} cases",
             "cases": len(labels),
             "met": met,
             "judged": len(judged),
-            "figures": {f"{one.name}, {one.generator}": one.value for one in judged},
+            "figures": {f"{figure.name}, {figure.generator}": figure.value for figure in judged},
         }
 
 
@@ -110,7 +110,7 @@ def _mark(label: Label, path: Path, seconds: float | None) -> Mark:
     """
     answer = {"seconds": seconds, **document(path, verdict=str)}
     try:
-        return marked(label, answer)
+        return mark_answer(label, answer)
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
         problem = f"is no answer as docs/reference/blind.md has it ({type(error).__name__}: {error})"
         raise ArtifactError(path, problem) from error

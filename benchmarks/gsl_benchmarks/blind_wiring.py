@@ -23,10 +23,10 @@ from gsl.rollout.parallel import Workers, in_parallel
 from gsl.storage import documents
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.velocity_motors import check_servos
-from gsl_benchmarks.blind.dials import drawn, visible
-from gsl_benchmarks.blind.jitter import NOISE, jittered
+from gsl_benchmarks.blind.dials import draw, visible
+from gsl_benchmarks.blind.jitter import NOISE, jitter
 from gsl_benchmarks.blind.make import START
-from gsl_benchmarks.blind.programmes import Programme, drawn_programmes
+from gsl_benchmarks.blind.programmes import Programme, draw_programmes
 from gsl_benchmarks.blind.same import play_same
 from gsl_benchmarks.blind.wiring import KINDS, wire
 
@@ -68,7 +68,7 @@ class BlindWiring:
         kinds = tuple(KINDS)
         slots = [_Slot(k, kinds[k % len(kinds)], k // len(kinds) % 2 == 1) for k in range(self.faults)]
         slots += [_Slot(self.faults + k, CLEAN if k % 3 == 0 else PHYSICS, k % 3 != 0) for k in range(self.others)]
-        programme = drawn_programmes(self.excitation, 1, self.sim.period, np.random.default_rng(self.seed))[0]
+        programme = draw_programmes(self.excitation, 1, self.sim.period, np.random.default_rng(self.seed))[0]
         shared = (self.sim.plant, self.sim.step, self.sim.period, programme, self.seed)
         with console.progress(len(slots), "making and auditing cases") as progress:
             cases = in_parallel(_case, shared, slots, self.workers, progress)
@@ -83,7 +83,7 @@ def _case(frozen: bytes, slot: _Slot) -> dict[str, Any]:
     rng = np.random.default_rng([seed, slot.number])
     effects = _draw_effect(plant, rng) if slot.beside else {}
     robot, noise, start_rng = (
-        jittered(plant, rng),
+        jitter(plant, rng),
         float(rng.uniform(*NOISE)),
         np.random.default_rng(rng.integers(2**32)),
     )
@@ -97,22 +97,22 @@ def _case(frozen: bytes, slot: _Slot) -> dict[str, Any]:
     else:
         log, against, kind, joints = play(programme.commands), plant, "", ()
     begin = time.process_time()
-    found = audit(log, against, step, lambda: None)
-    answer = found.document()
+    result = audit(log, against, step, lambda: None)
+    answer = result.document()
     return {
         "kind": slot.kind,
         "truth": kind,
         "joints": list(joints),
         "effects": effects,
-        "verdict": found.verdict,
-        "found": [{"kind": one["kind"], "joints": sorted(one["joints"])} for one in answer["findings"]],
-        "sentences": [one["sentence"] for one in answer["findings"]],
+        "verdict": result.verdict,
+        "found": [{"kind": finding["kind"], "joints": sorted(finding["joints"])} for finding in answer["findings"]],
+        "sentences": [finding["sentence"] for finding in answer["findings"]],
         "cpu": time.process_time() - begin,
     }
 
 
 def _draw_effect(plant: Plant, rng: np.random.Generator) -> dict[str, Any]:
-    dial = drawn(str(rng.choice(visible())), plant.robot, rng)
+    dial = draw(str(rng.choice(visible())), plant.robot, rng)
     return {dial.effect: dial.entry(float(rng.uniform(*SHARES)))}
 
 
@@ -122,7 +122,7 @@ def _record(
 ) -> Batch:  # fmt: skip
     body = lump(robot.robot)
     n = len(body.controlled)
-    targets = [one[:, body.drive] for one in commands]
+    targets = [command[:, body.drive] for command in commands]
     starts = [path[0] + START * rng.standard_normal(len(path[0])) for path in targets]
     episodes = []
     for asked, measured in zip(commands, play_same(robot, effects, None, targets, starts, period), strict=True):
@@ -131,30 +131,30 @@ def _record(
         episodes.append(Trajectory(times, asked, position, slope(position, period)))
     about = {"robot": body.name, "role": "real", "source": "gsl blind"}
     return Batch(
-        tuple(episodes), body.controlled, period, {**about, "episodes": [{"policy": one} for one in programme.names]}
+        tuple(episodes), body.controlled, period, {**about, "episodes": [{"policy": name} for name in programme.names]}
     )
 
 
 def _right_kind(case: Mapping[str, Any]) -> bool:
-    return bool(case["found"]) and case["truth"] in {one["kind"] for one in case["found"]}
+    return bool(case["found"]) and case["truth"] in {finding["kind"] for finding in case["found"]}
 
 
 def _right(case: Mapping[str, Any]) -> bool:
     """Whether the kind is right, and its joints are exactly those that have the fault."""
-    joints = {joint for one in case["found"] if one["kind"] == case["truth"] for joint in one["joints"]}
+    joints = {joint for finding in case["found"] if finding["kind"] == case["truth"] for joint in finding["joints"]}
     return _right_kind(case) and joints == set(case["joints"])
 
 
 def _figures(cases: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    faults, others = [one for one in cases if one["truth"]], [one for one in cases if not one["truth"]]
+    faults, others = [case for case in cases if case["truth"]], [case for case in cases if not case["truth"]]
     return {
         "faults": len(faults),
         "right_kind": sum(map(_right_kind, faults)),
         "right_kind_and_joints": sum(map(_right, faults)),
-        "missed": sum(one["verdict"] != "wiring" for one in faults),
+        "missed": sum(case["verdict"] != "wiring" for case in faults),
         "others": len(others),
-        "false_alarms": sum(one["verdict"] == "wiring" for one in others),
-        "cpu": float(np.median([one["cpu"] for one in cases])),
+        "false_alarms": sum(case["verdict"] == "wiring" for case in others),
+        "cpu": float(np.median([case["cpu"] for case in cases])),
     }
 
 
@@ -167,13 +167,13 @@ def _headline(cases: Sequence[Mapping[str, Any]]) -> str:
 def _table(cases: Sequence[Mapping[str, Any]]) -> str:
     lines = ["| fault | cases | right kind | right kind and joints | missed |", "| --- | --- | --- | --- | --- |"]
     for kind in [*KINDS, "all"]:
-        own = [one for one in cases if one["truth"] and kind in (one["kind"], "all")]
-        missed = sum(one["verdict"] != "wiring" for one in own)
+        own = [case for case in cases if case["truth"] and kind in (case["kind"], "all")]
+        missed = sum(case["verdict"] != "wiring" for case in own)
         lines.append(f"| {kind} | {len(own)} | {sum(map(_right_kind, own))} | {sum(map(_right, own))} | {missed} |")
     lines += ["", "| no fault | cases | false alarms |", "| --- | --- | --- |"]
     for kind in (CLEAN, PHYSICS):
-        own = [one for one in cases if one["kind"] == kind]
-        lines.append(f"| {kind} | {len(own)} | {sum(one['verdict'] == 'wiring' for one in own)} |")
+        own = [case for case in cases if case["kind"] == kind]
+        lines.append(f"| {kind} | {len(own)} | {sum(case['verdict'] == 'wiring' for case in own)} |")
     sums = _figures(cases)
     bounds = wilson(sums["right_kind_and_joints"], sums["faults"])
     share = f"{sums['right_kind_and_joints'] / sums['faults']:.2f} ({bounds.lower:.2f} to {bounds.upper:.2f})"

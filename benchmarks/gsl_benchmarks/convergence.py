@@ -50,7 +50,7 @@ class Measured(NamedTuple):
     cpu: float
 
 
-def measured(step: float, iterations: int, first_seed: int = 0) -> Measured:
+def measure(step: float, iterations: int, first_seed: int = 0) -> Measured:
     """Measure one setting on the same policies.
 
     Args:
@@ -105,7 +105,7 @@ def main() -> None:
     jobs = [(*setting, 0) for setting in SETTINGS] + [(*REFERENCE, 1)]
     console, results = Console(), []
     with console.progress(len(jobs), "settings") as progress:
-        for result in joblib.Parallel(n_jobs=-1, return_as="generator")(joblib.delayed(measured)(*job) for job in jobs):
+        for result in joblib.Parallel(n_jobs=-1, return_as="generator")(joblib.delayed(measure)(*job) for job in jobs):
             results.append(result)
             progress.advance()
     console.table("Physics period and solver", COLUMNS, table(results[:-1], results[-1]))

@@ -93,7 +93,7 @@ def loops(scenario: Scenario, repeats: int) -> LoopCost:
         begin = time.process_time()
         rollout(scenario, env, parameters, seed)
         whole.append(time.process_time() - begin)
-        with _timed_steps(engine) as clock:
+        with _time_steps(engine) as clock:
             rollout(scenario, env, parameters, seed)
         inside.append(clock.seconds)
         count.append(clock.calls)
@@ -104,20 +104,22 @@ def loops(scenario: Scenario, repeats: int) -> LoopCost:
     return LoopCost(ratio, float(np.median(whole)), float(np.median(reloads)), 1e6 * step)
 
 
-def untrained(scenario: Scenario) -> Scenario:
+def make_untrained(scenario: Scenario) -> Scenario:
     """Return the scenario with a grounding of two MLPs of the default size and small random weights."""
     rng, joints = np.random.default_rng(0), scenario.world.layout.joints
     config = ModelConfig(family="mlp", sensors=("gyro", "tilt", "foot_force"))
     windows = (config.of_body, config.of_joints)
     sizes = [(window.size(len(joints)), *config.hidden, len(joints)) for window in windows]
-    nets = [Network([(0.01 * rng.standard_normal((b, a)), np.zeros(b)) for a, b in pairwise(one)]) for one in sizes]
+    nets = [
+        Network([(0.01 * rng.standard_normal((b, a)), np.zeros(b)) for a, b in pairwise(widths)]) for widths in sizes
+    ]
     forward = ForwardModel(nets[0], windows[0], joints)
     inverse = Regression(nets[1], windows[1], joints)
     return replace(scenario, grounding=LoadedTransformation(forward, inverse, alpha=TRUST))
 
 
 @contextmanager
-def _timed_steps(engine: Any) -> Iterator[StepClock]:
+def _time_steps(engine: Any) -> Iterator[StepClock]:
     """Time the physics steps of an engine, which takes them through pybullet meanwhile: the same steps, to the bit."""
     bullet, handle = engine.bullet, getattr(engine, "handle", THROUGH_PYBULLET)
     plain = bullet.stepSimulation

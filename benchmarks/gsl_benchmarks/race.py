@@ -58,7 +58,7 @@ def play(scenario: Scenario, candidates: Sequence[np.ndarray], seeds: np.ndarray
 
 def race_again(played: Played, error: float, races: int = RACES) -> Raced:
     """Race on a generation that has played everything."""
-    whole, found, (candidates, rollouts) = played.values.mean(axis=1), [], played.values.shape
+    whole, races_run, (candidates, rollouts) = played.values.mean(axis=1), [], played.values.shape
     for number in range(races):
         race = Race(candidates, rollouts, error, lambda rows: rows.mean(axis=1), np.random.default_rng(number))
         while pairs := race.pairs():
@@ -66,8 +66,8 @@ def race_again(played: Played, error: float, races: int = RACES) -> Raced:
         there = np.isfinite(race.values)
         winner = np.argmax(np.where(there.all(axis=1), whole, -np.inf))
         another = float(winner != np.argmax(whole))
-        found.append((another, there.mean(), played.steps[there].sum() / played.steps.sum()))
-    return Raced(*(float(share) for share in np.mean(found, axis=0)))
+        races_run.append((another, there.mean(), played.steps[there].sum() / played.steps.sum()))
+    return Raced(*(float(share) for share in np.mean(races_run, axis=0)))
 
 
 def cost_of_coarse(scenario: Scenario, world: BulletWorld) -> float:
@@ -76,9 +76,9 @@ def cost_of_coarse(scenario: Scenario, world: BulletWorld) -> float:
     envs, theta = [fine.make(), coarse.make()], fine.policy.initial
     taken = np.zeros((PAIRS + 1, 2))
     for seed in range(PAIRS + 1):  # the first one compiles
-        for n, (one, env) in enumerate(zip((fine, coarse), envs, strict=True)):
+        for n, (variant, env) in enumerate(zip((fine, coarse), envs, strict=True)):
             begin = time.process_time()
-            rollout(one, env, theta, seed)
+            rollout(variant, env, theta, seed)
             taken[seed, n] = time.process_time() - begin
     return float(np.median(taken[1:, 1] / taken[1:, 0]))
 
@@ -89,25 +89,25 @@ def main() -> None:
     for name, default in (("candidates", 150), ("generations", 10), ("rollouts", 20), ("seed", 1)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--error", type=float, default=0.05)
-    given, console, rows, found = parser.parse_args(), Console(), [], []
+    options, console, rows, races = parser.parse_args(), Console(), [], []
     world, policy = BulletWorld(robot="nao", effects={}, start_noise=0.02), WalkEngine()
     plain = Scenario(world, Walk(), policy, SIM, TorqueNoise())
     scenario = plain.prepare({})
-    seed = derive_seed(given.seed, "optimize")
-    search = CmaEs(given.candidates, given.generations).start(policy.initial, policy.scale, seed)
-    with console.progress(given.candidates * given.generations * given.rollouts, "playing all") as progress:
-        for index in range(given.generations):
-            places = np.ndindex(given.candidates, given.rollouts)
-            seeds = np.array([derive_seed(given.seed, "optimize", index, *place) for place in places])
-            played = play(scenario, search.ask(), seeds.reshape(given.candidates, given.rollouts), progress)
+    seed = derive_seed(options.seed, "optimize")
+    search = CmaEs(options.candidates, options.generations).start(policy.initial, policy.scale, seed)
+    with console.progress(options.candidates * options.generations * options.rollouts, "playing all") as progress:
+        for index in range(options.generations):
+            places = np.ndindex(options.candidates, options.rollouts)
+            seeds = np.array([derive_seed(options.seed, "optimize", index, *place) for place in places])
+            played = play(scenario, search.ask(), seeds.reshape(options.candidates, options.rollouts), progress)
             search.tell(played.values.mean(axis=1).tolist())
-            raced = race_again(played, given.error)
-            found.append(raced)
+            raced = race_again(played, options.error)
+            races.append(raced)
             best = f"{100.0 * played.values.mean(axis=1).max():.1f}"
             rows.append((index + 1, best, f"{played.fell.mean():.3f}", *(f"{share:.3f}" for share in raced)))
             console.status("\t".join(map(str, rows[-1])))
-    rows.append(("mean", "", "", *(f"{share:.3f}" for share in np.mean(found, axis=0))))
-    console.table(f"optimizer.race={given.error:g}", COLUMNS, rows)
+    rows.append(("mean", "", "", *(f"{share:.3f}" for share in np.mean(races, axis=0))))
+    console.table(f"optimizer.race={options.error:g}", COLUMNS, rows)
     console.status(f"a walk at {1000 * COARSE:g} ms costs {cost_of_coarse(plain, world):.2f} of one at 2 ms")
 
 

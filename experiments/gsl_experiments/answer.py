@@ -30,7 +30,7 @@ def name_difference(what: str, difference: Interval, unit: Unit) -> str:
         difference: Its mean with its interval, in the unit of the task.
         unit: How it is shown.
     """
-    mean = f"{what}: {unit.shown(difference.mean, sign=True)}"
+    mean = f"{what}: {unit.format(difference.mean, sign=True)}"
     if math.isinf(difference.upper):
         return f"{mean}, in a single trial, which gives no interval."
     bounds = unit.interval([difference.lower, difference.upper], sign=True)
@@ -42,30 +42,30 @@ def answer_difference(question: str, what: str, difference: Interval, unit: Unit
     return Answer(question, name_difference(what, difference, unit), is_significant(difference), more)
 
 
-def answer_comparison(found: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> Answer:
+def answer_comparison(results: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> Answer:
     """Return how the best method of each world stands to the first method, or what it is worth if that is the first.
 
     Args:
-        found: Of all trials.
+        results: Of all trials.
         trials: All of them.
         unit: Of the task.
     """
-    first, sentences, sure = found[0].method, list[str](), True
-    for key in dict.fromkeys((one.simulator, one.world, one.iteration) for one in found):
-        own = [one for one in found if (one.simulator, one.world, one.iteration) == key]
-        best = max(own, key=lambda one: one.value.mean)
+    first, sentences, sure = results[0].method, list[str](), True
+    for key in dict.fromkeys((summary.simulator, summary.world, summary.iteration) for summary in results):
+        own = [summary for summary in results if (summary.simulator, summary.world, summary.iteration) == key]
+        best = max(own, key=lambda summary: summary.value.mean)
         place = ", ".join(filter(None, (best.simulator, best.world)))
-        place += f", iteration {best.iteration}" if any(one.iteration > 1 for one in found) else ""
-        worth = unit.shown(best.value.mean)
+        place += f", iteration {best.iteration}" if any(summary.iteration > 1 for summary in results) else ""
+        worth = unit.format(best.value.mean)
         if not math.isinf(best.value.upper):
             worth += f" (95 % {unit.interval([best.value.lower, best.value.upper])})"
         best_of = f"In {place}, {best.method} is best of {several(len(own), 'method')} with {worth}"
-        if best.method == first or all(one.method != first for one in own):
+        if best.method == first or all(summary.method != first for summary in own):
             sentences.append(f"{best_of}.")
             sure = False
             continue
         apart = differences(trials, Cell(*best[:4]), first, attrgetter("value"))
         sentences.append(name_difference(f"{best_of}; {best.method} minus {first}", apart, unit))
         sure = sure and is_significant(apart)
-    more = CHOSEN if len({one.method for one in found}) > 2 else ()
+    more = CHOSEN if len({summary.method for summary in results}) > 2 else ()
     return Answer(QUESTION, sentences[0], sure, [*sentences[1:], *more])

@@ -30,10 +30,10 @@ from gsl.validation.replay import replay_starts
 from gsl_experiments.answer import answer_difference
 from gsl_experiments.budget_curve import Line, budget_curve_figure
 from gsl_experiments.compare import Compare
-from gsl_experiments.comparison_table import bounds, finely, told_difference
+from gsl_experiments.comparison_table import bounds, finely, format_difference
 from gsl_experiments.effort import check_search, seconds
-from gsl_experiments.held_out import MEASURED, check_first_iteration, check_robot, held_out, starts
-from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
+from gsl_experiments.held_out import MEASURED, check_first_iteration, check_robot, collect_held_out, starts
+from gsl_experiments.ledger import GOES_ON, Known, Ledger, list_earlier, recipe
 from gsl_experiments.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
 from gsl_experiments.tasks import in_order
 
@@ -91,7 +91,7 @@ class Budget:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parents(self.known, DATA)
+        return list_earlier(self.known, DATA)
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Run all trials, write the points, the table and the figure.
@@ -157,46 +157,50 @@ class Budget:
     def _point(self, home: Path, method: str, count: int, number: int, console: Console) -> Point:
         name, seed = f"trial_{number:02d}", self.iterate.seed + number - 1
         if method == NONE:
-            return self._ungrounded(home / NONE / name, number, console)
+            return self._play_ungrounded(home / NONE / name, number, console)
         place, real = home / method / f"real_{count:03d}" / name, home / "data" / f"real_{count:03d}" / name
         shared = {REAL: real, SIM: home / "data" / "sim" / name}
         chain = replace(self._with(count).chain, accept=True, shared=shared)
-        begins = starts(held_out(chain, home / "held_out" / name, seed, console), chain)
+        begins = starts(collect_held_out(chain, home / "held_out" / name, seed, console), chain)
         ready = chain.ready(place, self.methods[method], None, seed, console)
-        found = chain.search(place / "optimize", ready, None, seed, console)
-        measured = chain.measure(place / "evaluate", found, seed, console)
-        acting = Scenario(chain.sim, chain.task, chain.policy, SIM, ready).prepare(found.metrics).grounding
+        search = chain.search(place / "optimize", ready, None, seed, console)
+        measured = chain.measure(place / "evaluate", search, seed, console)
+        acting = Scenario(chain.sim, chain.task, chain.policy, SIM, ready).prepare(search.metrics).grounding
         assert isinstance(acting, LoadedTransformation), "its world is a robot"
         env: Any = chain.sim.make()
         drawn = derive_seed(seed, "replays")
-        grounded, bare = (replay_starts(env, one, begins, drawn)[TICKS] for one in (acting.expected, NoGrounding()))
+        grounded, bare = (
+            replay_starts(env, way, begins, drawn)[TICKS] for way in (acting.deterministic, NoGrounding())
+        )
         env.close()
         errors = degrees(grounded.joints), degrees(bare.joints)
         return Point(method, count, number, measured.metrics["returned"]["value"], *errors)
 
-    def _ungrounded(self, place: Path, number: int, console: Console) -> Point:
+    def _play_ungrounded(self, place: Path, number: int, console: Console) -> Point:
         chain, seed = self.iterate.chain, self.iterate.seed + number - 1
-        found = chain.search(place / "optimize", NoGrounding(), None, seed, console)
-        measured = chain.measure(place / "evaluate", found, seed, console)
+        search = chain.search(place / "optimize", NoGrounding(), None, seed, console)
+        measured = chain.measure(place / "evaluate", search, seed, console)
         return Point(NONE, 0, number, measured.metrics["returned"]["value"], None, None)
 
     def tell(self, folder: Path, points: Sequence[Point], made: str) -> None:
         """Write the table and the figure of all points; `made` says who made them."""
         shown, unit = self.iterate.task.shown, self.iterate.task.unit
         rows, values, errors, fewest = [], {}, {}, self.budgets[0]
-        none = [shown * one.value for one in points if one.method == NONE]
-        plain = mean_interval(list({one.trial: one.bare for one in points if one.bare is not None}.values()))
+        none = [shown * point.value for point in points if point.method == NONE]
+        plain = mean_interval(list({point.trial: point.bare for point in points if point.bare is not None}.values()))
         for method in self.methods:
-            cells = [[one for one in points if one.method == method and one.trajectories == n] for n in self.budgets]
-            returns = [[shown * one.value for one in cell] for cell in cells]
-            wrong = [[one.error for one in cell if one.error is not None] for cell in cells]
+            cells = [
+                [point for point in points if point.method == method and point.trajectories == n] for n in self.budgets
+            ]
+            returns = [[shown * point.value for point in cell] for cell in cells]
+            wrong = [[point.error for point in cell if point.error is not None] for cell in cells]
             values[method] = Line(self.budgets, list(map(mean_interval, returns)))
             errors[method] = Line(self.budgets, list(map(mean_interval, wrong)))
             for n, value, error in zip(self.budgets, returns, wrong, strict=True):
                 more, farther = (mean_interval(np.subtract(*pair)) for pair in ((value, none), (error, wrong[0])))
-                than = "" if n == fewest else told_difference(farther, fine=True)
+                than = "" if n == fewest else format_difference(farther, fine=True)
                 cells_of_error = (*_cells(mean_interval(error), fine=True), than)
-                rows.append((method, str(n), *_cells(mean_interval(value)), told_difference(more), *cells_of_error))
+                rows.append((method, str(n), *_cells(mean_interval(value)), format_difference(more), *cells_of_error))
         without = mean_interval(none)
         rows.append((NONE, "0", *_cells(without), "", *_cells(plain, fine=True), ""))
         titles = (
@@ -209,13 +213,13 @@ class Budget:
         bases = dict(zip(panels, (without.mean, plain.mean), strict=True))
         title = "What a grounding makes of more real data, with 95 % intervals"
         picture = save(budget_curve_figure(panels, bases, title), folder / FIGURE)
-        last = [one.value for one in points if (one.method, one.trajectories) == (method, self.budgets[-1])]
-        apart = mean_interval(np.subtract(last, [one.value for one in points if one.method == NONE]))
+        last = [point.value for point in points if (point.method, point.trajectories) == (method, self.budgets[-1])]
+        apart = mean_interval(np.subtract(last, [point.value for point in points if point.method == NONE]))
         what = f"With {self.budgets[-1]} real trajectories, {method} minus none"
         answer = answer_difference("How much real data does a grounding need?", what, apart, Unit.of(self.iterate.task))
         write_study_page(folder, answer, [TABLE], [picture])
 
 
-def _cells(found: Interval, *, fine: bool = False) -> tuple[str, str]:
+def _cells(interval: Interval, *, fine: bool = False) -> tuple[str, str]:
     """Return a mean and its interval; `fine` of degrees."""
-    return (f"{found.mean:.2f}", finely(found)) if fine else (f"{found.mean:.1f}", bounds(found))
+    return (f"{interval.mean:.2f}", finely(interval)) if fine else (f"{interval.mean:.1f}", bounds(interval))

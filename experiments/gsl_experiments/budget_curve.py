@@ -19,7 +19,7 @@ class Line(NamedTuple):
     """A figure at each budget."""
 
     budgets: Sequence[int]
-    found: Sequence[Interval]
+    intervals: Sequence[Interval]
 
 
 def budget_curve_figure(panels: Mapping[str, Mapping[str, Line]], bases: Mapping[str, float], title: str) -> Figure:
@@ -44,8 +44,8 @@ def _draw(axes: Axes, lines: Mapping[str, Line], base: float | None) -> None:
     ends = []
     for method, line in lines.items():
         colour = method_colour(method)
-        means = [one.mean for one in line.found]
-        bounds = np.array([[one.lower, one.upper] for one in line.found]).T
+        means = [interval.mean for interval in line.intervals]
+        bounds = np.array([[interval.lower, interval.upper] for interval in line.intervals]).T
         axes.plot(line.budgets, means, "o-", color=colour, markersize=4)
         if np.isfinite(bounds).all():
             axes.fill_between(line.budgets, *bounds, color=colour, alpha=0.18, linewidth=0)

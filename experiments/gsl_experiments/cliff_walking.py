@@ -26,7 +26,7 @@ from gsl.worlds.gymnasium import GymnasiumWorld
 from gsl_experiments.answer import answer_difference
 from gsl_experiments.noise_curve import Curve, noise_curve_figure
 from gsl_experiments.sizes import PresetName, check_rising, sizes_of
-from gsl_experiments.table_episodes import played
+from gsl_experiments.table_episodes import play
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -90,20 +90,20 @@ class Figure11:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Run all trials; write the points, the table and the figure."""
         simulator = self._real(0.0)
-        start = simulator.solved(np.full(len(simulator.terminal), DOWN))
+        start = simulator.solve(np.full(len(simulator.terminal), DOWN))
         points: list[Point] = []
         with console.progress(len(self.noises) * self.trials, "grounding at the cliff") as progress:
             for noise in self.noises:
                 for trial in range(self.trials):
                     points += [self._trial(simulator, start, noise, method, trial) for method in METHODS]
                     progress.advance()
-        write_json(folder / DATA, [one._asdict() for one in points])
+        write_json(folder / DATA, [point._asdict() for point in points])
         bounds = {noise: self._bounds(start, noise) for noise in self.noises}
         sizes = f"{sizes_of(self.preset_name)} {several(self.trials, 'trial')}."
         (folder / TABLE).write_text(f"{_table(points, bounds)}\n{sizes}\n", encoding="utf-8")
         picture = _draw(folder / FIGURE, points, bounds)
-        noise = max(bounds, key=lambda one: bounds[one][1] - bounds[one][0])
-        each = {method: [one.value for one in _of(points, method, noise)] for method in METHODS}
+        noise = max(bounds, key=lambda level: bounds[level][1] - bounds[level][0])
+        each = {method: [point.value for point in _of(points, method, noise)] for method in METHODS}
         apart = mean_interval(np.subtract(each["sgat"], each["gat"]))
         question = "Does a stochastic grounding return more than a deterministic one as the real world gets noisier?"
         what = f"At noise {noise:g}, where there is most to gain, sgat minus gat"
@@ -117,26 +117,26 @@ class Figure11:
     def _bounds(self, start: np.ndarray, noise: float) -> tuple[float, float]:
         """Return what the simulator's optimum and the real optimum are worth in the real world."""
         real = self._real(noise)
-        return real.value(start), real.value(real.solved(start))
+        return real.value(start), real.value(real.solve(start))
 
     def _trial(self, simulator: Table, start: np.ndarray, noise: float, method: str, trial: int) -> Point:
         real, policy = self._real(noise), start
         rng = np.random.default_rng(derive_seed(self.seed, self.kind, round(1e6 * noise), trial))
-        inverse = Counts(played(simulator, start, self.sim_episodes, rng, explore=0.9).seen, "inverse_model")
+        inverse = Counts(play(simulator, start, self.sim_episodes, rng, explore=0.9).seen, "inverse_model")
         seen, rounds, converged = np.zeros(real.chances.shape), 0, False
         while rounds < self.rounds and not converged:
             rounds += 1
-            seen += played(real, policy, self.episodes, rng, explore=self.explore).seen
+            seen += play(real, policy, self.episodes, rng, explore=self.explore).seen
             grounding = TableTransformation(Counts(seen), inverse, draws=METHODS[method])
-            better = grounding.grounded(simulator).solved(policy)
+            better = grounding.ground(simulator).solve(policy)
             converged = np.array_equal(better, policy)
             policy = better
-        estimate = float(played(real, policy, self.evaluations, rng).returns.mean())
+        estimate = float(play(real, policy, self.evaluations, rng).returns.mean())
         return Point(method, noise, trial + 1, real.value(policy), estimate, rounds, converged, rounds * self.episodes)
 
 
 def _of(points: Sequence[Point], method: str, noise: float) -> list[Point]:
-    return [one for one in points if (one.method, one.noise) == (method, noise)]
+    return [point for point in points if (point.method, point.noise) == (method, noise)]
 
 
 def _table(points: Sequence[Point], bounds: Mapping[float, tuple[float, float]]) -> str:
@@ -146,36 +146,42 @@ def _table(points: Sequence[Point], bounds: Mapping[float, tuple[float, float]])
     )
     rows = []
     for noise, (edge, best) in bounds.items():
-        each = {method: [one.value for one in _of(points, method, noise)] for method in METHODS}
+        each = {method: [point.value for point in _of(points, method, noise)] for method in METHODS}
         apart = mean_interval(np.subtract(each["sgat"], each["gat"]))
-        told = [_told(mean_interval(values)) for values in each.values()]
+        means = [_format(mean_interval(values)) for values in each.values()]
         share = f"{100 * np.mean(each['sgat']) / best:.1f} %" if best > 0.0 else "-"
         spent = (_episodes(_of(points, method, noise)) for method in METHODS)
-        rows.append((f"{noise:g}", f"{edge:.2f}", f"{best:.2f}", *told, _told(apart), share, *spent))
+        rows.append((f"{noise:g}", f"{edge:.2f}", f"{best:.2f}", *means, _format(apart), share, *spent))
     effort = []
     for method in METHODS:
-        own = [one for one in points if one.method == method]
-        open_ends = sum(not one.converged for one in own)
-        rounds = f"{np.mean([one.rounds for one in own]):.1f}"
+        own = [point for point in points if point.method == method]
+        open_ends = sum(not point.converged for point in own)
+        rounds = f"{np.mean([point.rounds for point in own]):.1f}"
         effort.append((method, rounds, f"{open_ends} of {len(own)}", _episodes(own)))
-    off = max(abs(one.estimate - one.value) for one in points)
+    off = max(abs(point.estimate - point.value) for point in points)
     below = f"\nEstimates from real episodes are off the exact values by {off:.2f} at most.\n\n"
     return markdown(titles, rows) + below + markdown(("grounding", "rounds", "not converged", "real episodes"), effort)
 
 
 def _episodes(points: Sequence[Point]) -> str:
-    spent = [one.real_episodes for one in points]
+    spent = [point.real_episodes for point in points]
     return f"{np.mean(spent):.0f} ({min(spent)} to {max(spent)})"
 
 
-def _told(one: Interval) -> str:
-    return f"{one.mean:.2f} ({one.lower:.2f} to {one.upper:.2f})" if np.isfinite(one.upper) else f"{one.mean:.2f}"
+def _format(interval: Interval) -> str:
+    return (
+        f"{interval.mean:.2f} ({interval.lower:.2f} to {interval.upper:.2f})"
+        if np.isfinite(interval.upper)
+        else f"{interval.mean:.2f}"
+    )
 
 
 def _draw(path: Path, points: Sequence[Point], bounds: Mapping[float, tuple[float, float]]) -> Figure:
     noises = list(bounds)
     curves = {
-        method: Curve(noises, [mean_interval([one.value for one in _of(points, method, noise)]) for noise in noises])
+        method: Curve(
+            noises, [mean_interval([point.value for point in _of(points, method, noise)]) for noise in noises]
+        )
         for method in METHODS
     }
     exact = {"real optimum": [best for _, best in bounds.values()], "edge path": [edge for edge, _ in bounds.values()]}

@@ -31,7 +31,7 @@ from gsl_experiments import effort
 from gsl_experiments.answer import answer_comparison
 from gsl_experiments.comparison import Summary, summaries
 from gsl_experiments.comparison_table import markdown
-from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
+from gsl_experiments.ledger import GOES_ON, Known, Ledger, list_earlier, recipe
 from gsl_experiments.paper_cells import worth
 from gsl_experiments.sizes import First, PresetName, numbers, sizes_of, trials_of
 from gsl_experiments.tasks import in_order
@@ -75,19 +75,19 @@ class Compare:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parents(self.known, DATA)
+        return list_earlier(self.known, DATA)
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Run all trials; write every trial's figures and the tables."""
         searches = isinstance(self.iterate.optimizer, Search)
-        found, made = self.carried_out(folder, console, (lambda: effort.seconds(self)) if searches else None)
-        summary = summaries(found)
-        text = "\n".join(filter(None, (markdown(summary, found, Unit.of(self.iterate.task)), foretelling(found))))
+        trials, made = self.carry_out(folder, console, (lambda: effort.seconds(self)) if searches else None)
+        summary = summaries(trials)
+        text = "\n".join(filter(None, (markdown(summary, trials, Unit.of(self.iterate.task)), foretelling(trials))))
         sizes = f"{sizes_of(self.preset_name)} {trials_of(self.first, self.trials)}."
         (folder / TABLE).write_text(f"{text}\n{sizes} {made}\n", encoding="utf-8")
         task = self.iterate.task
-        picture = trials_figure(found, self.methods, worth(found, task), tolerant=self.tolerant)
-        write_study_page(folder, answer_comparison(summary, found, Unit.of(task)), [TABLE], [picture])
+        picture = trials_figure(trials, self.methods, worth(trials, task), tolerant=self.tolerant)
+        write_study_page(folder, answer_comparison(summary, trials, Unit.of(task)), [TABLE], [picture])
         return self.metrics(summary)
 
     @property
@@ -97,11 +97,11 @@ class Compare:
 
     def metrics(self, summary: Sequence[Summary]) -> dict[str, Any]:
         """Return the summaries, and the line that `gsl runs` shows."""
-        methods = ", ".join(dict.fromkeys(one.method for one in summary))
+        methods = ", ".join(dict.fromkeys(row.method for row in summary))
         headline = f"{several(self.trials, 'trial')} of {methods}"
-        return {"headline": headline, "trials": self.trials, "summaries": [one._asdict() for one in summary]}
+        return {"headline": headline, "trials": self.trials, "summaries": [row._asdict() for row in summary]}
 
-    def carried_out(
+    def carry_out(
         self, folder: Path, console: Console, seconds: Callable[[], float] | None = None
     ) -> tuple[list[Trial], str]:
         """Return all trials, built beside `folder` and told as they end, and who made them; write them down.
@@ -119,8 +119,8 @@ class Compare:
         home, simulators = folder.parent, self._simulators
         for sim, real in product(simulators.values(), self.worlds.values()):
             check_alike(sim.layout, real.layout)
-        named = {f"simulators.{name}" if name else "iterate.sim": one for name, one in simulators.items()}
-        try_out({**named, **{f"worlds.{name}": one for name, one in self.worlds.items()}})
+        named = {f"simulators.{name}" if name else "iterate.sim": world for name, world in simulators.items()}
+        try_out({**named, **{f"worlds.{name}": world for name, world in self.worlds.items()}})
         ledger = Ledger(home / DATA, self.parents(), Trial, console)
         keys = self.recipes
         duration = ledger.announce({key: cell.method for (_, cell), key in keys.items()}, seconds)
@@ -163,7 +163,7 @@ class Compare:
         part = f"{cell.worlds}, {cell.method}, trial {number}"
         with console.part(part):
             for trial in self._trial(home, self._simulators[cell.simulator], cell, number, console):
-                console.status(f"{part}: {trial.told(Unit.of(self.iterate.task))}")
+                console.status(f"{part}: {trial.describe(Unit.of(self.iterate.task))}")
                 yield trial
 
     def _trial(self, home: Path, sim: World, cell: Cell, number: int, console: Console) -> Iterator[Trial]:
@@ -171,39 +171,39 @@ class Compare:
         seed, name, method = self.iterate.seed + number - 1, f"trial_{number:02d}", self.methods[cell.method]
         chain = replace(self.iterate.chain, sim=sim, real=self.worlds[cell.world], accept=True)
         below = home / cell.simulator
-        grounding = chain.diagnosed(below / cell.world / "diagnosis" / name, method, seed, console)
+        grounding = chain.diagnose(below / cell.world / "diagnosis" / name, method, seed, console)
         flight = flown(below / cell.world / "diagnosis" / name, method, grounding)
         spent, first, previous = flight.episodes if flight else 0, None, None
         data = {REAL: below / cell.world / "data" / name, SIM: below / "sim" / "data" / name}
         chain = replace(chain, shared={REAL: data[REAL]} if isinstance(grounding, DiagnosedEffects) else data)
         if self.iterate.pretrained:
-            previous = chain.pretrained(below / "sim" / "pretrained" / name, seed, console)
+            previous = chain.pretrain(below / "sim" / "pretrained" / name, seed, console)
         for iteration in range(1, self.iterate.iterations + 1):
             place = below / cell.world / cell.method / name / (f"iteration_{iteration:02d}" if iteration > 1 else "")
             apart = is_learned(grounding) or flight is not None or iteration > 1
             spent += sum(self.iterate.budget.real) if REAL in evidence_of(grounding) else 0
             out = place if apart else below / "sim" / cell.method / name
             at = seed_of_round(seed, iteration)
-            ready, found, measured = chain.round(place, grounding, previous, at, console, search=out)
-            rank = self._ranked(chain, below / cell.world, out, ready, found, console) if iteration == 1 else None
+            ready, search, measured = chain.round(place, grounding, previous, at, console, search=out)
+            rank = self._rank(chain, below / cell.world, out, ready, search, console) if iteration == 1 else None
             trial = Trial.of(
                 cell._replace(iteration=iteration),
                 number,
-                found.metrics,
+                search.metrics,
                 measured.metrics,
                 spent=spent,
                 first=first,
                 rank=rank,
-                tried=read_tried(found.metrics, measured),
+                tried=read_tried(search.metrics, measured),
             )
             yield trial
             spent, previous, first = trial.real_episodes, str(measured.folder), first or measured.metrics
             chain = replace(chain.after(place), shared={})
 
-    def _ranked(
-        self, chain: Chain, world: Path, out: Path, ready: Grounding, found: Artifact, console: Console
+    def _rank(
+        self, chain: Chain, world: Path, out: Path, ready: Grounding, search: Artifact, console: Console
     ) -> float | None:
         if not self.rank:
             return None
-        simulated = chain.values(out / "values", ready, found.metrics, console)
+        simulated = chain.values(out / "values", ready, search.metrics, console)
         return rank(simulated, chain.values(world / "values", None, {}, console))

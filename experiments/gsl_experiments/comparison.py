@@ -14,7 +14,7 @@ from gsl.core.statistics import Interval, mean_interval
 from gsl_experiments.trial import Cell, Trial
 
 Figure = Callable[[Trial], Any]  # of a trial
-IMPROVEMENT: Figure = attrgetter("told_improvement")
+IMPROVEMENT: Figure = attrgetter("plausible_improvement")
 
 
 class Summary(NamedTuple):
@@ -65,7 +65,7 @@ def summaries(trials: Sequence[Trial]) -> list[Summary]:
 
 def differences(trials: Sequence[Trial], cell: Cell, other: str, figure: Figure = IMPROVEMENT) -> Interval:
     """Return how much larger a figure is than another method's, paired by trial, with its 95 % interval."""
-    return mean_interval(np.subtract(*_paired(trials, cell, other, figure)))
+    return mean_interval(np.subtract(*_pair(trials, cell, other, figure)))
 
 
 class Order(NamedTuple):
@@ -92,18 +92,18 @@ def orders(
     trials: with ten the least p is .002, which is none any more after a correction for all pairs of seventeen methods.
     """
     there = {trial.method for trial in trials if trial.cell[:2] == (simulator, world)}
-    found = []
+    pairs = []
     for method, other in product(methods, others):
         if not {method, other} <= there or method == other:
             continue
-        first, second = _paired(trials, Cell(simulator, world, method, 1), other, attrgetter("stable"))
+        first, second = _pair(trials, Cell(simulator, world, method, 1), other, attrgetter("stable"))
         apart = first - second
         p = float(wilcoxon(apart).pvalue) if apart.any() else 1.0
-        found.append(Order(method, other, float(np.mean(apart)), p))
-    return _corrected(found)
+        pairs.append(Order(method, other, float(np.mean(apart)), p))
+    return _correct(pairs)
 
 
-def _paired(trials: Sequence[Trial], cell: Cell, other: str, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
+def _pair(trials: Sequence[Trial], cell: Cell, other: str, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
     """Return a figure of two methods in the trials that both have, shape (trials,) each."""
     values = {
         name: {trial.number: figure(trial) for trial in trials if trial.cell == cell._replace(method=name)}
@@ -114,23 +114,23 @@ def _paired(trials: Sequence[Trial], cell: Cell, other: str, figure: Figure) -> 
     return first, second
 
 
-def _corrected(found: Sequence[Order]) -> list[Order]:
+def _correct(orders: Sequence[Order]) -> list[Order]:
     """Holm's correction: the k-th least of n p-values times n - k + 1, none less than one before it."""
-    p = np.array([one.p for one in found])
+    p = np.array([order.p for order in orders])
     order = np.argsort(p)
     p[order] = np.maximum.accumulate(np.minimum(1.0, p[order] * np.arange(len(p), 0, -1)))
-    return [one._replace(p=value) for one, value in zip(found, p.tolist(), strict=True)]
+    return [order._replace(p=value) for order, value in zip(orders, p.tolist(), strict=True)]
 
 
 def _summary(cell: Cell, trials: list[Trial]) -> Summary:
     generations = [trial.generation for trial in trials if trial.generation]
-    told = [trial.told_improvement for trial in trials if trial.told_improvement is not None]
+    improvements = [trial.plausible_improvement for trial in trials if trial.plausible_improvement is not None]
     ranks = [trial.rank for trial in trials if trial.rank is not None]
     return Summary(
         *cell,
         trials=len(trials),
         value=mean_interval([trial.value for trial in trials]),
-        improvement=mean_interval(told) if len(told) == len(trials) else None,
+        improvement=mean_interval(improvements) if len(improvements) == len(trials) else None,
         without=sum(trial.without for trial in trials),
         unimproved=sum(trial.improving == 0 for trial in trials),
         stable=sum(trial.stable for trial in trials),

@@ -43,7 +43,7 @@ class Point(NamedTuple):
     stable: float
 
 
-def searched(files: Iterable[Path]) -> list[Trial]:
+def read_searches(files: Iterable[Path]) -> list[Trial]:
     """Return the trials of first iterations that some files hold, each once.
 
     Raises:
@@ -67,7 +67,7 @@ def points(rows: Sequence[Replay], trials: Sequence[Trial]) -> dict[str, list[Po
     by_world: dict[str, list[Point]] = {}
     for (world, method), own in measured.items():
         searches = [trial for trial in trials if (trial.world, trial.method) == (world, method)]
-        gains = [trial.told_improvement for trial in searches if trial.told_improvement is not None]
+        gains = [trial.plausible_improvement for trial in searches if trial.plausible_improvement is not None]
         winners = sum(trial.winners for trial in searches)
         if gains and winners:
             error, near = np.mean(own, axis=0).tolist()
@@ -114,8 +114,8 @@ def predictors(rows: Sequence[Replay], trials: Sequence[Trial], seed: int) -> st
             )
             rho, p = rank_correlations(first, second, np.random.default_rng(seed))
             mean = float(np.nanmean(list(rho.values()))) if np.isfinite(p) else np.nan
-            cells = [_shown(value, "+.2f") for value in (*rho.values(), mean)]
-            shown.append((outcome, figure, *cells, _shown(p, ".4f" if p < 0.01 else ".2f")))
+            cells = [_format(value, "+.2f") for value in (*rho.values(), mean)]
+            shown.append((outcome, figure, *cells, _format(p, ".4f" if p < 0.01 else ".2f")))
     titles = ("goes with", "figure of the simulator", *worlds, "mean", "p")
     named = "; ".join(f"{world}: {', '.join(point.method for point in own)}" for world, own in worlds.items())
     count = sum(map(len, worlds.values()))
@@ -135,5 +135,5 @@ def _standard(values: Sequence[float]) -> np.ndarray:
     return scaled
 
 
-def _shown(value: float, form: str) -> str:
+def _format(value: float, form: str) -> str:
     return f"{value:{form}}" if np.isfinite(value) else "-"

@@ -37,7 +37,7 @@ def check_robot(world: World, where: str) -> None:
         raise ConfigError(where, "is no robot; replays begin in a robot's real states")
 
 
-def held_out(chain: Chain, place: Path, seed: int, console: Console) -> Batch:
+def collect_held_out(chain: Chain, place: Path, seed: int, console: Console) -> Batch:
     """Return them, collected at `place` if they are not there yet: one of π0, the others around it."""
     stage = Collect(
         world=chain.real,
@@ -60,8 +60,8 @@ def starts(held: Batch, chain: Chain) -> list[Place]:
     Raises:
         GslError: All of these trajectories are too short.
     """
-    found = places(of_policy(held, pi0=False), chain.sim.layout, REPLAYS)
-    if not found:
+    begins = places(of_policy(held, pi0=False), chain.sim.layout, REPLAYS)
+    if not begins:
         problem = f"none of {HELD_OUT} real trajectories off π0 has the {PAST + TICKS} ticks of a replay"
         raise GslError(f"{problem}; take a smaller budget.spread, or a longer task")
-    return found
+    return begins

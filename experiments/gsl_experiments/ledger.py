@@ -56,11 +56,11 @@ def recipe(*parts: Any) -> str:
     return hashlib.sha256(settings.encode()).hexdigest()[:DIGITS]
 
 
-def known_parents(known: str | tuple[str, ...] | None, name: str, role: str = "known") -> dict[str, Path]:
+def list_earlier(earlier: str | tuple[str, ...] | None, name: str, role: str = "known") -> dict[str, Path]:
     """Return the files of earlier trials, or those of runs, as parents of the study.
 
     Args:
-        known: As the user gave it.
+        earlier: As the user gave it.
         name: Of such a file in a study's artifact.
         role: Setting that the user gave.
 
@@ -68,15 +68,15 @@ def known_parents(known: str | tuple[str, ...] | None, name: str, role: str = "k
         ArtifactError: There is none.
         ConfigError: It is an empty list.
     """
-    if isinstance(known, str):
-        return {role: _file(known, name)}
-    if known == ():
+    if isinstance(earlier, str):
+        return {role: _file(earlier, name)}
+    if earlier == ():
         raise ConfigError(role, "is an empty list; leave it out")
-    return {f"{role}.{index}": _file(one, name) for index, one in enumerate(known or ())}
+    return {f"{role}.{index}": _file(reference, name) for index, reference in enumerate(earlier or ())}
 
 
-def _file(known: str, name: str) -> Path:
-    place = resolve(known) if Path(known).suffix else resolve(known, kind=("reproduce", "compare"))
+def _file(reference: str, name: str) -> Path:
+    place = resolve(reference) if Path(reference).suffix else resolve(reference, kind=("reproduce", "compare"))
     return place if place.is_file() else place / name
 
 
@@ -90,24 +90,24 @@ class Ledger:
             another one tells otherwise, or is the one to be written.
     """
 
-    def __init__(self, path: Path, known: Mapping[str, Path], kind: type[Figures], console: Console) -> None:
+    def __init__(self, path: Path, earlier: Mapping[str, Path], kind: type[Figures], console: Console) -> None:
         self._path, self._console = path, console
         self._done: dict[str, list[dict[str, Any]]] = {}
         self._kind = kind
         self._kept = self._here()
         self._known: dict[str, list[dict[str, Any]]] = {}
         self._from: dict[Path, Set[str]] = {}
-        for file in dict.fromkeys(known.values()):
+        for file in dict.fromkeys(earlier.values()):
             if path.exists() and file.samefile(path):
                 raise ArtifactError(file, "is what this study writes; copy it, or give the study another name=")
-            found = read(file, kind)
-            for key in found.keys() & self._known.keys():
-                if _figures(found[key]) != _figures(self._known[key]):
+            rows = read(file, kind)
+            for key in rows.keys() & self._known.keys():
+                if _figures(rows[key]) != _figures(self._known[key]):
                     problem = f"tells a trial (recipe {key}) otherwise than {self._whose(key)}"
                     raise ArtifactError(file, f"{problem}; leave one out")
-            self._from[file] = found.keys() - self._known.keys()
-            self._known = {**found, **self._known}
-        self._me = _made_by()
+            self._from[file] = rows.keys() - self._known.keys()
+            self._known = {**rows, **self._known}
+        self._me = _name_maker()
 
     @property
     def figures(self) -> list[dict[str, Any]]:
@@ -124,18 +124,18 @@ class Ledger:
         Raises:
             ArtifactError: A file of earlier trials that was given holds none of this study's.
         """
-        known = wanted.keys() & self._known.keys()
-        here = {key for key in wanted if self._rows_of(key)} - known
-        if self._from and not known:
+        there = wanted.keys() & self._known.keys()
+        here = {key for key in wanted if self._rows_of(key)} - there
+        if self._from and not there:
             problem = "holds no result of this study: its trials have other settings, seeds or files"
             raise ArtifactError(next(iter(self._from)), f"{problem}; without it the study runs them all")
         for place, keys in {**self._from, self._path: here}.items():
             if keys := wanted.keys() & keys:
                 self._console.status(f"{len(keys)} of this study's {len(wanted)} results are in {place}")
-        if others := sum(key in self._kept for key in wanted.keys() - known - here):
+        if others := sum(key in self._kept for key in wanted.keys() - there - here):
             problem = "are of another version of gsl and not taken; a copy of that file, given as known=, is"
             self._console.status(f"{others} of this study's {len(wanted)} results in {self._path} {problem}")
-        missing = Counter(name for key, name in wanted.items() if key not in known | here)
+        missing = Counter(name for key, name in wanted.items() if key not in there | here)
         if not missing or seconds is None:
             return 0.0
         which = ", ".join(f"{name} ({count})" for name, count in missing.items())
@@ -160,7 +160,7 @@ class Ledger:
             for name, value in of.items() if rows else ():
                 right = value if isinstance(value, list) else [value] * len(rows)
                 if (said := [row[name] for row in rows]) != right:
-                    problem = f"a trial whose settings (recipe {key}) say {name} {_told(right)} says {_told(said)}"
+                    problem = f"a trial whose settings (recipe {key}) say {name} {_spell(right)} says {_spell(said)}"
                     raise ArtifactError(self._whose(key), f"{problem}; leave it out")
 
     def take(self, key: str) -> bool:
@@ -184,7 +184,7 @@ class Ledger:
             why = "are of other settings, methods or trials and were not used"
             self._console.status(f"{unused} of {len(self._known)} known trials {why}")
         write_json(path, self._rows())
-        made = _made(self._rows())
+        made = _list_makers(self._rows())
         if len(made) > 1:
             self._console.status(f"these trials were made by {len(made)} versions of gsl; the table says which")
         return " ".join(f"Made by {name}: {trials}." for name, trials in made.items())
@@ -223,7 +223,7 @@ def _idle(name: str, value: Any) -> bool:
     return made_here or name in (*WITHOUT_EFFECT, *LABELS) or (name in LATER and value == LATER[name])
 
 
-def _told(values: Sequence[Any]) -> str:
+def _spell(values: Sequence[Any]) -> str:
     return ", ".join(map(str, dict.fromkeys(values)))
 
 
@@ -231,15 +231,15 @@ def _number(row: Mapping[str, Any]) -> int:
     return int(next(row[name] for name in NUMBER if name in row))
 
 
-def _made(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def _list_makers(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """Return by maker which trials, with the methods of those that several have made."""
-    found: dict[str, dict[int, set[str]]] = {}
+    trials_of: dict[str, dict[int, set[str]]] = {}
     for row in rows:
-        found.setdefault(row[MADE_BY], {}).setdefault(_number(row), set()).add(row.get("method", ""))
-    makers = Counter(number for trials in found.values() for number in trials)
+        trials_of.setdefault(row[MADE_BY], {}).setdefault(_number(row), set()).add(row.get("method", ""))
+    makers = Counter(number for trials in trials_of.values() for number in trials)
     return {
         name: _spans({number: ", ".join(sorted(own)) if makers[number] > 1 else "" for number, own in trials.items()})
-        for name, trials in found.items()
+        for name, trials in trials_of.items()
     }
 
 
@@ -253,7 +253,7 @@ def _spans(trials: Mapping[int, str]) -> str:
     return f"trial{'s' * (len(trials) > 1)} {', '.join(parts)}"
 
 
-def _made_by() -> str:
+def _name_maker() -> str:
     """Return the commit of gsl and the studies, or where their sources are of none, their hash."""
     made = commit()
     if made is None or made["dirty"]:

@@ -38,15 +38,15 @@ def read(path: Path, kind: type[Figures]) -> dict[str, list[dict[str, Any]]]:
     Raises:
         ArtifactError: The file holds something else, a trial twice, or figures that cannot be.
     """
-    adapter, found, last = TypeAdapter[Figures](kind), dict[str, list[dict[str, Any]]](), None
-    for index, row in enumerate(_parsed(path), start=1):
+    adapter, rows, last = TypeAdapter[Figures](kind), dict[str, list[dict[str, Any]]](), None
+    for index, row in enumerate(_parse(path), start=1):
         if problem := _problem(row, adapter, kind):
             raise ArtifactError(path, f"row {index} {problem}")
-        if row[RECIPE] in found and row[RECIPE] != last:
+        if row[RECIPE] in rows and row[RECIPE] != last:
             raise ArtifactError(path, f"row {index} is of a trial that the file has already; leave one of the two out")
         last = row[RECIPE]
-        found.setdefault(last, []).append(row)
-    return found
+        rows.setdefault(last, []).append(row)
+    return rows
 
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -71,7 +71,7 @@ def _seal(path: Path) -> Path:
     return path.with_name(f".{path.name}.sha256")
 
 
-def _parsed(path: Path) -> list[dict[str, Any]]:
+def _parse(path: Path) -> list[dict[str, Any]]:
     try:
         rows = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_figure)
     except (ValueError, OSError) as error:
@@ -82,8 +82,10 @@ def _parsed(path: Path) -> list[dict[str, Any]]:
 
 
 def _problem(row: Mapping[str, Any], adapter: TypeAdapter[Figures], kind: type[Figures]) -> str:
-    known = signature(kind).parameters.values()
-    fields = [one.name for one in known if one.name in row or one.default is one.empty]
+    parameters = signature(kind).parameters.values()
+    fields = [
+        parameter.name for parameter in parameters if parameter.name in row or parameter.default is parameter.empty
+    ]
     due = {*fields, RECIPE, MADE_BY}
     if wrong := [
         f"{_few(names)} {how}" for names, how in ((due - row.keys(), "lacking"), (row.keys() - due, "unknown")) if names

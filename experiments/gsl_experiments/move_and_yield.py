@@ -37,17 +37,21 @@ def move_and_yield_figure(
         group: Of joints, whose compliance it is.
     """
     most = max(len(methods) for methods in moving.values())
-    spanned = float(np.ptp([value for methods in moving.values() for one in methods.values() for value in one.values]))
+    spanned = float(
+        np.ptp([value for methods in moving.values() for dots in methods.values() for value in dots.values])
+    )
     with look():
         whole = figure(0.6 + len(moving) * (1.1 + 0.32 * most))
         axes = whole.subplots(len(moving), 2, sharex="col", sharey="row", squeeze=False)
         for (left, right), (world, methods) in zip(axes, moving.items(), strict=True):
             draw_methods(left, methods, CLOSE * spanned)
             left.set_title(f"{world}: how joints move", loc="left", fontsize=10.5)
-            lacking = [name for name in MARKERS if not any(len(getattr(one, name)) for one in yielding[world].values())]
+            lacking = [
+                name for name in MARKERS if not any(len(getattr(shares, name)) for shares in yielding[world].values())
+            ]
             same = f"; no gap in {' and '.join(lacking)}" if lacking else ""
             right.set_title(f"how {group} yield{same}", loc="left", fontsize=10.5)
-            _draw(right, yielding[world], [one.colour for one in methods.values()])
+            _draw(right, yielding[world], [dots.colour for dots in methods.values()])
             right.tick_params(axis="y", length=0, labelleft=False)
         left, right = axes[-1]
         left.set_xlabel("joints off the real ones after 0.2 s [°]")

@@ -30,7 +30,7 @@ from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.optimize import BEST
 from gsl.storage.policy_choice import EVALUATION
 from gsl.worlds.gymnasium import GymnasiumWorld, try_out
-from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
+from gsl_experiments.ledger import GOES_ON, Known, Ledger, list_earlier, recipe
 from gsl_experiments.noise_bars import Bars, noise_bars_figure
 from gsl_experiments.noise_table import REFERENCE, NoiseTable, Place, Point
 from gsl_experiments.sizes import First, PresetName, check_rising, numbers, sizes_of, trials_of
@@ -79,12 +79,12 @@ class NoiseStudy:
         check_rising("noises", self.noises)
         check_aggregate(self.iterate, self.methods.values(), "iterate.aggregate")
         if self.iterate.iterations > 1 and self.choice == SIM:
-            given = str(self.iterate.iterations)
-            raise ConfigError("iterate.iterations", "several need choice=real, to go on from", given=given)
+            rounds = str(self.iterate.iterations)
+            raise ConfigError("iterate.iterations", "several need choice=real, to go on from", given=rounds)
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return known_parents(self.known, DATA)
+        return list_earlier(self.known, DATA)
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Run all trials; write the points, the table and the figure."""
@@ -92,7 +92,9 @@ class NoiseStudy:
             check_alike(self.sims.get(name, self.iterate.sim).layout, world.layout)
         for name, grounding in self.methods.items():
             check_trainable(self.iterate, f"methods.{name}", grounding)
-        named = {f"{group}.{name}": one for group in ("worlds", "sims") for name, one in getattr(self, group).items()}
+        named = {
+            f"{group}.{name}": world for group in ("worlds", "sims") for name, world in getattr(self, group).items()
+        }
         try_out({"iterate.sim": self.iterate.sim, **named})
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
@@ -116,15 +118,15 @@ class NoiseStudy:
         """Write the table and the figure of all points; `made` says who made them."""
         table = NoiseTable(
             points,
-            places=[Place(*one) for one in product(self.worlds, self.noises, self._rounds)],
+            places=[Place(*cell) for cell in product(self.worlds, self.noises, self._rounds)],
             shown=self._shown,
-            learned=[name for name, one in self.methods.items() if is_learned(one)],
-            noisy=[name for name, one in self.methods.items() if isinstance(one, ActionNoise)],
+            learned=[name for name, grounding in self.methods.items() if is_learned(grounding)],
+            noisy=[name for name, grounding in self.methods.items() if isinstance(grounding, ActionNoise)],
             trials=self.trials,
             chosen=self.choice == REAL,
         )
         (folder / TABLE).write_text(
-            f"{table.told(*self._below)}\n{sizes_of(self.preset_name)} {made}\n", encoding="utf-8"
+            f"{table.render(*self._below)}\n{sizes_of(self.preset_name)} {made}\n", encoding="utf-8"
         )
         write_study_page(folder, table.answer, [TABLE], [self._draw(folder / FIGURE, table)])
 
@@ -135,13 +137,13 @@ class NoiseStudy:
         of = f"{min(environments)}, " if alike else ""
         last = self._rounds[-1]
         if by_round := len(self.noises) == 1 and last > 1:
-            ticks, along = [f"{one}" for one in self._rounds], "rounds"
+            ticks, along = [f"{number}" for number in self._rounds], "rounds"
         else:
             ticks = [f"{noise:g}" for noise in self.noises] if any(self.noises) else ["no noise"]
             along = "sd of action noise in real [half ranges]" if any(self.noises) else ""
         panels = {}
         for world in self.worlds:
-            where = [Place(*one) for one in product([world], self.noises, self._rounds if by_round else [last])]
+            where = [Place(*cell) for cell in product([world], self.noises, self._rounds if by_round else [last])]
             panels[f"{of}{world.replace('_', ' ')}"] = Bars(ticks, table.means(where))
         hatched = "without real data" if self.choice == SIM else "no model of real"
         title = f"Return in real, mean ± standard error ({trials_of(self.first, self.trials)}); hatched: {hatched}"
@@ -150,11 +152,11 @@ class NoiseStudy:
     @property
     def _shown(self) -> dict[str, str]:
         """Names of all methods for people."""
-        told = {
+        names = {
             method: f"ane {grounding.sd:g}" if isinstance(grounding, ActionNoise) else method
             for method, grounding in self.methods.items()
         }
-        return {**told, REFERENCE: REFERENCE}
+        return {**names, REFERENCE: REFERENCE}
 
     @property
     def _rounds(self) -> range:
@@ -168,21 +170,23 @@ class NoiseStudy:
             real, sim = replace(self.worlds[world], action_noise=noise), self.sims.get(world)
             chain = self._chain(sim or self.iterate.sim)
             alone, below = home / (f"{world}_sim" if sim else "sim"), home / f"{world}_{noise:g}"
-            start = chain.pretrained(alone / "pretrained" / name, seed, console)
+            start = chain.pretrain(alone / "pretrained" / name, seed, console)
             shared = {SIM: alone / "models" / name, REAL: below / "models" / name}
             at = replace(chain, real=real, optimizer=self.further, shared=shared)
             for method, grounding in self.methods.items():
                 place = below / method / name
                 first = place if is_learned(grounding) else alone / method / name
                 of = partial(Point, world, noise, method, number)
-                points += self._carried_out(of, at, grounding, first, place, start, seed, console)
+                points += self._play_rounds(of, at, grounding, first, place, start, seed, console)
             of, place = partial(Point, world, noise, REFERENCE, number), below / "real" / name
-            for one in self._carried_out(of, replace(at, sim=real), NoGrounding(), place, place, start, seed, console):
-                spent = one.round * self.further.taken if isinstance(self.further, Trpo) else None
-                points.append(one._replace(real_steps=spent))
+            for point in self._play_rounds(
+                of, replace(at, sim=real), NoGrounding(), place, place, start, seed, console
+            ):
+                spent = point.round * self.further.steps_taken if isinstance(self.further, Trpo) else None
+                points.append(point._replace(real_steps=spent))
         return points
 
-    def _carried_out(
+    def _play_rounds(
         self,
         of: Callable[..., Point],
         chain: Chain,
@@ -199,14 +203,14 @@ class NoiseStudy:
             if number > 1:
                 first = place = home / f"iteration_{number:02d}"
             at, only = seed_of_round(seed, number), BEST if self.choice == SIM else ""
-            _, found, measured = chain.round(place, grounding, start, at, console, search=first, only=only)
+            _, search, measured = chain.round(place, grounding, start, at, console, search=first, only=only)
             spent += _steps(chain.shared.get(REAL, place)) if REAL in evidence_of(grounding) else 0
-            told = measured.metrics
+            metrics = measured.metrics
             if self.choice == SIM:
-                value, promised = told["last"]["value"], found.metrics["best_value_sim"]
+                value, promised = metrics["last"]["value"], search.metrics["best_value_sim"]
             else:
-                value, choice = told["returned"]["value"], choice + _choice_steps(measured.folder)
-                promised = told["returned_value_sim"] if told["best_generation"] else promised
+                value, choice = metrics["returned"]["value"], choice + _choice_steps(measured.folder)
+                promised = metrics["returned_value_sim"] if metrics["best_generation"] else promised
             yield of(number, float(value), spent, choice, promised)
             start, chain = str(measured.folder), replace(chain.after(place), shared={})
 
@@ -214,7 +218,7 @@ class NoiseStudy:
     def _reference(self) -> str:
         """How much of the real world the reference learned from, in a round."""
         if isinstance(self.further, Trpo):
-            return f"{self.further.taken:,} steps"
+            return f"{self.further.steps_taken:,} steps"
         return f"{self.further.generations * self.further.candidates * self.iterate.budget.rollouts:,} episodes"
 
     @property
@@ -247,5 +251,7 @@ def _steps(place: Path) -> int:
 
 
 def _choice_steps(evaluation: Path) -> int:
-    told = json.loads((evaluation / EVALUATION).read_text(encoding="utf-8"))
-    return round(sum(one["episodes"] * one["outcome"]["steps"] for one in [*told["policies"], *told["check"]]))
+    document = json.loads((evaluation / EVALUATION).read_text(encoding="utf-8"))
+    return round(
+        sum(policy["episodes"] * policy["outcome"]["steps"] for policy in [*document["policies"], *document["check"]])
+    )

@@ -18,7 +18,7 @@ class Curve(NamedTuple):
     """Values at each noise."""
 
     noises: Sequence[float]
-    found: Sequence[Interval]
+    intervals: Sequence[Interval]
 
 
 def noise_curve_figure(curves: Mapping[str, Curve], exact: Mapping[str, Sequence[float]], title: str) -> Figure:
@@ -39,8 +39,8 @@ def noise_curve_figure(curves: Mapping[str, Curve], exact: Mapping[str, Sequence
             axes.annotate(name, (noises[middle], values[middle]), (8, 8), textcoords="offset points", color=COMMAND)
         for name, curve in curves.items():
             colour = method_colour(name)
-            means = [one.mean for one in curve.found]
-            bounds = np.array([(one.lower, one.upper) for one in curve.found]).T
+            means = [interval.mean for interval in curve.intervals]
+            bounds = np.array([(interval.lower, interval.upper) for interval in curve.intervals]).T
             axes.plot(noises, means, "o-", color=colour, markersize=4)
             if np.isfinite(bounds).all():
                 axes.fill_between(noises, *bounds, color=colour, alpha=0.2, linewidth=0)

@@ -90,34 +90,34 @@ class NoiseTable:
             for method, name in self.shown.items()
         }
 
-    def told(self, *below: str) -> str:
+    def render(self, *below: str) -> str:
         """Return what all methods came to, with lines below that, their differences, and what simulators promised."""
         rows = []
         for place in self.places:
             values = {method: _values(self.points, place, method) for method in self.shown}
-            means = [_mean(found) for found in values.values()]
-            known = values.keys() >= BOTH and self.trials > 1
-            apart = _difference(values["sgat"], values["gat"]) if known else "-"
-            told = (f"{mean:.0f}" + f" ± {error:.0f}" * (self.trials > 1) for mean, error in means)
-            here = [one for one in self.points if one.place == place]
-            spent = [_spent(one.real_steps for one in here if one.method != REFERENCE)]
-            spent += [_spent(one.choice_steps for one in here)] if self.chosen else []
-            rows.append(self._row(place, *told, apart, *spent))
-        titles = self._titled(*self.shown.values(), "sgat - gat (95 %)", "real steps")
+            means = [_mean(returns) for returns in values.values()]
+            paired = values.keys() >= BOTH and self.trials > 1
+            apart = _difference(values["sgat"], values["gat"]) if paired else "-"
+            cells = (f"{mean:.0f}" + f" ± {error:.0f}" * (self.trials > 1) for mean, error in means)
+            here = [point for point in self.points if point.place == place]
+            spent = [_sum_spent(point.real_steps for point in here if point.method != REFERENCE)]
+            spent += [_sum_spent(point.choice_steps for point in here)] if self.chosen else []
+            rows.append(self._row(place, *cells, apart, *spent))
+        titles = self._list_titles(*self.shown.values(), "sgat - gat (95 %)", "real steps")
         titles += ["real steps of the choice"] if self.chosen else []
         return "\n".join([markdown(titles, rows), *below, "", *self._differences(), *self._promises()])
 
     @property
     def answer(self) -> Answer:
         """How much more the best learned grounding returns than none, where the noise is largest and the round last."""
-        place = max(self.places, key=lambda one: (one.noise, one.round))
+        place = max(self.places, key=lambda cell: (cell.noise, cell.round))
         question = "Does a learned grounding return more on the real side than none?"
         values = {method: _values(self.points, place, method) for method in self.methods}
         best = max(self.learned, key=lambda name: np.mean(values[name]), default=None)
         where = f"In {place.world} at noise {place.noise:g}"
         if best is None or "none" not in values:
-            told = (f"{self.shown[name]} {np.mean(found):.0f}" for name, found in values.items())
-            return Answer(question, f"{where}, methods return {', '.join(told)}.", sure=False)
+            phrases = (f"{self.shown[name]} {np.mean(returns):.0f}" for name, returns in values.items())
+            return Answer(question, f"{where}, methods return {', '.join(phrases)}.", sure=False)
         apart = mean_interval(np.subtract(values[best], values["none"]))
         return answer_difference(
             question, f"{where}, {self.shown[best]} minus none", apart, Unit(name="of return"), CHOSEN
@@ -126,7 +126,7 @@ class NoiseTable:
     def _promises(self) -> list[str]:
         """Return the lines of a table of what policies were worth where they were learned, and in real."""
         rows = [
-            self._row(place, *(_kept(_at(self.points, place, method)) for method in self.methods))
+            self._row(place, *(_describe_promises(_at(self.points, place, method)) for method in self.methods))
             for place in self.places
         ]
         shown = [self.shown[method] for method in self.methods]
@@ -135,7 +135,7 @@ class NoiseTable:
             "Mean return where a policy was learned -> in the real world. The first is of few episodes; those of a\n"
             f"search also chose the policy, which flatters it.{start}"
         )
-        return [markdown(self._titled(*shown), rows), below, ""]
+        return [markdown(self._list_titles(*shown), rows), below, ""]
 
     def _differences(self) -> list[str]:
         """Return the lines of a table of what learned groundings are above methods that know nothing, by trial."""
@@ -147,18 +147,18 @@ class NoiseTable:
             values = {method: _values(self.points, place, method) for method in self.methods}
             best = max(noisy, key=lambda name: np.mean(values[name]), default=None)
             others = [name for name in ("none", best) if name in values]
-            told = [_difference(values[name], values[other]) for other in others for name in learned]
-            rows.append(self._row(place, *told, *([self.shown[best]] if best else [])))
+            cells = [_difference(values[name], values[other]) for other in others for name in learned]
+            rows.append(self._row(place, *cells, *([self.shown[best]] if best else [])))
         others = [*(["none"] if "none" in self.methods else []), *(["best ane"] if noisy else [])]
         titles = [f"{name} - {other}" for other in others for name in learned]
         below = "Paired differences with 95 % intervals. These do not count that the best width was chosen."
-        return [markdown(self._titled(*titles, *(["best ane"] if noisy else [])), rows), below, ""]
+        return [markdown(self._list_titles(*titles, *(["best ane"] if noisy else [])), rows), below, ""]
 
     @property
     def _several(self) -> bool:
         return any(place.round > 1 for place in self.places)
 
-    def _titled(self, *titles: str) -> list[str]:
+    def _list_titles(self, *titles: str) -> list[str]:
         return ["real world", "noise", *(["round"] if self._several else []), *titles]
 
     def _row(self, place: Place, *cells: str) -> list[str]:
@@ -166,11 +166,11 @@ class NoiseTable:
 
 
 def _at(points: Sequence[Point], place: Place, method: str) -> list[Point]:
-    return [one for one in points if (one.place, one.method) == (place, method)]
+    return [point for point in points if (point.place, point.method) == (place, method)]
 
 
 def _values(points: Sequence[Point], place: Place, method: str) -> list[float]:
-    return [one.value for one in _at(points, place, method)]
+    return [point.value for point in _at(points, place, method)]
 
 
 def _difference(values: Sequence[float], others: Sequence[float]) -> str:
@@ -178,22 +178,22 @@ def _difference(values: Sequence[float], others: Sequence[float]) -> str:
     differences = np.subtract(values, others)
     if not differences.any():
         return "-"
-    found = mean_interval(differences)
-    return f"{found.mean:+.0f} ({found.lower:+.0f} to {found.upper:+.0f})"
+    interval = mean_interval(differences)
+    return f"{interval.mean:+.0f} ({interval.lower:+.0f} to {interval.upper:+.0f})"
 
 
-def _kept(trials: Sequence[Point]) -> str:
+def _describe_promises(trials: Sequence[Point]) -> str:
     """Return what policies promised and what the real world gave them, and how many are what all began with."""
-    new = [(one.promised, one.value) for one in trials if one.promised is not None]
+    new = [(trial.promised, trial.value) for trial in trials if trial.promised is not None]
     start = f" ({len(trials) - len(new)})" if len(new) < len(trials) else ""
     if not new:
-        return f"{np.mean([one.value for one in trials]):.0f}{start}"
+        return f"{np.mean([trial.value for trial in trials]):.0f}{start}"
     promised, value = np.mean(new, axis=0)
     return f"{promised:.0f} -> {value:.0f}{start}"
 
 
-def _spent(steps: Iterable[int | None]) -> str:
-    counted = [one for one in steps if one]
+def _sum_spent(steps: Iterable[int | None]) -> str:
+    counted = [count for count in steps if count]
     return f"{np.median(counted):,.0f} ({min(counted):,} to {max(counted):,})" if counted else "-"
 
 

@@ -11,7 +11,7 @@ from gsl.core.statistics import Interval
 from gsl.core.unit import Unit
 from gsl.report.markdown import table
 from gsl_experiments.comparison import Summary, summaries
-from gsl_experiments.comparison_table import bounds, places, starred
+from gsl_experiments.comparison_table import bounds, explain_star, places
 from gsl_experiments.trial import Trial
 
 
@@ -30,15 +30,15 @@ SPEED = "speed [cm/s]"
 
 def worth(trials: Sequence[Trial], task: Task) -> Drawn:
     """Return improvements where every trial has one to tell, else values."""
-    told = [trial.told_improvement for trial in trials if trial.told_improvement is not None]
-    if len(told) == len(trials):
-        return Drawn("improvement over π0 on the real side [%]", told)
+    improvements = [trial.plausible_improvement for trial in trials if trial.plausible_improvement is not None]
+    if len(improvements) == len(trials):
+        return Drawn("improvement over π0 on the real side [%]", improvements)
     return Drawn(f"on the real side [{task.unit}]", [task.shown * trial.value for trial in trials])
 
 
-def improvement_cells(one: Summary) -> tuple[str, str]:
+def improvement_cells(summary: Summary) -> tuple[str, str]:
     """Return a mean improvement and its interval [%], nothing where a trial has none to tell."""
-    return ("", "") if one.improvement is None else (f"{one.improvement.mean:.1f}", bounds(one.improvement))
+    return ("", "") if summary.improvement is None else (f"{summary.improvement.mean:.1f}", bounds(summary.improvement))
 
 
 def value_cells(interval: Interval, task: Task) -> tuple[str, str]:
@@ -55,7 +55,7 @@ def every_trial(trials: Sequence[Trial]) -> str:
         + (", ".join(_one(trial) for trial in trials if trial.cell == cell),)
         for cell in cells
     ]
-    head = f"Improvement of each trial [%]; {starred(trials)}:\n"
+    head = f"Improvement of each trial [%]; {explain_star(trials)}:\n"
     return "\n".join([head, table(("worlds", "grounding", "iteration", "trials"), rows)])
 
 
@@ -66,22 +66,24 @@ def one_by_one(trials: Sequence[Trial], task: Task) -> str:
         **{title: attrgetter(name) for title, name in where.items()},
         "grounding": attrgetter("method"),
         "trial": attrgetter("number"),
-        f"π0 [{task.unit}]": lambda one: f"{task.shown * one.start:z.1f}",
-        f"returned [{task.unit}]": lambda one: f"{task.shown * one.value:z.1f}",
-        "improvement [%]": lambda one: "" if one.told_improvement is None else f"{one.told_improvement:z.1f}",
-        f"gained at least, 95 % [{task.unit}]": lambda one: f"{task.shown * one.surely:.1f}",
-        "best generation": lambda one: one.generation or "",
-        "stable winners": lambda one: f"{one.stable} of {one.winners}",
+        f"π0 [{task.unit}]": lambda trial: f"{task.shown * trial.start:z.1f}",
+        f"returned [{task.unit}]": lambda trial: f"{task.shown * trial.value:z.1f}",
+        "improvement [%]": lambda trial: (
+            "" if trial.plausible_improvement is None else f"{trial.plausible_improvement:z.1f}"
+        ),
+        f"gained at least, 95 % [{task.unit}]": lambda trial: f"{task.shown * trial.surely:.1f}",
+        "best generation": lambda trial: trial.generation or "",
+        "stable winners": lambda trial: f"{trial.stable} of {trial.winners}",
         "improving winners": attrgetter("improving"),
-        "falls": lambda one: f"{one.falls} of {one.episodes}",
-        "rank": lambda one: "" if one.rank is None else f"{one.rank:.2f}",
-        "alpha": lambda one: "" if one.alpha is None else f"{one.alpha:g}",
-        "refused": lambda one: "yes" if one.refused else "no",
+        "falls": lambda trial: f"{trial.falls} of {trial.episodes}",
+        "rank": lambda trial: "" if trial.rank is None else f"{trial.rank:.2f}",
+        "alpha": lambda trial: "" if trial.alpha is None else f"{trial.alpha:g}",
+        "refused": lambda trial: "yes" if trial.refused else "no",
         "real episodes": attrgetter("real_episodes"),
     }
-    return table(tuple(tellers), [[str(tell(one)) for tell in tellers.values()] for one in trials])
+    return table(tuple(tellers), [[str(tell(trial)) for tell in tellers.values()] for trial in trials])
 
 
 def _one(trial: Trial) -> str:
-    told = trial.told_improvement
-    return "-" if told is None else f"{told:.1f}{'*' if trial.without else ''}"
+    improvement = trial.plausible_improvement
+    return "-" if improvement is None else f"{improvement:.1f}{'*' if trial.without else ''}"

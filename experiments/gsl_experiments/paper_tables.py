@@ -18,7 +18,7 @@ from gsl.core.statistics import Interval, mean_interval, wilson
 from gsl.report.markdown import table
 from gsl.tasks.arm import Arm
 from gsl_experiments.comparison import differences, summaries
-from gsl_experiments.comparison_table import bounds, places, told_difference
+from gsl_experiments.comparison_table import bounds, format_difference, places
 from gsl_experiments.paper_cells import NOTHING, SPEED, Drawn, every_trial, improvement_cells, value_cells, worth
 from gsl_experiments.trial import Trial
 
@@ -40,31 +40,31 @@ class Table3:
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
-        found = summaries(trials)
-        where = places(found, told=["iteration"])
+        results = summaries(trials)
+        where = places(results, shown=["iteration"])
         titles = (
             *(*where, "grounding", "iteration", f"in real [{task.unit}]", "95 % interval", "improvement [%]"),
             *("95 % interval", "best generation", "falls", "refused", "stopped by then"),
             *(f"where they stop [{task.unit}]", "real episodes", f"paper [{task.unit}]", "paper: improvement [%]"),
         )
         rows = []
-        for one in found:
-            own = one.own(trials)
-            chains = [[past for past in trials if past.cell[:3] == one[:3] and past.number == k.number] for k in own]
-            so_far = [[past for past in chain if past.iteration <= one.iteration] for chain in chains]
+        for row in results:
+            own = row.own(trials)
+            chains = [[past for past in trials if past.cell[:3] == row[:3] and past.number == k.number] for k in own]
+            so_far = [[past for past in chain if past.iteration <= row.iteration] for chain in chains]
             stops = sum(any(past.surely <= 0.0 for past in chain) for chain in so_far)
-            stopped = mean_interval([_returned(chain) for chain in so_far])
-            paper = TABLE_3.get(one.iteration, NOTHING[:2]) if one.method == "gat" else NOTHING[:2]
+            stopped = mean_interval([_read_return(chain) for chain in so_far])
+            paper = TABLE_3.get(row.iteration, NOTHING[:2]) if row.method == "gat" else NOTHING[:2]
             rows.append(
-                (*one.cells(where), one.method, str(one.iteration))
-                + (*value_cells(one.value, task), *improvement_cells(one))
+                (*row.cells(where), row.method, str(row.iteration))
+                + (*value_cells(row.value, task), *improvement_cells(row))
                 + (
-                    one.best_generation,
-                    str(one.falls),
-                    f"{one.refused} of {one.trials}",
-                    f"{stops} of {one.trials}",
+                    row.best_generation,
+                    str(row.falls),
+                    f"{row.refused} of {row.trials}",
+                    f"{stops} of {row.trials}",
                     value_cells(stopped, task)[0],
-                    f"{one.real_episodes:.0f}",
+                    f"{row.real_episodes:.0f}",
                     *paper,
                 )
             )
@@ -72,7 +72,7 @@ class Table3:
         below = f"π0 in real: {task.shown * start.mean:.1f} {task.unit} (paper: 19.5)."
         return "\n".join([table(titles, rows), below, "", every_trial(trials)])
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
+    def select(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return what a trial is worth."""
         return worth(trials, task)
 
@@ -85,22 +85,22 @@ class Table4:
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
-        found = summaries(trials)
-        where = places(found, told=["iteration"])
+        results = summaries(trials)
+        where = places(results, shown=["iteration"])
         titles = (
             *(*where, "grounding", "step", f"in real, a fall worth 0 [{task.unit}]", "95 % interval"),
             *("speed [cm/s]", "falls", "95 % interval [%]", "real episodes", "paper: speed [cm/s]", "paper: falls"),
         )
         rows = []
-        for one in found:
-            own = one.own(trials)
+        for row in results:
+            own = row.own(trials)
             low, high = (f"{100 * bound:.0f}" for bound in _share_of_falls(own)[1:])
             speed = np.mean([trial.outcome.get(SPEED, np.nan) for trial in own])
             rows.append(
-                (*one.cells(where), one.method, str(one.iteration))
-                + (*value_cells(one.value, task), f"{speed:.1f}")
-                + (f"{one.falls} of {sum(trial.episodes for trial in own)}", f"{low} to {high}")
-                + (f"{one.real_episodes:.0f}", *TABLE_4.get((one.method, one.iteration), NOTHING[:2]))
+                (*row.cells(where), row.method, str(row.iteration))
+                + (*value_cells(row.value, task), f"{speed:.1f}")
+                + (f"{row.falls} of {sum(trial.episodes for trial in own)}", f"{low} to {high}")
+                + (f"{row.real_episodes:.0f}", *TABLE_4.get((row.method, row.iteration), NOTHING[:2]))
             )
         start = mean_interval([trial.start for trial in trials if trial.iteration == 1])
         below = [
@@ -109,7 +109,7 @@ class Table4:
         ]
         return "\n".join([table(titles, rows), *below, *_differences(trials, task, self.against, falls=True)])
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
+    def select(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return what a trial is worth: of a π0 that falls half of the time shares would be of little."""
         return Drawn(f"in real, a fall worth 0 [{task.unit}]", [task.shown * trial.value for trial in trials])
 
@@ -120,23 +120,23 @@ class LinearWalkTable:
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table."""
-        found = summaries(trials)
-        where = places(found, told=["iteration"])
+        results = summaries(trials)
+        where = places(results, shown=["iteration"])
         titles = (
             *(*where, "grounding", "iteration", f"distance in real [{task.unit}]", "95 % interval"),
             *("trials without a gain", "without an improving winner", "best generation", "falls", "real episodes"),
             *("paper [cm]", "paper: without an improving winner", "paper: best generation"),
         )
         rows = [
-            (*one.cells(where), one.method, str(one.iteration), *value_cells(one.value, task))
-            + (f"{one.without} of {one.trials}", f"{one.unimproved} of {one.trials}", one.best_generation)
-            + (str(one.falls),)
-            + (f"{one.real_episodes:.0f}", *(LINEAR_WALK.get(one.method, NOTHING) if one.iteration == 1 else NOTHING))
-            for one in found
+            (*row.cells(where), row.method, str(row.iteration), *value_cells(row.value, task))
+            + (f"{row.without} of {row.trials}", f"{row.unimproved} of {row.trials}", row.best_generation)
+            + (str(row.falls),)
+            + (f"{row.real_episodes:.0f}", *(LINEAR_WALK.get(row.method, NOTHING) if row.iteration == 1 else NOTHING))
+            for row in results
         ]
         return "\n".join([table(titles, rows), *_differences(trials, task, ("none", "gat"))])
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
+    def select(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return the distances."""
         return Drawn(f"distance in real [{task.unit}]", [task.shown * trial.value for trial in trials])
 
@@ -152,20 +152,20 @@ class Figure5:
 
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the figure's values as a table."""
-        rows, first, found = [], trials[0].method, summaries(trials)
-        where = places(found)
-        for one in found:
-            own = one.own(trials)
+        rows, first, results = [], trials[0].method, summaries(trials)
+        where = places(results)
+        for row in results:
+            own = row.own(trials)
             farther = differences(trials, own[0].cell, first, _on_average)
             cells = (
                 *_degrees(map(_on_average, own)),
-                "" if one.method == first else told_difference(farther),
+                "" if row.method == first else format_difference(farther),
                 *_degrees(trial.last[AT_THE_END] for trial in own),
                 f"{sum(trial.last[ABOVE] > 0.0 for trial in own)} of {len(own)}",
                 *_degrees(trial.outcome[ON_AVERAGE] for trial in own),
-                f"{one.real_episodes:.0f}",
+                f"{row.real_episodes:.0f}",
             )
-            rows.append((*one.cells(where), one.method, *cells))
+            rows.append((*row.cells(where), row.method, *cells))
         titles = (
             *(*where, "grounding", "mean distance [°]", "95 % interval", f"minus {first} [°] (95 %)"),
             *("final distance [°]", "95 % interval", "trials above the goal"),
@@ -173,7 +173,7 @@ class Figure5:
         )
         return table(titles, rows)
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
+    def select(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return the mean distances; an arm above the goal has failed."""
         failed = [trial.last[ABOVE] > 0.0 for trial in trials]
         return Drawn(
@@ -184,7 +184,7 @@ class Figure5:
 def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *, falls: bool = False) -> list[str]:
     """Return the table of values, and of falls, against those of other methods, paired by trial, if there are any."""
     methods, rows = list(dict.fromkeys(trial.method for trial in trials)), []
-    where = places(summaries(trials), told=["iteration"])
+    where = places(summaries(trials), shown=["iteration"])
     for other, cell in product(against, dict.fromkeys(trial.cell for trial in trials)):
         if other not in methods or methods.index(cell.method) <= methods.index(other):
             continue
@@ -204,8 +204,8 @@ def _on_average(trial: Trial) -> float:
 
 def _degrees(distances: Iterable[float]) -> tuple[str, str]:
     """Return the cells of a mean and its interval."""
-    found = mean_interval(list(distances))
-    return f"{found.mean:.1f}", bounds(found)
+    interval = mean_interval(list(distances))
+    return f"{interval.mean:.1f}", bounds(interval)
 
 
 def _share_of_falls(trials: Sequence[Trial]) -> Interval:
@@ -216,7 +216,7 @@ def _share_of_falls(trials: Sequence[Trial]) -> Interval:
     return Interval(*np.clip(mean_interval(shares), 0.0, 1.0).tolist())
 
 
-def _returned(chain: Sequence[Trial]) -> float:
+def _read_return(chain: Sequence[Trial]) -> float:
     """Return the value of what an `iterate` of a trial's iterations, in order, returns."""
     value = chain[0].start
     for trial in chain:

@@ -31,9 +31,9 @@ from gsl.validation.replay import replay_starts
 from gsl.worlds.bullet import BulletWorld
 from gsl_experiments.compare import Compare
 from gsl_experiments.effort import seconds
-from gsl_experiments.gain_predictors import TRIALS, predictors, searched
-from gsl_experiments.held_out import MEASURED, check_first_iteration, check_robot, held_out, starts
-from gsl_experiments.ledger import GOES_ON, Known, Ledger, known_parents, recipe
+from gsl_experiments.gain_predictors import TRIALS, predictors, read_searches
+from gsl_experiments.held_out import MEASURED, check_first_iteration, check_robot, collect_held_out, starts
+from gsl_experiments.ledger import GOES_ON, Known, Ledger, list_earlier, recipe
 from gsl_experiments.replay import Replay
 from gsl_experiments.replays_table import FIGURE, TABLE, Shown
 from gsl_experiments.sizes import First, PresetName, numbers, sizes_of, trials_of
@@ -65,7 +65,7 @@ class Replays:
 
     def parents(self) -> Mapping[str, Path]:
         """Everything is made here, but for what is known."""
-        return {**known_parents(self.known, DATA), **known_parents(self.gains, TRIALS, "gains")}
+        return {**list_earlier(self.known, DATA), **list_earlier(self.gains, TRIALS, "gains")}
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Build every grounding as a search would have it, replay, load, write the figures, the table and the picture.
@@ -76,7 +76,7 @@ class Replays:
         self.check()
         study = Compare(self.iterate, self.worlds, self.methods, self.trials)
         home = folder.parent
-        ledger = Ledger(home / DATA, known_parents(self.known, DATA), Replay, console)
+        ledger = Ledger(home / DATA, list_earlier(self.known, DATA), Replay, console)
         keys = self.recipes
         ledger.announce({key: cell[2] for cell, key in keys.items()}, lambda: seconds(study, search=False))
         ledger.judge({key: {"trial": k, "world": world, "method": name} for (k, world, name), key in keys.items()})
@@ -119,21 +119,21 @@ class Replays:
     def _replay(self, home: Path, number: int, world: str, method: str, loads: Loads, console: Console) -> Replay:
         seed, name, below = self.iterate.seed + number - 1, f"trial_{number:02d}", home / world
         chain = replace(self.iterate.chain, real=self.worlds[world], accept=True)
-        held = held_out(chain, below / "held_out" / name, seed, console)
+        held = collect_held_out(chain, below / "held_out" / name, seed, console)
         begins = starts(held, chain)
-        grounding = chain.diagnosed(below / "diagnosis" / name, self.methods[method], seed, console)
+        grounding = chain.diagnose(below / "diagnosis" / name, self.methods[method], seed, console)
         data = {REAL: below / "data" / name, SIM: home / "sim" / "data" / name}
         own = isinstance(grounding, DiagnosedEffects)  # simulations that know the effects
         chain = replace(chain, shared={REAL: data[REAL]} if own else data)
         ready = chain.ready(below / method / name, grounding, None, seed, console)
         gate = Gate(chain.policy.initial, below / method / name, Silent(), accept=True, seed=seed)
         gate.folder.mkdir(parents=True, exist_ok=True)
-        scenario, found = check_grounding(Scenario(chain.sim, chain.task, chain.policy, SIM, ready), gate)
+        scenario, report = check_grounding(Scenario(chain.sim, chain.task, chain.policy, SIM, ready), gate)
         acting, reach = scenario.grounding, None
         env: Any = scenario.world.make()
         drawn = derive_seed(seed, "replays")
         if isinstance(acting, LoadedTransformation):
-            acting = acting.expected
+            acting = acting.deterministic
             reach = ask_reachability(env, acting, of_policy(held, pi0=False), drawn)
         after = replay_starts(env, acting, begins, drawn)
         env.close()
@@ -148,7 +148,7 @@ class Replays:
             pitch=degrees(after[TICKS].pitch),
             forward=after[TICKS].forward_mm,
             unreached=reach.share if reach else None,
-            alpha=found.get("alpha"),
+            alpha=report.get("alpha"),
             replays=len(after[TICKS]),
             **yielding._asdict(),
         )
@@ -158,12 +158,12 @@ class Replays:
         trials = trials_of(self.first, self.trials)
         servos = any(isinstance(innermost(method), LearnedServo) for method in self.methods.values())
         flown = f"effects{' and servos' * servos} from motions in the air"
-        sizes = f"{sizes_of(self.preset_name)} {trials}; {self.iterate.budget.learned}, {flown}."
+        sizes = f"{sizes_of(self.preset_name)} {trials}; {self.iterate.budget.in_words}, {flown}."
         robot = self.iterate.sim.plant.robot if isinstance(self.iterate.sim, BulletWorld) else None
         colours = {name: method_colour(method) for name, method in self.methods.items()}
         shown = Shown(rows, tuple(self.worlds), colours, tuple(joint_groups(robot)) if robot else ())
-        gains = known_parents(self.gains, TRIALS, "gains").values()
-        foretold = predictors(rows, searched(gains), self.iterate.seed)
+        gains = list_earlier(self.gains, TRIALS, "gains").values()
+        foretold = predictors(rows, read_searches(gains), self.iterate.seed)
         parts = filter(None, (shown.table(), MEASURED, *shown.about(), sizes, foretold, made))
         (folder / TABLE).write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")
         write_study_page(folder, shown.answer, [TABLE], [shown.draw(folder / FIGURE)])

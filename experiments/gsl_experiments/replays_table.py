@@ -16,7 +16,7 @@ from gsl.report.markdown import table
 from gsl.report.run_page import Answer
 from gsl.report.style import save
 from gsl_experiments.answer import CHOSEN, answer_difference
-from gsl_experiments.comparison_table import finely, told_difference
+from gsl_experiments.comparison_table import finely, format_difference
 from gsl_experiments.gain_predictors import STANDS
 from gsl_experiments.move_and_yield import Shares, move_and_yield_figure
 from gsl_experiments.replay import Replay
@@ -122,19 +122,19 @@ class Shown:
         reach = [100.0 * row.unreached for row in own if row.unreached is not None]
         means = [f"{np.mean([getattr(row, name) for row in own]):{form}}" for name, form in MEANS.items()]
         last = f"{np.mean(reach):.0f}{_few(len(reach), len(own))}" if reach else ""
-        than = "" if method == first else told_difference(nearer, fine=True)
+        than = "" if method == first else format_difference(nearer, fine=True)
         shares = [_share(own, name, group) for name, group in yielding]
         return [world, method, f"{joints.mean:.2f}", finely(joints), than, *means, last, *shares]
 
 
 def _share(rows: Sequence[Replay], name: str, group: str) -> str:
     """Return the means of a group's share and of what is closed joint by joint."""
-    known = [row for row in rows if getattr(row, name) is not None]
-    parts = [[getattr(row, of)[group] for row in known] for of in (name, f"{name}_closed")]
+    measured = [row for row in rows if getattr(row, name) is not None]
+    parts = [[getattr(row, of)[group] for row in measured] for of in (name, f"{name}_closed")]
     shares, closed = ([share for share in part if share is not None] for part in parts)
     if not shares or not closed:
-        return SAME if known else UNKNOWN
-    return f"{np.mean(shares):z.2f} ({np.mean(closed):z.2f}){_few(len(known), len(rows))}"
+        return SAME if measured else UNKNOWN
+    return f"{np.mean(shares):z.2f} ({np.mean(closed):z.2f}){_few(len(measured), len(rows))}"
 
 
 def _few(some: int, among: int) -> str:

@@ -37,7 +37,7 @@ class PaperTable(Protocol):
     def markdown(self, trials: Sequence[Trial], task: Task) -> str:
         """Return the table with the paper's figures beside ours."""
 
-    def drawn(self, trials: Sequence[Trial], task: Task) -> Drawn:
+    def select(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return what is drawn of every trial."""
 
 
@@ -57,26 +57,26 @@ class Reproduce(Compare):
         """
         kind, task = getattr(self.table, "of", Task), self.iterate.task
         if not isinstance(task, kind):
-            given = f"{type(self.table).__name__} of {type(task).__name__}"
-            raise ConfigError("table", f"tells of {kind.__name__} alone; choose another table=", given=given)
+            kinds = f"{type(self.table).__name__} of {type(task).__name__}"
+            raise ConfigError("table", f"tells of {kind.__name__} alone; choose another table=", given=kinds)
         check_search(self.iterate, "iterate")
-        if absent := sorted(_named(self.table) - self.methods.keys()):
+        if absent := sorted(_list_named(self.table) - self.methods.keys()):
             console.status(f"no methods here, so that the table sets nothing against them: {', '.join(absent)}")
-        trials, made = self.carried_out(folder, console, lambda: seconds(self))
-        told = filter(None, (self.table.markdown(trials, task), foretelling(trials)))
-        parts = [*told, f"{sizes_of(self.preset_name)} {_sizes(self)}\n", made]
+        trials, made = self.carry_out(folder, console, lambda: seconds(self))
+        texts = filter(None, (self.table.markdown(trials, task), foretelling(trials)))
+        parts = [*texts, f"{sizes_of(self.preset_name)} {_sizes(self)}\n", made]
         (folder / TABLE).write_text("\n".join(parts) + "\n", encoding="utf-8")
         (folder / TRIALS).write_text(one_by_one(trials, task), encoding="utf-8")
-        picture = trials_figure(trials, self.methods, self.table.drawn(trials, task), tolerant=self.tolerant)
+        picture = trials_figure(trials, self.methods, self.table.select(trials, task), tolerant=self.tolerant)
         summary = summaries(trials)
         answer = answer_comparison(summary, trials, Unit.of(task))
         write_study_page(folder, answer, [TABLE, TRIALS], [save(picture, folder / FIGURE)])
         return self.metrics(summary)
 
 
-def _named(table: PaperTable) -> set[str]:
+def _list_named(table: PaperTable) -> set[str]:
     """Return the methods that a table's settings list."""
-    values = (getattr(table, one.name) for one in fields(table))  # type: ignore[arg-type]
+    values = (getattr(table, field.name) for field in fields(table))  # type: ignore[arg-type]
     return {name for value in values if isinstance(value, tuple) for name in value if isinstance(name, str)}
 
 
@@ -89,4 +89,4 @@ def _sizes(study: Compare) -> str:
     )
     measured = f"{budget.episodes} for the choice, {budget.check} for the check, {budget.confirmation} for the report"
     trials = trials_of(study.first, study.trials)
-    return f"{trials}. A search: {searched}. {budget.learned.capitalize()}. Real episodes: {measured}."
+    return f"{trials}. A search: {searched}. {budget.in_words.capitalize()}. Real episodes: {measured}."

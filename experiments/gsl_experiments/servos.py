@@ -81,9 +81,9 @@ class Servos:
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""
         logs = {
-            name: path for key, one in self.benches.items() for name, path in log_parents(**{key: one.real}).items()
+            name: path for key, bench in self.benches.items() for name, path in log_parents(**{key: bench.real}).items()
         }
-        return logs | {f"{key}.diagnoses": Path(one.diagnoses) for key, one in self.benches.items()}
+        return logs | {f"{key}.diagnoses": Path(bench.diagnoses) for key, bench in self.benches.items()}
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Replay all, write every error and the tables."""
@@ -93,18 +93,18 @@ class Servos:
             trial = Trial.of(bench, threads(self.workers))
             rows = [row for model in trial.models for row in trial.judge(model, console)]
             motions = [record.name for record in trial.records]
-            texts.append(f"## {name}\n\n{tell(rows, motions, trial.joints)}\n{trial.told}\n")
+            texts.append(f"## {name}\n\n{tell(rows, motions, trial.joints)}\n{trial.remark}\n")
             document[name] = [
-                {"model": one.model, "fitted": one.way, "gains": one.gains, "mean": one.mean, "square": one.square}
-                for one in rows
+                {"model": row.model, "fitted": row.way, "gains": row.gains, "mean": row.mean, "square": row.square}
+                for row in rows
             ]
             document[f"{name} trajectories"] = motions
-            own = [one for one in rows if one.way == WAYS[0] and np.isfinite(one.mean).all()]
-            best[name] = min(own, key=lambda one: float(one.mean.mean())).model
+            own = [row for row in rows if row.way == WAYS[0] and np.isfinite(row.mean).all()]
+            best[name] = min(own, key=lambda row: float(row.mean.mean())).model
         write_json(folder / DATA, json.loads(json.dumps(document, default=np.ndarray.tolist)))
         (folder / TABLE).write_text("\n".join(texts), encoding="utf-8")
-        told = "; ".join(f"{name}: {model}" for name, model in best.items())
-        answer = Answer("Which published servo model replays real motions best, as it is?", told, False, [])
+        winners = "; ".join(f"{name}: {model}" for name, model in best.items())
+        answer = Answer("Which published servo model replays real motions best, as it is?", winners, False, [])
         write_study_page(folder, answer, [TABLE], [])
         return {"best": best}
 
@@ -119,7 +119,7 @@ class Trial:
         models: World and effects by fold, by name.
         joints: Names of the logged joints.
         period: Control period [s].
-        told: A sentence on the fold's file.
+        remark: A sentence on the fold's file.
         threads: That replay side by side.
     """
 
@@ -128,7 +128,7 @@ class Trial:
     models: Mapping[str, tuple[BulletWorld, Sequence[Effects]]]
     joints: Sequence[str]
     period: float
-    told: str
+    remark: str
     threads: int
 
     @classmethod
@@ -142,20 +142,20 @@ class Trial:
             raise ConfigError("nominal", f"is none of the worlds {', '.join(bench.worlds)}", given=bench.nominal)
         log, robot = read_logs(bench.real), lump(bench.worlds[bench.nominal].plant.robot)
         check_log(log, robot, bench.real)
-        records = [one.cut_to_driven() for one in to_records(log, robot)]
-        records = [one for one in records if len(one)]
+        records = [record.cut_to_driven() for record in to_records(log, robot)]
+        records = [record for record in records if len(record)]
         folds = json.loads(Path(bench.diagnoses).read_text(encoding="utf-8"))
-        places = {str(value): k for k, one in enumerate(folds) for value in one["values"]}
-        labels = [str(one.about.get(bench.by)) for one in records]
+        places = {str(value): k for k, fold in enumerate(folds) for value in fold["values"]}
+        labels = [str(record.about.get(bench.by)) for record in records]
         if lost := [label for label in labels if label not in places]:
             raise ConfigError("diagnoses", f"holds no fold without {bench.by} {lost[0]}", given=bench.diagnoses)
         bare: Sequence[Effects] = [{}] * len(folds)
         models = {name: (world, bare) for name, world in bench.worlds.items()}
-        models[DIAGNOSED] = bench.worlds[bench.nominal], [one["parameters"] for one in folds]
-        with_all = 1e3 * float(np.mean(np.concatenate([one["errors"]["diagnosed"] for one in folds])))
-        told = f"With its calibration of single joints the diagnosis leaves {with_all:.1f} mrad in the same folds."
+        models[DIAGNOSED] = bench.worlds[bench.nominal], [fold["parameters"] for fold in folds]
+        with_all = 1e3 * float(np.mean(np.concatenate([fold["errors"]["diagnosed"] for fold in folds])))
+        remark = f"With its calibration of single joints the diagnosis leaves {with_all:.1f} mrad in the same folds."
         fold = np.array([places[label] for label in labels])
-        return cls(records, fold, models, robot.controlled, log.control_period, told, count)
+        return cls(records, fold, models, robot.controlled, log.control_period, remark, count)
 
     def judge(self, name: str, console: Console) -> list[Errors]:
         """Return the errors of a model on held-out trajectories, in each of WAYS."""
@@ -168,13 +168,13 @@ class Trial:
         played: dict[str, dict[float, list[np.ndarray]]] = {}
         gains: list[float] = []
         for k, some in enumerate(effects):
-            held, known = every[self.fold == k], played.setdefault(json.dumps(some, sort_keys=True), {})
+            held, cache = every[self.fold == k], played.setdefault(json.dumps(some, sort_keys=True), {})
             rest = [place for place, index in enumerate(firsts) if self.fold[index] != k]
 
-            def errors(gain: float, some: Effects = some, known: dict[float, list[np.ndarray]] = known) -> Any:
-                if gain not in known:
-                    known[gain] = self._replay(simulator, some, gain, firsts)
-                return known[gain]
+            def errors(gain: float, some: Effects = some, cache: dict[float, list[np.ndarray]] = cache) -> Any:
+                if gain not in cache:
+                    cache[gain] = self._replay(simulator, some, gain, firsts)
+                return cache[gain]
 
             def loss(gain: float, rest: Sequence[int] = rest, errors: Callable[[float], Any] = errors) -> float:
                 return _loss([errors(gain)[place] for place in rest])
@@ -208,7 +208,7 @@ def climb(loss: Callable[[float], float]) -> float:
     """Return the power of 2 at which a loss of one valley is least, to FINEST, from 0 on and no farther than FAR."""
     best, step = 0.0, 1.0
     while step >= FINEST:
-        near = [one for one in (best - step, best + step) if abs(one) <= FAR]
+        near = [exponent for exponent in (best - step, best + step) if abs(exponent) <= FAR]
         lower = min(near, key=loss)
         if loss(lower) < loss(best):
             best = lower
@@ -220,15 +220,15 @@ def climb(loss: Callable[[float], float]) -> float:
 def pad(records: Sequence[Record], simulator: InTheAir, period: float) -> Pieces:
     """Return whole records as windows of one length, to be replayed side by side; the last command stays."""
     robot, longest = lump(simulator.plant.robot), max(map(len, records))
-    whole = [cut_pieces([one], robot, period, warm_up=0, scored=len(one)) for one in records]
+    whole = [cut_pieces([record], robot, period, warm_up=0, scored=len(record)) for record in records]
     commands, real = [], []
-    for one, record in zip(whole, records, strict=True):
+    for piece, record in zip(whole, records, strict=True):
         extra = longest - len(record)
-        newest_first = one.windows.commands[0]
+        newest_first = piece.windows.commands[0]
         commands.append(np.concatenate([np.repeat(newest_first[:1], extra, axis=0), newest_first]))
-        real.append(np.concatenate([one.real[0], np.full((extra, one.real.shape[2]), np.nan)]))
-    motion, clock = np.concatenate([one.windows.motion for one in whole]), np.zeros(len(whole))
-    conditions = tuple(one.conditions for one in records) if any(one.conditions for one in records) else ()
+        real.append(np.concatenate([piece.real[0], np.full((extra, piece.real.shape[2]), np.nan)]))
+    motion, clock = np.concatenate([piece.windows.motion for piece in whole]), np.zeros(len(whole))
+    conditions = tuple(record.conditions for record in records) if any(record.conditions for record in records) else ()
     numbers = np.arange(len(whole))
     return Pieces(Windows(np.array(commands), motion, clock), np.array(real), numbers, 0 * numbers, 0, conditions)
 
@@ -242,11 +242,11 @@ def _loss(errors: Sequence[np.ndarray]) -> float:
 def tell(rows: Sequence[Errors], motions: Sequence[str], joints: Sequence[str]) -> str:
     """Return the tables: all joints with intervals over motions, then every joint."""
     titles = ("model", "fitted on other motions", "factor on kp", "mean absolute [mrad]", "rms [mrad]")
-    whole = [(one.model, one.way, _factor(one), _mean(one, motions), _rms(one, motions)) for one in rows]
+    whole = [(row.model, row.way, _factor(row), _mean(row, motions), _rms(row, motions)) for row in rows]
     single = ("model", "fitted on other motions", *joints)
     each = [
-        (one.model, one.way, *(f"{_mean(one, motions, k)}; {_rms(one, motions, k)}" for k in range(len(joints))))
-        for one in rows
+        (row.model, row.way, *(f"{_mean(row, motions, k)}; {_rms(row, motions, k)}" for k in range(len(joints))))
+        for row in rows
         if len(joints) > 1
     ]
     below = "Intervals of 95 % by bootstrap over motions, repeats together.\n"
@@ -275,8 +275,8 @@ def _interval(values: np.ndarray, motions: Sequence[str], joint: int | None, sta
         return "diverges"
     groups = [np.flatnonzero([name == motion for name in motions]) for motion in dict.fromkeys(motions)]
 
-    def drawn(index: np.ndarray) -> float:
+    def resample(index: np.ndarray) -> float:
         return float(statistic(chosen[np.concatenate([groups[k] for k in index])]))
 
-    found = bootstrap_interval(drawn, len(groups), np.random.default_rng(0))
-    return f"{found.mean:.1f} ({found.lower:.1f} to {found.upper:.1f})"
+    interval = bootstrap_interval(resample, len(groups), np.random.default_rng(0))
+    return f"{interval.mean:.1f} ({interval.lower:.1f} to {interval.upper:.1f})"

@@ -23,8 +23,8 @@ def numbers(first: int, count: int) -> range:
 def check_rising(name: str, values: Sequence[float]) -> None:
     """Refuse the values of a curve that goes back, or has one of them twice."""
     if any(after <= before for before, after in pairwise(values)):
-        given = ",".join(f"{value:g}" for value in values)
-        raise ConfigError(name, "are to rise, the least of them first", given=f"[{given}]")
+        numbers = ",".join(f"{value:g}" for value in values)
+        raise ConfigError(name, "are to rise, the least of them first", given=f"[{numbers}]")
 
 
 def sizes_of(preset_name: str) -> str:

@@ -21,7 +21,7 @@ class Episodes(NamedTuple):
     seen: np.ndarray
 
 
-def played(
+def play(
     table: Table, policy: np.ndarray, episodes: int, rng: np.random.Generator, *, explore: float = 0.0, most: int = 1000
 ) -> Episodes:
     """Play episodes side by side.

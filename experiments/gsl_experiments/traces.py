@@ -64,7 +64,7 @@ class Figure6:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Train the grounding, play the command in the three worlds, draw."""
         _check(self.iterate, self.joint, self.duration)
-        iterate, loaded = self.iterate, trained(self.iterate, folder.parent, console)
+        iterate, loaded = self.iterate, train_grounding(self.iterate, folder.parent, console)
         layout = iterate.sim.layout
         index, period = layout.joints.index(self.joint), layout.control_period
         target = iterate.policy.posture(iterate.policy.initial, layout).copy()
@@ -72,16 +72,16 @@ class Figure6:
         target[index] += self.change
         ticks = round(self.duration / period)
         played = [
-            _played(world, grounding, start, target, ticks, index)
+            _play(world, grounding, start, target, ticks, index)
             for world, grounding in ((iterate.real, NoGrounding()), (iterate.sim, NoGrounding()), (iterate.sim, loaded))
         ]
         (real, command), (bare, _), (grounded, sent) = played
         time = period * np.arange(1 - PAST, ticks + 1)
         moved = slice(PAST, None)  # before, all of them rest
-        found = {"ungrounded": bare[moved], "grounded": grounded[moved]}
+        simulated = {"ungrounded": bare[moved], "grounded": grounded[moved]}
         traces = Traces(time, command, real, bare, grounded, sent)
         picture = joint_trace(folder / "figure_6.png", traces, self.joint, rest=PAST)
-        return _told(folder, self, real[moved], found, [picture])
+        return _write_errors(folder, self, real[moved], simulated, [picture])
 
 
 @component
@@ -106,7 +106,7 @@ class Figure7:
         if extra_ticks(iterate.sim):
             raise ConfigError("iterate.sim", "acts late: f looks several ticks ahead there and draws no trace")
         _check(iterate, self.joint, self.duration)
-        walk = _walked(iterate)
+        walk = _walk(iterate)
         layout = iterate.sim.layout
         index, period = layout.joints.index(self.joint), layout.control_period
         tick = max(PAST, iterate.forward_model.of_body.span, round(self.begin / period))
@@ -114,7 +114,7 @@ class Figure7:
             problem = f"π0's real walk is over after {period * len(walk):.1f} s; begin before"
             raise ConfigError("begin", problem, given=f"{self.begin:g}")
         ticks = min(round(self.duration / period), len(walk) - tick)
-        loaded = trained(iterate, folder.parent, console)
+        loaded = train_grounding(iterate, folder.parent, console)
         place = Place(observations(walk, layout), walk.action, tick)
         env: Any = iterate.sim.make()
         bare, grounded = (
@@ -122,9 +122,9 @@ class Figure7:
             for way in (NoGrounding(), loaded)
         )
         env.close()
-        known = loaded.forward.joints
-        foreseen = _predicted(loaded.forward, walk.only(layout.numbers(known)), tick, ticks)
-        predicted = foreseen[:, known.index(self.joint)]
+        joints = loaded.forward.joints
+        foreseen = _predict(loaded.forward, walk.only(layout.numbers(joints)), tick, ticks)
+        predicted = foreseen[:, joints.index(self.joint)]
         shown = slice(tick + 1, tick + 1 + ticks)
         plain = Traces(walk.time[shown], walk.action[tick : tick + ticks, index], walk.position[shown, index], bare)
         far = [f"{degrees(trace - plain.real):.1f}°" for trace in (predicted, bare)]
@@ -133,11 +133,11 @@ class Figure7:
             folder / "figure_7a.png", plain._replace(grounded=predicted, name="forward model"), self.joint, title=title
         )
         second = joint_trace(folder / "figure_7b.png", plain._replace(grounded=grounded), self.joint)
-        found = {"ungrounded": bare, "forward model": predicted, "grounded": grounded}
-        return _told(folder, self, plain.real, found, [first, second])
+        traces = {"ungrounded": bare, "forward model": predicted, "grounded": grounded}
+        return _write_errors(folder, self, plain.real, traces, [first, second])
 
 
-def trained(iterate: Iterate, home: Path, console: Console) -> LoadedTransformation:
+def train_grounding(iterate: Iterate, home: Path, console: Console) -> LoadedTransformation:
     """Return the grounding of an iteration's settings, alpha 1 for `auto`, trained below `home`."""
     assert isinstance(iterate.grounding, ActionTransformation), "_check has refused others"
     console.status(f"{duration_told(seconds_of_models(iterate))} from nothing; what is built is not built again")
@@ -153,14 +153,14 @@ def _check(iterate: Iterate, joint: str, duration: float) -> None:
     if not isinstance(iterate.grounding, ActionTransformation):
         raise ConfigError("iterate.grounding", "only a transformation of actions can be drawn, such as gat")
     check_trainable(iterate, "iterate.grounding", iterate.grounding)
-    known = iterate.forward_model.joints_of_interest(iterate.sim.layout.joints, "iterate.forward_model")
-    check_known([joint], known, "joint")
+    joints = iterate.forward_model.joints_of_interest(iterate.sim.layout.joints, "iterate.forward_model")
+    check_known([joint], joints, "joint")
     if round(duration / iterate.sim.layout.control_period) < 1:
         problem = f"is less than a tick, {iterate.sim.layout.control_period:g} s"
         raise ConfigError("duration", problem, given=f"{duration:g}")
 
 
-def _played(
+def _play(
     world: World, grounding: Grounding, start: np.ndarray, target: np.ndarray, ticks: int, index: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return a joint's positions and what was sent to it [rad], shape (PAST + ticks,) each; it rests for `PAST`."""
@@ -174,7 +174,7 @@ def _played(
     return np.array(positions), np.array(sent)
 
 
-def _walked(iterate: Iterate) -> Trajectory:
+def _walk(iterate: Iterate) -> Trajectory:
     scenario = Scenario(iterate.real, iterate.task, iterate.policy, REAL, NoGrounding())
     env = scenario.make()
     walk = rollout(scenario, env, iterate.policy.initial, iterate.seed)
@@ -182,7 +182,7 @@ def _walked(iterate: Iterate) -> Trajectory:
     return walk
 
 
-def _predicted(forward: Forward, walk: Trajectory, tick: int, ticks: int) -> np.ndarray:
+def _predict(forward: Forward, walk: Trajectory, tick: int, ticks: int) -> np.ndarray:
     """Return where f, fed with its own answers, sees the joints go [rad], shape (ticks, n_joints)."""
     x, body = walk.position.copy(), read_sensors(walk, forward.history.sensors)
     for now in range(tick, tick + ticks):
@@ -190,14 +190,14 @@ def _predicted(forward: Forward, walk: Trajectory, tick: int, ticks: int) -> np.
     return x[tick + 1 : tick + 1 + ticks]
 
 
-def _told(
+def _write_errors(
     folder: Path,
     figure: Figure6 | Figure7,
     real: np.ndarray,
-    found: Mapping[str, np.ndarray],
+    traces: Mapping[str, np.ndarray],
     pictures: Sequence[Figure],
 ) -> Mapping[str, Any]:
-    errors = {name: degrees(trace - real) for name, trace in found.items()}
+    errors = {name: degrees(trace - real) for name, trace in traces.items()}
     rows = [(figure.joint, name, f"{error:.2f}") for name, error in errors.items()]
     own, neighbours = figure.iterate.budget.real
     learned = f"The grounding learned from {own} real episodes of π0 and {neighbours} around it."

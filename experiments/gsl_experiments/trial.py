@@ -99,14 +99,14 @@ class Trial(NamedTuple):
     def read(cls, row: Mapping[str, Any]) -> Trial:
         """Return a trial as a file's row, which has been checked, tells it."""
         tried = row.get("tried")
-        return cls(**{**row, "tried": None if tried is None else [Tried._make(one) for one in tried]})
+        return cls(**{**row, "tried": None if tried is None else [Tried._make(policy) for policy in tried]})
 
     @classmethod
     def of(
         cls,
         cell: Cell,
         number: int,
-        found: Mapping[str, Any],
+        search: Mapping[str, Any],
         measured: Mapping[str, Any],
         *,
         spent: int,
@@ -119,7 +119,7 @@ class Trial(NamedTuple):
         Args:
             cell: What was tried.
             number: Of the trial.
-            found: Metrics of the search.
+            search: Metrics of the search.
             measured: Metrics of the evaluation.
             spent: Real episodes before this evaluation.
             first: Metrics of the first iteration's evaluation, which has measured π0; none if this is the first.
@@ -141,8 +141,8 @@ class Trial(NamedTuple):
             stable=measured["stable_policies"],
             improving=measured["improving_policies"],
             winners=measured["policies"],
-            alpha=found.get("alpha"),
-            refused=not found.get("grounding_acceptable", True),
+            alpha=search.get("alpha"),
+            refused=not search.get("grounding_acceptable", True),
             rank=rank,
             real_episodes=spent + measured["real_episodes"],
             outcome=after["outcome"],
@@ -156,14 +156,14 @@ class Trial(NamedTuple):
         """What was tried."""
         return Cell(self.simulator, self.world, self.method, self.iteration)
 
-    def told(self, unit: Unit) -> str:
+    def describe(self, unit: Unit) -> str:
         """Return the trial in a few words."""
         winners = f", {self.stable} of {self.winners} winners stable" if unit.falls else ""
-        more = "" if self.told_improvement is None else f" ({self.told_improvement:+.1f} %)"
-        return f"{self.returned}, {unit.shown(self.value)}{more}{winners}"
+        more = "" if self.plausible_improvement is None else f" ({self.plausible_improvement:+.1f} %)"
+        return f"{self.returned}, {unit.format(self.value)}{more}{winners}"
 
     @property
-    def told_improvement(self) -> float | None:
+    def plausible_improvement(self) -> float | None:
         """The improvement that tables tell [%]: None also where it is of a π0 next to nothing, more than tenfold."""
         return self.improvement if self.improvement is not None and telling(self.improvement / 100.0) else None
 

@@ -35,7 +35,9 @@ def trial_dots_figure(panels: Mapping[str, Mapping[str, Dots]], *, axis: str, ti
         title: What there is to see.
     """
     most = max(len(methods) for methods in panels.values())
-    spanned = float(np.ptp([value for methods in panels.values() for one in methods.values() for value in one.values]))
+    spanned = float(
+        np.ptp([value for methods in panels.values() for dots in methods.values() for value in dots.values])
+    )
     with look():
         whole = figure(1.4 + 0.32 * most)
         for axes, (world, methods) in zip(
@@ -51,15 +53,15 @@ def trial_dots_figure(panels: Mapping[str, Mapping[str, Dots]], *, axis: str, ti
 def draw_methods(axes: Axes, methods: Mapping[str, Dots], close: float) -> None:
     """Draw the methods, from above; dots nearer to each other than `close` are moved apart."""
     axes.axvline(0.0, color=QUIET, linewidth=1.0, zorder=0)
-    for row, one in enumerate(methods.values()):
-        values, failed = np.asarray(one.values, float), np.asarray(one.failed, bool)
-        found = mean_interval(values)
-        if np.isfinite(found.lower):
-            axes.hlines(row, found.lower, found.upper, color=one.colour, linewidth=6, alpha=0.25)
-        axes.plot([found.mean] * 2, [row - 0.3, row + 0.3], color=one.colour, linewidth=2.2)
-        for part, face in ((~failed, one.colour), (failed, "white")):
+    for row, dots in enumerate(methods.values()):
+        values, failed = np.asarray(dots.values, float), np.asarray(dots.failed, bool)
+        interval = mean_interval(values)
+        if np.isfinite(interval.lower):
+            axes.hlines(row, interval.lower, interval.upper, color=dots.colour, linewidth=6, alpha=0.25)
+        axes.plot([interval.mean] * 2, [row - 0.3, row + 0.3], color=dots.colour, linewidth=2.2)
+        for part, face in ((~failed, dots.colour), (failed, "white")):
             heights = row + _apart(values, close)[part]
-            axes.plot(values[part], heights, "o", color=one.colour, markerfacecolor=face, markersize=4.5)
+            axes.plot(values[part], heights, "o", color=dots.colour, markerfacecolor=face, markersize=4.5)
     axes.set_yticks(range(len(methods)), list(methods))
     axes.set_ylim(len(methods) - 0.5, -0.5)
     axes.tick_params(axis="y", length=0)

@@ -43,7 +43,7 @@ def trials_figure(trials: Sequence[Trial], methods: Mapping[str, Grounding], dra
     failures = drawn.failed or [trial.surely <= 0.0 if tolerant else trial.without for trial in trials]
     for cell in dict.fromkeys(trial.cell for trial in trials):
         every = zip(trials, drawn.values, failures, strict=True)
-        shown, failed = zip(*((value, one) for trial, value, one in every if trial.cell == cell), strict=True)
+        shown, failed = zip(*((value, failure) for trial, value, failure in every if trial.cell == cell), strict=True)
         panel = f"{cell.simulator} as simulator, {cell.world} in real" if cell.simulator else cell.world
         name = f"{cell.method}, iteration {cell.iteration}" if further else cell.method
         panels.setdefault(panel, {})[name] = Dots(shown, failed, method_colour(methods[cell.method]))

@@ -22,14 +22,14 @@ PREDICTORS: Mapping[str, Callable[[Tried], Any]] = {
 }
 
 
-def read_tried(found: Mapping[str, Any], measured: Artifact) -> list[Tried]:
+def read_tried(search: Mapping[str, Any], measured: Artifact) -> list[Tried]:
     """Return the policies of a search in their order, the one that it began with first.
 
     Args:
-        found: Metrics of the search.
+        search: Metrics of the search.
         measured: Evaluation of its policies.
     """
-    drift = found.get("drift", {})
+    drift = search.get("drift", {})
     rows = json.loads((measured.folder / EVALUATION).read_text(encoding="utf-8"))["policies"]
     return [
         Tried(
@@ -50,15 +50,15 @@ def foretelling(trials: Sequence[Trial]) -> str:
     for trial in trials:
         if trial.tried:
             searches.setdefault(trial.cell, []).append(trial.tried[1:])
-    if not any(one.falls for own in searches.values() for search in own for one in search):
+    if not any(policy.falls for own in searches.values() for search in own for policy in search):
         return ""
     rows = []
     for cell, own in searches.items():
-        telling = [search for search in own if len({one.falls for one in search}) > 1]
-        fell = [one.falls > 0 for search in own for one in search]
+        telling = [search for search in own if len({policy.falls for policy in search}) > 1]
+        fell = [policy.falls > 0 for search in own for policy in search]
         counts = f"{sum(fell)} of {len(fell)}", f"{len(telling)} of {len(own)}"
-        told = (cell.worlds, cell.method, str(cell.iteration), *counts)
-        rows.append((*told, *(_told(telling, figure) for figure in PREDICTORS.values())))
+        place = (cell.worlds, cell.method, str(cell.iteration), *counts)
+        rows.append((*place, *(_format(telling, figure) for figure in PREDICTORS.values())))
     head = (
         "What predicts falls: how often, of two policies of a search, the larger figure is that of the policy which\n"
         "falls more often in the choice. 0.5 is chance. Shares are means over the trials that have such a pair\n"
@@ -68,15 +68,17 @@ def foretelling(trials: Sequence[Trial]) -> str:
     return "\n".join([head, table(titles, rows)])
 
 
-def _told(searches: Sequence[Sequence[Tried]], figure: Callable[[Tried], Any]) -> str:
+def _format(searches: Sequence[Sequence[Tried]], figure: Callable[[Tried], Any]) -> str:
     """Return the mean concordance of a figure with falls over searches and its interval, nothing if one lacks it."""
-    if not searches or any(figure(one) is None for search in searches for one in search):
+    if not searches or any(figure(policy) is None for search in searches for policy in search):
         return ""
-    every = [concordance([figure(one) for one in search], [one.falls for one in search]) for search in searches]
-    found = mean_interval(every)
-    known = len(every) >= FEWEST and found.lower < found.upper
-    bounds = f" ({max(0.0, found.lower):.2f} to {min(1.0, found.upper):.2f})"
-    return f"{found.mean:.2f}{bounds * known}"
+    every = [
+        concordance([figure(policy) for policy in search], [policy.falls for policy in search]) for search in searches
+    ]
+    interval = mean_interval(every)
+    enough = len(every) >= FEWEST and interval.lower < interval.upper
+    bounds = f" ({max(0.0, interval.lower):.2f} to {min(1.0, interval.upper):.2f})"
+    return f"{interval.mean:.2f}{bounds * enough}"
 
 
 def _short(value: float | None) -> float | None:

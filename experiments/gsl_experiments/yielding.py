@@ -24,7 +24,7 @@ class Yielding(NamedTuple):
     strength_closed: Mapping[str, float | None] | None = None
 
 
-def closed_strength(sim: Compliance, grounded: Compliance, real: Compliance, group: str) -> float | None:
+def compute_closed_strength(sim: Compliance, grounded: Compliance, real: Compliance, group: str) -> float | None:
     """Return the share of a group's gap in strength that is closed joint by joint; None where there is none."""
     where = sim.where(group)
     before, after, robot = (place.torque[where] for place in (sim, grounded, real))
@@ -65,7 +65,7 @@ class Loads:
             {group: share.stiffness for group, share in shares.items()},
             {group: share.torque for group, share in shares.items()},
             {group: share.impedance for group, share in shares.items()},
-            {group: closed_strength(sim, grounded, robot, group) for group in shares},
+            {group: compute_closed_strength(sim, grounded, robot, group) for group in shares},
         )
 
     @property

@@ -14,7 +14,7 @@ from gsl.commandline.composer import compose, open_hydra
 from gsl.commandline.config import resolve
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import find_trust
-from gsl.core.described import rebuilt
+from gsl.core.described import restore
 from gsl.core.interfaces import Grounding, Policy, Task, World
 from gsl.core.trust import TRUST
 from gsl.core.validation import config_error
@@ -74,7 +74,7 @@ def _make(group: str, name: str, config_dir: Path | str | None, settings: Mappin
         if folder is not None:  # effects of a world that is there already stay
             load_own_effects(folder, find_trust(arguments))
         composition = compose(ROLES[group], [f"{group}={name}", *overrides(below, f"{group}."), *arguments])
-    made = rebuilt(resolve(composition)[group], trust=composition.trust, where=group)
+    made = restore(resolve(composition)[group], trust=composition.trust, where=group)
     if not isinstance(made, kind):
         raise ConfigError(group, f"is no {group}", given=name)
     return made

@@ -32,7 +32,7 @@ def _text(value: Any) -> str:
         ConfigError: It has no place on a command line.
     """
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {_text(one)}" for key, one in value.items()) + "}"
+        return "{" + ", ".join(f"{key}: {_text(entry)}" for key, entry in value.items()) + "}"
     if isinstance(value, np.ndarray | np.generic):
         return _text(value.tolist())
     if isinstance(value, list | tuple):

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from gsl.core.described import rebuilt
+from gsl.core.described import restore
 from gsl.core.interfaces import World
 from gsl.grounding.diagnosis_file import read_diagnosis
 from gsl.grounding.effects import switch_on
@@ -47,8 +47,8 @@ class Result:
 
     def _repr_html_(self) -> str:
         return "".join(
-            f"<p><b>{escape(told.title)}</b></p>{_table(told.columns, told.rows)}<p>{escape(told.caption or '')}</p>"
-            for told in account(self.artifact)
+            f"<p><b>{escape(part.title)}</b></p>{_table(part.columns, part.rows)}<p>{escape(part.caption or '')}</p>"
+            for part in account(self.artifact)
         )
 
 
@@ -69,7 +69,7 @@ class Verdict(Result):
     @property
     def causes(self) -> list[str]:
         """Names of the effects that cause the gap."""
-        return [one["effect"] for one in self.report["causes"]]
+        return [cause["effect"] for cause in self.report["causes"]]
 
     @property
     def effects(self) -> Mapping[str, Any]:
@@ -79,7 +79,7 @@ class Verdict(Result):
     @property
     def world(self) -> World:
         """The simulator with what it lacks."""
-        sim = rebuilt(self.artifact.config["sim"], trust=self.trust, where="sim")
+        sim = restore(self.artifact.config["sim"], trust=self.trust, where="sim")
         return switch_on(sim, read_diagnosis(str(self.folder), "diagnose"))
 
     @property

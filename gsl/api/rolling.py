@@ -65,10 +65,10 @@ def roll_out(
     how = make(_Rolling, {"episodes": episodes, "role": role, "workers": workers, "seed": seed})
     task, family = task or make_task("walk"), policy or make_policy("walk_engine")
     grounding = grounding or NoGrounding()
-    for given, kind in ((world, World), (task, Task), (family, Policy), (grounding, Grounding)):
-        if not isinstance(given, kind):
+    for argument, kind in ((world, World), (task, Task), (family, Policy), (grounding, Grounding)):
+        if not isinstance(argument, kind):
             name = kind.__name__.lower()
-            raise ConfigError(name, f"is no {name}; gsl.make_{name} makes one", given=str(given))
+            raise ConfigError(name, f"is no {name}; gsl.make_{name} makes one", given=str(argument))
     family = size(family, world)
     chosen = family.initial if parameters is None else _numbers(parameters, family)
     scenario = Scenario(world, task, family, how.role, grounding).prepare()

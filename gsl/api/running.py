@@ -87,6 +87,6 @@ def diagnose(log: Batch | Path | str, world: World | str, *, name: str = "diagno
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(written.read_bytes())
         log = path
-    found = run("diagnose", real=str(log), sim=world, name=name, **settings)
-    assert isinstance(found, Verdict), "a diagnosis has a verdict"
-    return found
+    verdict = run("diagnose", real=str(log), sim=world, name=name, **settings)
+    assert isinstance(verdict, Verdict), "a diagnosis has a verdict"
+    return verdict

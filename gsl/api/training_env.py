@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 
 from gsl.api.components import make_grounding, make_policy, make_task, make_world
-from gsl.core.described import rebuilt
+from gsl.core.described import restore
 from gsl.core.interfaces import SIM, Grounding, Policy, PolicyRun, Task, World
 from gsl.core.layout import Layout
 from gsl.core.validation import make
@@ -110,9 +110,9 @@ def _of_run(run: str | None, trust: tuple[str, ...]) -> tuple[dict[str, Any], di
     parts = {
         name: artifact.config[name] for name in ("world", "task", "policy", "grounding") if name in artifact.config
     }
-    made: dict[str, Any] = {name: rebuilt(part, trust=trust, where=name) for name, part in parts.items()}
+    made: dict[str, Any] = {name: restore(part, trust=trust, where=name) for name, part in parts.items()}
     if artifact.manifest.kind == "diagnose":
-        sim = rebuilt(artifact.config["sim"], trust=trust, where="sim")
+        sim = restore(artifact.config["sim"], trust=trust, where="sim")
         return {"world": switch_on(sim, read_diagnosis(str(artifact.folder), "diagnose"))}, {}
     return made, artifact.metrics
 

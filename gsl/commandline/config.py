@@ -19,7 +19,7 @@ from gsl.commandline.overrides import COMMAND_KEYS, file_of
 from gsl.commandline.own_word import modules_of
 from gsl.core.budget import within
 from gsl.core.console import Console
-from gsl.core.described import describe, rebuilt
+from gsl.core.described import describe, restore
 from gsl.core.setting import component, setting
 from gsl.core.trust import TRUST, check_code
 from gsl.core.validation import make
@@ -135,7 +135,7 @@ def prepare(config: Mapping[str, Any], trust: Collection[str] = ()) -> tuple[Any
         raise missing(path)
     if TRUST in settings:
         settings[TRUST] = list(trust)
-    stage = rebuilt(settings, trust=trust)
+    stage = restore(settings, trust=trust)
     told = describe(stage)  # refuses what could not be written down afterwards
     if own.cluster is not None and not any(name.rpartition(".")[2] == WORKERS for name in flat(told)):
         raise ConfigError("executor", "this command gives nothing to workers; leave it out", given=own.executor)

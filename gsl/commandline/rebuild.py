@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gsl.core.described import rebuilt
+from gsl.core.described import restore
 from gsl.errors import ArtifactError
 from gsl.storage.artifact import CONFIG, Artifact
 from gsl.storage.identity import content_hash
@@ -30,7 +30,7 @@ def rebuild(artifact: Artifact, trust: Sequence[str]) -> tuple[Any, dict[str, An
         if content_hash(source) != parent.hash:
             raise ArtifactError(source, f"is no longer what {artifact.folder.as_posix()} was made from")
         _move(config, parent.role.split("."), source)
-    stage = rebuilt(config, trust=trust)
+    stage = restore(config, trust=trust)
     if not (hasattr(stage, "parents") and hasattr(stage, "run")):
         raise ArtifactError(
             artifact.folder / CONFIG, "names no stage; it is not as gsl wrote it, build the artifact again"

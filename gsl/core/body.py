@@ -137,7 +137,7 @@ class Robot:
         """Return the joint called `name`."""
         return next(joint for joint in self.joints if joint.name == name)
 
-    def commanded(self, name: str) -> tuple[float, float]:
+    def bound_commands(self, name: str) -> tuple[float, float]:
         """Return the range that commands of a motor keep [rad]."""
         joint = self.joint(name)
         lower, upper = self.soft.get(name, (joint.lower, joint.upper))

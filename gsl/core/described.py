@@ -33,24 +33,24 @@ def describe(thing: Any) -> Any:
     return thing
 
 
-def rebuilt(told: Any, *, trust: Collection[str] = (), where: str = "") -> Any:
+def restore(plain: Any, *, trust: Collection[str] = (), where: str = "") -> Any:
     """Return what `describe` returned, read from a file, as components again.
 
     Args:
-        told: Plain data; every mapping with a `_target_` is a component.
+        plain: Plain data; every mapping with a `_target_` is a component.
         trust: Modules that are not gsl's and whose classes may be imported.
         where: Dotted path of the data, for errors.
 
     Raises:
         ConfigError: A setting is wrong, or names a class that is not there or may not be imported.
     """
-    check_code(told, trust, where)
-    return _build(told, where)
+    check_code(plain, trust, where)
+    return _build(plain, where)
 
 
-def _build(told: Any, where: str) -> Any:
-    if isinstance(told, Mapping):
-        settings = {key: _build(value, f"{where}.{key}".lstrip(".")) for key, value in told.items()}
+def _build(plain: Any, where: str) -> Any:
+    if isinstance(plain, Mapping):
+        settings = {key: _build(value, f"{where}.{key}".lstrip(".")) for key, value in plain.items()}
         if TARGET not in settings:
             return settings
         kind = class_of(settings.pop(TARGET), where)
@@ -58,6 +58,6 @@ def _build(told: Any, where: str) -> Any:
             return make(kind, settings)
         except ConfigError as error:
             raise error.under(where) from error
-    if isinstance(told, list | tuple):
-        return [_build(value, f"{where}.{index}".lstrip(".")) for index, value in enumerate(told)]
-    return told
+    if isinstance(plain, list | tuple):
+        return [_build(value, f"{where}.{index}".lstrip(".")) for index, value in enumerate(plain)]
+    return plain

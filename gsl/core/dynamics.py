@@ -78,11 +78,11 @@ def jacobian(robot: Robot, frames: Frames, link: str, point: np.ndarray) -> tupl
 def _ancestors(robot: Robot, link: str) -> list[Joint]:
     """Joints between a link and the base."""
     above = {joint.child: joint for joint in robot.joints}
-    found = []
+    joints = []
     while link in above:
-        found.append(above[link])
+        joints.append(above[link])
         link = above[link].parent
-    return found
+    return joints
 
 
 def _cross(vector: np.ndarray) -> np.ndarray:

@@ -35,8 +35,8 @@ def gain(sensitivity: np.ndarray, damping: float) -> np.ndarray:
     """
     square = sensitivity.T @ sensitivity
     ridge = damping * np.trace(square) / len(square)
-    found: np.ndarray = np.linalg.solve(square + ridge * np.eye(len(square)), sensitivity.T)
-    return found
+    gains: np.ndarray = np.linalg.solve(square + ridge * np.eye(len(square)), sensitivity.T)
+    return gains
 
 
 def solve_action(action: np.ndarray, correction: np.ndarray, wanted: np.ndarray, expected: np.ndarray) -> np.ndarray:
@@ -48,5 +48,5 @@ def solve_action(action: np.ndarray, correction: np.ndarray, wanted: np.ndarray,
         wanted: f(s, a), effect of the action on the real robot [rad], shape (n,).
         expected: f_sim(s, a), its effect in the simulator [rad], shape (n,).
     """
-    found: np.ndarray = action + correction @ (wanted - expected)
-    return found
+    target: np.ndarray = action + correction @ (wanted - expected)
+    return target

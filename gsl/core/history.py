@@ -33,7 +33,7 @@ class History:
     rested: bool = False
 
     @property
-    def sensed(self) -> int:
+    def sensor_entries(self) -> int:
         """Number of sensor entries of one tick."""
         return sum(BODY_SENSORS[name] for name in self.sensors)
 
@@ -44,7 +44,7 @@ class History:
 
     def size(self, n_joints: int) -> int:
         """Return the length of a window."""
-        return (2 + 2 * self.ticks) * n_joints + self.sensor_ticks * self.sensed
+        return (2 + 2 * self.ticks) * n_joints + self.sensor_ticks * self.sensor_entries
 
 
 def windows(
@@ -56,7 +56,7 @@ def windows(
         history: What a window holds.
         position: Joint positions x [rad], shape (T + 1, n_joints).
         action: Actions a [rad], shape (T, n_joints).
-        sensed: Body sensors, shape (T + 1, history.sensed).
+        sensed: Body sensors, shape (T + 1, history.sensor_entries).
         ticks: Each at least `history.span` and less than T.
     """
     return np.concatenate(window_parts(history, position, action, sensed, ticks), axis=1)
@@ -91,8 +91,8 @@ def with_rest(
     def after(first: np.ndarray, column: np.ndarray) -> np.ndarray:
         return np.concatenate([np.repeat(first, history.span, axis=0), column])
 
-    told = find_rest_action(action[:1], position[:1])
-    return after(position[:1], position), after(told, action), after(sensed[:1], sensed)
+    rest = find_rest_action(action[:1], position[:1])
+    return after(position[:1], position), after(rest, action), after(sensed[:1], sensed)
 
 
 def tilt(x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any]:
@@ -107,7 +107,7 @@ class Window:
     """
 
     def __init__(self, history: History, n_joints: int) -> None:
-        k, wide = history.ticks, history.sensed
+        k, wide = history.ticks, history.sensor_entries
         self._raw, self._values = np.zeros((2 + 2 * k, n_joints)), np.zeros(history.size(n_joints))
         self._joints = self._values[: self._raw.size].reshape(self._raw.shape)
         self._here = self._joints[1]
@@ -119,7 +119,7 @@ class Window:
         self._fresh = True
 
     def see(self, position: np.ndarray, sensed: np.ndarray | Sequence[float]) -> None:
-        """Take in the joint positions [rad], shape (n_joints,), and body sensors, shape (history.sensed,)."""
+        """Take in the joint positions [rad], shape (n_joints,), and body sensors, shape (history.sensor_entries,)."""
         older, newer = self._positions
         older[:] = position if self._fresh else newer
         self._position[:] = position

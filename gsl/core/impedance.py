@@ -22,8 +22,8 @@ def phasors(values: np.ndarray, times: np.ndarray, frequency: float) -> np.ndarr
     """
     phase = 2.0 * np.pi * frequency * times
     columns = np.stack([np.cos(phase), -np.sin(phase), np.ones_like(times), times - times.mean()], axis=1)
-    found = np.linalg.lstsq(columns, values, rcond=None)[0]
-    amplitudes: np.ndarray = found[0] + 1j * found[1]
+    solution = np.linalg.lstsq(columns, values, rcond=None)[0]
+    amplitudes: np.ndarray = solution[0] + 1j * solution[1]
     return amplitudes
 
 

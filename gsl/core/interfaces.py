@@ -71,7 +71,7 @@ class Judged(NamedTuple):
 class ByDistance(Protocol):
     """A task whose value follows from a distance, so that a tape measure will do."""
 
-    def measured(self, distance: float, *, fell: bool) -> Judged:
+    def judge_distance(self, distance: float, *, fell: bool) -> Judged:
         """Return what a real episode is worth in which the robot got so far forward [m]."""
 
 
@@ -281,7 +281,7 @@ class Learner(Protocol):
         """How often parameters are kept."""
 
     @property
-    def taken(self) -> int:
+    def steps_taken(self) -> int:
         """Steps that it takes in the simulator, none of one that asks for its table."""
 
     def learn(

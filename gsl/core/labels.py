@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 
-def alike(one: Any, other: Any) -> bool:
+def alike(first: Any, second: Any) -> bool:
     """Whether two values are the same: as numbers where both are numbers, as they are written otherwise."""
-    if one is None or other is None:
-        return one is other
-    numbers = _number(one), _number(other)
-    return str(one) == str(other) or (None not in numbers and numbers[0] == numbers[1])
+    if first is None or second is None:
+        return first is second
+    numbers = _number(first), _number(second)
+    return str(first) == str(second) or (None not in numbers and numbers[0] == numbers[1])
 
 
 def _number(value: Any) -> float | None:

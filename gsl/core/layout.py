@@ -78,10 +78,10 @@ def check_alike(sim: Layout, real: Layout) -> None:
         ("actions", len(sim.joints), len(real.joints)),
     ):
         if ours != theirs:
-            told, other = (count or "no" for count in (theirs, ours))
-            raise ConfigError("real", f"has {told} {name}, the simulator {other}; a policy must fit both")
+            real_count, sim_count = (count or "no" for count in (theirs, ours))
+            raise ConfigError("real", f"has {real_count} {name}, the simulator {sim_count}; a policy must fit both")
     if sim.ranges != real.ranges:
-        here, there = (", ".join(f"{low:g} to {high:g}" for low, high in one.ranges) for one in (sim, real))
+        here, there = (", ".join(f"{low:g} to {high:g}" for low, high in layout.ranges) for layout in (sim, real))
         problem = f"takes actions of {there}, the simulator of {here}; an action must mean the same in both"
         raise ConfigError("real", f"{problem}: give them one range, and limit it inside of one")
     if abs(sim.control_period - real.control_period) > 1e-9:

@@ -40,7 +40,7 @@ def missing(episode: Trajectory, layout: Layout) -> list[str]:
 def read_sensors(episode: Trajectory, sensors: Iterable[str]) -> np.ndarray:
     """Return the body sensors that a window names, shape (T + 1, number of entries); see `observations`."""
     columns = [
-        column for name in sensors for column in _sensor(name, [episode.sensors[one] for one in SOURCES[name][1]])
+        column for name in sensors for column in _sensor(name, [episode.sensors[source] for source in SOURCES[name][1]])
     ]
     return np.column_stack(columns) if columns else np.zeros((len(episode) + 1, 0))
 
@@ -56,7 +56,7 @@ class Senses:
         """Return the joint positions [rad], shape (n_joints,)."""
         return observation[self._position]
 
-    def sensed(self, observation: np.ndarray) -> list[float]:
+    def read(self, observation: np.ndarray) -> list[float]:
         """Return the body sensors, in order."""
         return [entry for name, part in self._parts for entry in _sensor(name, observation[part].tolist())]
 

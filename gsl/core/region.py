@@ -39,5 +39,5 @@ def region(samples: np.ndarray, unseen: np.ndarray) -> Region:
     scaled = (samples - mean) / sd
     values, axes = np.linalg.eigh(scaled.T @ scaled / len(scaled))
     whitening = (axes / np.sqrt(values + RIDGE)).T / sd
-    found = Region(mean, whitening, 0.0)
-    return found._replace(bound=float(np.quantile(found._far(unseen), INSIDE)))
+    ellipsoid = Region(mean, whitening, 0.0)
+    return ellipsoid._replace(bound=float(np.quantile(ellipsoid._far(unseen), INSIDE)))

@@ -54,12 +54,14 @@ class Table:
         rewards = np.divide(paid, chances, out=np.zeros_like(paid), where=chances > 0.0)
         return cls(chances, rewards, terminal, start)
 
-    def disturbed(self, noise: float) -> Table:
+    def disturb(self, noise: float) -> Table:
         """Return the table of a world that replaces an action, with chance `noise`, by one drawn from all."""
         if not noise:
             return self
         paid = self.chances * self.rewards
-        chances, paid = ((1.0 - noise) * one + noise * one.mean(axis=1, keepdims=True) for one in (self.chances, paid))
+        chances, paid = (
+            (1.0 - noise) * array + noise * array.mean(axis=1, keepdims=True) for array in (self.chances, paid)
+        )
         return Table.paying(chances, paid, self.terminal, self.start)
 
     def values(self, policy: np.ndarray) -> np.ndarray:
@@ -67,14 +69,14 @@ class Table:
         rows = np.arange(len(policy))
         going = np.where(self.terminal[:, None], 0.0, (1.0 - ENDLESS) * self.chances[rows, policy])
         paid = np.where(self.terminal, 0.0, (self.chances * self.rewards).sum(axis=2)[rows, policy])
-        found: np.ndarray = np.linalg.solve(np.eye(len(policy)) - going, paid)
-        return found
+        values: np.ndarray = np.linalg.solve(np.eye(len(policy)) - going, paid)
+        return values
 
     def value(self, policy: np.ndarray) -> float:
         """Return the expected return of a policy from the start."""
         return float(self.start @ self.values(policy))
 
-    def improved(self, policy: np.ndarray) -> np.ndarray:
+    def improve(self, policy: np.ndarray) -> np.ndarray:
         """Return the greedy policy on a policy's values, shape (S,).
 
         Of equally good actions it keeps the policy's own, else takes the first.
@@ -83,13 +85,13 @@ class Table:
         worth = (self.chances * (self.rewards + (1.0 - ENDLESS) * values)).sum(axis=2)
         good = worth >= worth.max(axis=1, keepdims=True) - TIE
         kept = good[np.arange(len(policy)), policy]
-        found: np.ndarray = np.where(kept, policy, good.argmax(axis=1))
-        return found
+        choices: np.ndarray = np.where(kept, policy, good.argmax(axis=1))
+        return choices
 
-    def solved(self, policy: np.ndarray) -> np.ndarray:
+    def solve(self, policy: np.ndarray) -> np.ndarray:
         """Return an optimal policy by policy iteration from another, shape (S,)."""
         for _ in range(ROUNDS):
-            better = self.improved(policy)
+            better = self.improve(policy)
             if np.array_equal(better, policy):
                 break
             policy = better

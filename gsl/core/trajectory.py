@@ -88,12 +88,12 @@ class Batch:
         if tuple(joints) == self.joints:
             return self
         columns = [self.joints.index(joint) for joint in joints]
-        return replace(self, episodes=tuple(one.only(columns) for one in self.episodes), joints=tuple(joints))
+        return replace(self, episodes=tuple(episode.only(columns) for episode in self.episodes), joints=tuple(joints))
 
     def __len__(self) -> int:
         """Number of episodes."""
         return len(self.episodes)
 
     def __repr__(self) -> str:
-        seconds = sum(len(one) for one in self.episodes) * self.control_period
+        seconds = sum(len(episode) for episode in self.episodes) * self.control_period
         return f"Batch({len(self)} episodes, {seconds:.1f} s, {len(self.joints)} joints)"

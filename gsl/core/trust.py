@@ -48,17 +48,17 @@ _PICKLES: Mapping[str, str] = {"gsl.policies.sb3.Sb3Policy": "stable_baselines3"
 """Components whose files hold pickles, which run code as they are read, and the library that has to be trusted."""
 
 
-def code_in(told: Any, where: str = "") -> Iterator[tuple[str, str, str]]:
+def code_in(plain: Any, where: str = "") -> Iterator[tuple[str, str, str]]:
     """Yield where plain data names code that is not gsl's: its dotted path, the name, and the module of it."""
-    if isinstance(told, Mapping):
-        entries = [(str(key), value) for key, value in told.items()]
-    elif isinstance(told, list | tuple):
-        entries = [(str(index), value) for index, value in enumerate(told)]
+    if isinstance(plain, Mapping):
+        entries = [(str(key), value) for key, value in plain.items()]
+    elif isinstance(plain, list | tuple):
+        entries = [(str(index), value) for index, value in enumerate(plain)]
     else:
         return
-    if isinstance(told, Mapping) and (library := _PICKLES.get(str(told.get(TARGET)))):
-        yield f"{where}.file".lstrip("."), str(told.get("file")), library
-    labels = isinstance(told, Mapping) and str(told.get(TARGET)).startswith(_LABELS)
+    if isinstance(plain, Mapping) and (library := _PICKLES.get(str(plain.get(TARGET)))):
+        yield f"{where}.file".lstrip("."), str(plain.get("file")), library
+    labels = isinstance(plain, Mapping) and str(plain.get(TARGET)).startswith(_LABELS)
     for key, value in entries:
         path = f"{where}.{key}".lstrip(".")
         if key in _MODULE and isinstance(value, str):
@@ -74,16 +74,16 @@ def is_ours(module: str) -> bool:
     return _below(module, _OURS)
 
 
-def modules_in(told: Any) -> tuple[str, ...]:
+def modules_in(plain: Any) -> tuple[str, ...]:
     """Return the modules that plain data names and that are not gsl's."""
-    return tuple(dict.fromkeys(module for _, _, module in code_in(told)))
+    return tuple(dict.fromkeys(module for _, _, module in code_in(plain)))
 
 
-def check_code(told: Any, trust: Collection[str] = (), where: str = "", *, references: bool = False) -> None:
+def check_code(plain: Any, trust: Collection[str] = (), where: str = "", *, references: bool = False) -> None:
     """Refuse plain data that names code of others.
 
     Args:
-        told: What a file says.
+        plain: What a file says.
         trust: Modules whose code may be named, theirs below them included.
         where: Dotted path of the data, for errors.
         references: Whether a `${...}` stands for something that is checked once it is known.
@@ -91,8 +91,8 @@ def check_code(told: Any, trust: Collection[str] = (), where: str = "", *, refer
     Raises:
         ConfigError: It names the setting and what to say to trust it.
     """
-    foreign = [one for one in code_in(told, where) if not (references and "${" in one[1])]
-    if refused := [one for one in foreign if not _below(one[2], trust)]:
+    foreign = [mention for mention in code_in(plain, where) if not (references and "${" in mention[1])]
+    if refused := [mention for mention in foreign if not _below(mention[2], trust)]:
         path, name, _ = refused[0]
         wanted = dict.fromkeys(filter(None, [*trust, *(module for _, _, module in refused)]))
         how = f"{TRUST}={next(iter(wanted), '')}" if len(wanted) < 2 else f"'{TRUST}=[{','.join(wanted)}]'"
@@ -114,12 +114,12 @@ def class_of(name: Any, where: str = "") -> Any:
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise ConfigError(setting, f"cannot be loaded: {reason}", given=str(name)) from error
-    found = getattr(module, attribute, None)
-    if not isinstance(found, type):
+    target = getattr(module, attribute, None)
+    if not isinstance(target, type):
         raise ConfigError(setting, f"cannot be loaded: {place} has no class {attribute}", given=str(name))
-    if is_ours(place) and not (is_dataclass(found) and is_ours(found.__module__)):
+    if is_ours(place) and not (is_dataclass(target) and is_ours(target.__module__)):
         raise ConfigError(setting, "is no component of gsl", given=str(name))
-    return found
+    return target
 
 
 def _below(module: str, places: Collection[str]) -> bool:

@@ -23,7 +23,7 @@ class Unit(NamedTuple):
         """Return the unit of a task or of its class."""
         return cls(float(task.shown), str(task.unit), getattr(task, "falls", True))
 
-    def shown(self, value: float | None, *, sign: bool = False) -> str:
+    def format(self, value: float | None, *, sign: bool = False) -> str:
         """Return a value with its unit, `-` if there is none."""
         if value is None:
             return "-"
@@ -44,7 +44,7 @@ class Unit(NamedTuple):
         size = self.factor * max((abs(bound) for bound in bounds if bound is not None), default=0.0)
         return " to ".join(self.bare(bound, sign=sign, size=size) for bound in bounds)
 
-    def ended(self, summary: Mapping[str, Any]) -> str:
+    def describe_ends(self, summary: Mapping[str, Any]) -> str:
         """Return how often the robot fell in so many episodes, or the number of episodes."""
         episodes = summary["episodes"]
         return f"{falls(summary['falls'])} in {episodes}" if self.falls else several(episodes, "episode")

@@ -63,34 +63,38 @@ def make(target: Callable[..., T], values: Mapping[str, Any], *, where: str = ""
 
 def config_error(error: ValidationError, target: Callable[..., Any], *, where: str = "") -> ConfigError:
     """Return the most telling of pydantic's complaints about building `target` at the dotted path `where`."""
-    found = sorted(error.errors(), key=lambda detail: detail["type"] != "unexpected_keyword_argument")
-    details = found[0]
+    complaints = sorted(error.errors(), key=lambda detail: detail["type"] != "unexpected_keyword_argument")
+    details = complaints[0]
     location = [str(part) for part in details["loc"][:1]]
     location += [str(part) for part in details["loc"][1:] if isinstance(part, int)]
     path = ".".join([*filter(None, [where]), *location])
     if details["type"] == "unexpected_keyword_argument":
         return ConfigError(path, f"no such setting{did_you_mean(location[-1], settings_of(target))}")
-    known = settings_of(target).get(location[0]) if location else None
-    unit = f" ({known.unit})" if known is not None and known.unit else ""
-    return ConfigError(path or target.__name__, f"{_problems(found)}{unit}", given=_quote(details["input"]))
+    setting = settings_of(target).get(location[0]) if location else None
+    unit = f" ({setting.unit})" if setting is not None and setting.unit else ""
+    return ConfigError(path or target.__name__, f"{_problems(complaints)}{unit}", given=_quote(details["input"]))
 
 
-def did_you_mean(word: str, known: Iterable[str], *, listed: bool = False) -> str:
+def did_you_mean(word: str, candidates: Iterable[str], *, listed: bool = False) -> str:
     """Return `; did you mean ...?` and, where nothing is near or `listed`, the list of what there is."""
-    names = sorted(known)
+    names = sorted(candidates)
     alike = {name.casefold(): name for name in names}
-    near = [alike[one] for one in difflib.get_close_matches(word.casefold(), alike, n=2, cutoff=0.6)]
+    near = [alike[match] for match in difflib.get_close_matches(word.casefold(), alike, n=2, cutoff=0.6)]
     question = f"; did you mean {' or '.join(near)}?" if near else ""
     if near and not listed or not names:
         return question
     return f"{question}{' T' if near else '; t'}here is {', '.join(names)}"
 
 
-def _problems(found: Sequence[ErrorDetails]) -> str:
+def _problems(complaints: Sequence[ErrorDetails]) -> str:
     """Return what is wrong with the first setting; one that may be of several types breaks the rules of each."""
-    first = found[0]["loc"]
-    ways = [one for one in found if one["loc"][:1] == first[:1] and isinstance([*one["loc"], 0][1], str)]
-    words = dict.fromkeys(_problem(one) for one in (ways or found[:1]))
+    first = complaints[0]["loc"]
+    ways = [
+        complaint
+        for complaint in complaints
+        if complaint["loc"][:1] == first[:1] and isinstance([*complaint["loc"], 0][1], str)
+    ]
+    words = dict.fromkeys(_problem(complaint) for complaint in (ways or complaints[:1]))
     return ", or ".join(word if index == 0 else word.removeprefix("must be ") for index, word in enumerate(words))
 
 

@@ -12,4 +12,4 @@ def visible(text: str) -> str:
 
     What was JSON is JSON afterwards, and says the same.
     """
-    return _STEERING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return _STEERING.sub(lambda match: f"\\u{ord(match[0]):04x}", text)

@@ -31,27 +31,27 @@ def yaml_tree(path: Path, text: str, most: int = ENTRIES) -> Any:
     except RecursionError as error:
         raise InputError(f"{path}: is nested too deeply; {DEPTH} levels are read") from error
     except (yaml.YAMLError, ValueError, TypeError) as error:
-        told = " ".join(str(error).replace('in "<unicode string>", ', "in ").split())
-        raise InputError(f"{path}: is not YAML, or damaged: {told}") from error
+        problem = " ".join(str(error).replace('in "<unicode string>", ', "in ").split())
+        raise InputError(f"{path}: is not YAML, or damaged: {problem}") from error
 
 
 def _check_size(path: Path, root: Any, most: int) -> None:
     """Count entries and levels of a tree of yaml nodes, in which an alias is the same node again."""
-    known: dict[int, tuple[int, int]] = {}
+    cache: dict[int, tuple[int, int]] = {}
     open_nodes: set[int] = set()
 
     def size(node: Any) -> tuple[int, int]:
-        if id(node) in known:
-            return known[id(node)]
+        if id(node) in cache:
+            return cache[id(node)]
         if id(node) in open_nodes:
             raise InputError(f"{path}: holds an alias of what it is in; write it out")
         open_nodes.add(id(node))
         value = node.value
-        parts = [] if isinstance(value, str) else [one for part in value for one in _nodes(part)]
+        parts = [] if isinstance(value, str) else [child for part in value for child in _nodes(part)]
         sizes = [size(part) for part in parts]
         open_nodes.discard(id(node))
-        known[id(node)] = 1 + sum(count for count, _ in sizes), 1 + max((deep for _, deep in sizes), default=0)
-        return known[id(node)]
+        cache[id(node)] = 1 + sum(count for count, _ in sizes), 1 + max((deep for _, deep in sizes), default=0)
+        return cache[id(node)]
 
     count, depth = size(root)
     if depth > DEPTH:

@@ -130,15 +130,18 @@ def effect_class(name: str) -> type:
 
 def describe_confusion(name: str) -> str:
     """Return what an effect is confused with and what separates them, from its class."""
-    told = " ".join((effect_class(name).__doc__ or "").split()).partition("Confused with ")[2]
-    return re.split(r"\.(?:\s|$)", told, maxsplit=1)[0]
+    text = " ".join((effect_class(name).__doc__ or "").split()).partition("Confused with ")[2]
+    return re.split(r"\.(?:\s|$)", text, maxsplit=1)[0]
 
 
 def list_documented(name: str, robot: Robot) -> dict[str, Setting]:
     """Return the settings of an effect with the ranges that a robot documents, where they differ from a NAO's class."""
     own = robot.ranges.get(name, {})
-    known = settings_of(effect_class(name)).items()
-    return {key: replace(one, lower=own[key][0], upper=own[key][1]) if key in own else one for key, one in known}
+    settings = settings_of(effect_class(name)).items()
+    return {
+        key: replace(setting, lower=own[key][0], upper=own[key][1]) if key in own else setting
+        for key, setting in settings
+    }
 
 
 def check_ranges(name: str, ranges: Mapping[str, tuple[float, float]]) -> None:
@@ -148,13 +151,13 @@ def check_ranges(name: str, ranges: Mapping[str, tuple[float, float]]) -> None:
         ConfigError: One of them.
     """
     try:
-        known = settings_of(effect_class(name))
+        settings = settings_of(effect_class(name))
     except ConfigError as error:
         raise ConfigError(f"ranges.{name}", error.problem) from error
     for key, (lower, upper) in ranges.items():
-        if key not in known or known[key].lower is None:
+        if key not in settings or settings[key].lower is None:
             raise ConfigError(f"ranges.{name}.{key}", "the effect has no parameter of this name with a range")
-        most = known[key].most
+        most = settings[key].most
         if not lower < upper or (most is not None and upper > most):
             limit = "" if most is None else f", {most:g} at most"
             raise ConfigError(f"ranges.{name}.{key}", f"{lower:g} to {upper:g} is no range that it can have{limit}")
@@ -229,9 +232,9 @@ def scope(plant: Plant, joints: Scope) -> np.ndarray:
     try:
         return plant.mask(joints)
     except KeyError as error:
-        known = ("all", *plant.robot.groups, *plant.robot.motors)
-        near = difflib.get_close_matches(str(error.args[0]), known, 1)
-        hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(known)}"
+        names = ("all", *plant.robot.groups, *plant.robot.motors)
+        near = difflib.get_close_matches(str(error.args[0]), names, 1)
+        hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(names)}"
         raise ConfigError("joints", f"the {plant.robot.name} has no joint or group '{error.args[0]}'; {hint}") from None
 
 

@@ -35,5 +35,5 @@ class GroundCompliance:
         return replace(plant, contact=replace(contact, stiffness=stiffness, damping=damping))
 
 
-def _series(one: float, other: float) -> float:
-    return one * other / (one + other) if one + other > 0.0 else 0.0
+def _series(first: float, second: float) -> float:
+    return first * second / (first + second) if first + second > 0.0 else 0.0

@@ -91,7 +91,7 @@ def _add_actuator(actuators: xml.Element, simulator: Simulator, k: int, name: st
     """Add force = kp (control + offset - q) - kd dq/dt within the limit; a filter on the control if it is smoothed."""
     servo = simulator.plant.servo
     kp, kd, offset, limit = (float(values[k]) for values in (servo.kp, servo.kd, servo.offset, servo.limit))
-    low, high = simulator.plant.robot.commanded(name)
+    low, high = simulator.plant.robot.bound_commands(name)
     settings: dict[str, str] = {"gainprm": text(kp), "biastype": "affine", "biasprm": text(kp * offset, -kp, -kd)}
     if limit < UNLIMITED:
         settings["forcerange"] = text(-limit, limit)

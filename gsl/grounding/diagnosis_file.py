@@ -44,7 +44,7 @@ class Diagnosis:
     uncertain: tuple[UncertainCause, ...] = ()
 
     @property
-    def told(self) -> str:
+    def sentence(self) -> str:
         """What is done with it, in a sentence."""
         if not self.causes:
             kept = "Nothing is switched on: the simulator is taken as it is, calibrated joint by joint."
@@ -77,7 +77,7 @@ def _read(artifact: Artifact) -> Diagnosis:
     build({**sim["effects"], **report["effects"]})  # they are what effects are
     return Diagnosis(
         verdict=report["verdict"],
-        causes=tuple(one["effect"] for one in report["causes"]),
+        causes=tuple(cause["effect"] for cause in report["causes"]),
         summary=report["summary"],
         robot=sim["robot"],
         simulated=sim["effects"],
@@ -91,13 +91,13 @@ def _read(artifact: Artifact) -> Diagnosis:
 def uncertain_causes(report: Mapping[str, Any]) -> Iterator[UncertainCause]:
     """Yield the causes of a report with what its effects have of each; those without a probability are left out."""
     for cause in report["causes"]:
-        entries = [one for one in report["effects"].get(cause["effect"], []) if _is(one, cause)]
+        entries = [entry for entry in report["effects"].get(cause["effect"], []) if _is(entry, cause)]
         if "probability" not in cause or not entries:
             continue
         intervals = {
-            name: (float(one["low"]), float(one["high"]))
-            for name, one in cause["parameters"].items()
-            if one.get("low") is not None and one.get("high") is not None
+            name: (float(estimate["low"]), float(estimate["high"]))
+            for name, estimate in cause["parameters"].items()
+            if estimate.get("low") is not None and estimate.get("high") is not None
         }
         yield UncertainCause(cause["effect"], entries[0], float(cause["probability"]), intervals)
 
@@ -106,7 +106,7 @@ def _is(entry: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:
     """Whether an entry of `effects:` is a cause's, whose numbers are not rounded."""
     if "parameters" not in cause or cause["scope"] != entry.get("joints", entry.get("link", "")):
         return False
-    values = {**cause["fixed"], **{name: one["value"] for name, one in cause["parameters"].items()}}
+    values = {**cause["fixed"], **{name: estimate["value"] for name, estimate in cause["parameters"].items()}}
     return all(_same(entry.get(name), value) for name, value in values.items())
 
 

@@ -53,7 +53,7 @@ def around(world: BulletWorld | EnsembleWorld, causes: Sequence[UncertainCause])
     centre, members = (world.world, world.members) if isinstance(world, EnsembleWorld) else (world, (world,))
     drawn = drawings(causes, DRAWS)
     made = tuple(_draw(members[k % len(members)], causes, entries) for k, entries in enumerate(drawn))
-    if all(one == members[k % len(members)] for k, one in enumerate(made)):
+    if all(world == members[k % len(members)] for k, world in enumerate(made)):
         return world
     return EnsembleWorld(centre, made)
 

@@ -61,12 +61,12 @@ class DiagnosedEffects:
         if self.draws and isinstance(self.inner, RandomisedEffects):
             raise ConfigError("draws", "and grounding.inner both draw simulators; take one", given="true")
 
-    def drawn(self, world: World, found: Diagnosis) -> World:
+    def draw(self, world: World, diagnosis: Diagnosis) -> World:
         """Return the world with the effects as it is, or simulators around it if these were asked for."""
         if not self.draws:
             return world
         assert isinstance(world, BulletWorld | EnsembleWorld), "only these are diagnosed"
-        return around(world, found.uncertain)
+        return around(world, diagnosis.uncertain)
 
     def load(self, read: Callable[[str, str], Diagnosis]) -> Diagnosis:
         """Return the diagnosis; `read` finds one by its reference and method.
@@ -76,8 +76,8 @@ class DiagnosedEffects:
         """
         if self.effects:
             names = tuple(self.effects)
-            told = f"These effects were given, not diagnosed: {', '.join(names)}."
-            return Diagnosis("given", names, told, "", {}, self.effects)
+            sentence = f"These effects were given, not diagnosed: {', '.join(names)}."
+            return Diagnosis("given", names, sentence, "", {}, self.effects)
         if not self.diagnosis:
             raise ConfigError("grounding.diagnosis", f"is missing; name a run of gsl {self.method}, or set effects")
         return read(self.diagnosis, self.method)
@@ -97,9 +97,9 @@ class DiagnosedEffects:
 
     def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
         """Return the world with the effects and the inner grounding in it."""
-        found = self.load(read_diagnosis)
-        inside = prepare(self.inner, switch_on(world, found), settled)
-        return inside._replace(world=self.drawn(inside.world, found))
+        diagnosis = self.load(read_diagnosis)
+        inside = prepare(self.inner, switch_on(world, diagnosis), settled)
+        return inside._replace(world=self.draw(inside.world, diagnosis))
 
     def without_margins(self) -> DiagnosedEffects:
         """Return the same without draws, and without the margins of the inner grounding."""
@@ -125,7 +125,7 @@ def having_effects(world: World) -> Any:
     return world
 
 
-def switch_on(world: World, found: Diagnosis) -> World:
+def switch_on(world: World, diagnosis: Diagnosis) -> World:
     """Return the world with what it lacks.
 
     Raises:
@@ -133,10 +133,13 @@ def switch_on(world: World, found: Diagnosis) -> World:
     """
     simulator = having_effects(world)
     settings = describe(simulator)
-    if found.verdict != "given" and (settings["robot"], settings["effects"]) != (found.robot, found.simulated):
-        other = f"the {found.robot} with {', '.join(found.simulated) or 'no effects'}"
+    if diagnosis.verdict != "given" and (settings["robot"], settings["effects"]) != (
+        diagnosis.robot,
+        diagnosis.simulated,
+    ):
+        other = f"the {diagnosis.robot} with {', '.join(diagnosis.simulated) or 'no effects'}"
         raise ConfigError("grounding.diagnosis", f"is of another simulator: {other}; take this one")
-    return replace(simulator, effects=together([settings["effects"], found.effects]))
+    return replace(simulator, effects=together([settings["effects"], diagnosis.effects]))
 
 
 def innermost(grounding: Grounding) -> Grounding:

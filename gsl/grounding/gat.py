@@ -37,11 +37,13 @@ from gsl.storage.references import resolve
 REACH = 0.5  # [rad]; a servo told to go farther than this from the agent's target is at its torque limit anyway
 
 
-def check_known(joints: Sequence[str], known: Sequence[str], where: str) -> None:
+def check_known(joints: Sequence[str], modelled: Sequence[str], where: str) -> None:
     """Refuse joints that models do not know; `where` is the setting that names them."""
     for joint in joints:
-        if joint not in known:
-            raise ConfigError(where, f"the models know no joint of this name{did_you_mean(joint, known)}", given=joint)
+        if joint not in modelled:
+            raise ConfigError(
+                where, f"the models know no joint of this name{did_you_mean(joint, modelled)}", given=joint
+            )
 
 
 @component
@@ -190,7 +192,7 @@ class LoadedTransformation:
         return max(self.forward.history.span, self.inverse.history.span)
 
     @property
-    def expected(self) -> LoadedTransformation:
+    def deterministic(self) -> LoadedTransformation:
         """The same without noise on top and without draws, whose width would count as error where replays judge it."""
         return replace(self, noise=0.0, draws=False)
 
@@ -229,7 +231,7 @@ class TransformationRun:
         """Return the grounded action [rad], shape (n_joints,)."""
         grounding, real, sim = self._grounding, self._real, self._sim
         position, every, action = self._senses.position(observation)[self._known], action, action[self._known]
-        real.see(position, self._senses.sensed(observation))
+        real.see(position, self._senses.read(observation))
         window = real.complete(action)
         wanted, trust = self._predict(window)
         sim.see(position, ())
@@ -253,5 +255,5 @@ class TransformationRun:
         gate, forward = self._grounding.gate, self._grounding.forward
         if gate is None or not isinstance(forward, Ensemble):
             return forward.effect(window, self._draws), 1.0
-        wanted, doubt = forward.judged(window, self._draws)
+        wanted, doubt = forward.judge(window, self._draws)
         return wanted, np.clip(2.0 - doubt / gate, 0.0, 1.0)

@@ -100,13 +100,13 @@ class Draw:
         return {name: self._entry(name, rng) for name in self.effects}
 
     def _entry(self, name: str, rng: np.random.Generator) -> dict[str, float | str]:
-        known = list_documented(name, self.robot)
-        place = {"link": self.robot.base} if "link" in known else {}
-        return {**place, **{key: self._value(one, rng) for key, one in _strengths(known).items()}}
+        settings = list_documented(name, self.robot)
+        place = {"link": self.robot.base} if "link" in settings else {}
+        return {**place, **{key: self._value(setting, rng) for key, setting in _strengths(settings).items()}}
 
-    def _value(self, known: Setting, rng: np.random.Generator) -> float:
-        assert known.neutral is not None and known.lower is not None and known.upper is not None
-        low, high = (known.neutral + self.width * (end - known.neutral) for end in (known.lower, known.upper))
+    def _value(self, setting: Setting, rng: np.random.Generator) -> float:
+        assert setting.neutral is not None and setting.lower is not None and setting.upper is not None
+        low, high = (setting.neutral + self.width * (end - setting.neutral) for end in (setting.lower, setting.upper))
         return float(rng.uniform(low, high))
 
 
@@ -121,5 +121,5 @@ def randomise(world: Any, settings: RandomisedEffects, width: float) -> Randomis
     return RandomisedWorld(world, Draw(settings.effects, width, world.plant.robot))
 
 
-def _strengths(known: Mapping[str, Setting]) -> Mapping[str, Setting]:
-    return {key: one for key, one in known.items() if one.neutral is not None}
+def _strengths(settings: Mapping[str, Setting]) -> Mapping[str, Setting]:
+    return {key: setting for key, setting in settings.items() if setting.neutral is not None}

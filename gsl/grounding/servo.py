@@ -52,7 +52,7 @@ class LearnedServo:
 
     def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
         """Return the world with the learned servo, and action noise if it was asked for."""
-        return Prepared(self.at_its_place().switched_on(world), self.actions)
+        return Prepared(self.at_its_place().switch_on(world), self.actions)
 
     def at_its_place(self) -> LearnedServo:
         """Return the same with its servo named by its folder, whatever run or file it was asked for by."""
@@ -76,7 +76,7 @@ class LearnedServo:
         """How many members a chain learns."""
         return MEMBERS if self.ensemble else 1
 
-    def switched_on(self, world: Any) -> BulletWorld | EnsembleWorld:
+    def switch_on(self, world: Any) -> BulletWorld | EnsembleWorld:
         """Return the world with the learned servo, or with its members in turn.
 
         Raises:

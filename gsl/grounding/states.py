@@ -41,9 +41,9 @@ class StateTransformation:
             raise ConfigError("inverse_model", problem)
         if isinstance(f_inv, NearestChoice):
             for name, usual in (("alpha", 1.0), ("noise", 0.0)):
-                if (given := getattr(self, name)) != usual:
+                if (value := getattr(self, name)) != usual:
                     problem = f"choices are no numbers to be mixed; leave it at {usual:g}"
-                    raise ConfigError(name, problem, given=f"{given:g}")
+                    raise ConfigError(name, problem, given=f"{value:g}")
 
     def start(self, layout: Layout, rng: np.random.Generator) -> StateTransformationRun:
         """Return the grounding at the beginning of an episode.
@@ -71,10 +71,10 @@ class StateTransformationRun:
         if not grounding.forward.choices:
             action = np.minimum(np.maximum(action, -1.0), 1.0)  # as f has seen them
         wanted = grounding.forward.change(observation, action, self._draws)
-        found = grounding.inverse.action(observation, action, wanted)
+        match = grounding.inverse.action(observation, action, wanted)
         if grounding.forward.choices:
-            return found
-        sent = ground(action, found, grounding.alpha)
+            return match
+        sent = ground(action, match, grounding.alpha)
         if grounding.noise:
             sent = sent + grounding.noise * self._rng.standard_normal(len(sent))
         return np.asarray(np.minimum(np.maximum(sent, -1.0), 1.0))
@@ -95,18 +95,18 @@ class TableTransformation:
     draws: bool = False
 
     @property
-    def sent(self) -> np.ndarray:
+    def chances(self) -> np.ndarray:
         """P(carried-out action | s, a), shape (S, A, A)."""
         wanted, undo = self.forward.chances if self.draws else self.forward.modes, self.inverse.undo
         actions = wanted.shape[1]
         does = np.eye(actions + 1)[undo][:, :, :actions]  # -1 is the last row, which does nothing
-        found = np.einsum("sat,stb->sab", wanted, does)
-        left: np.ndarray = found + (1.0 - found.sum(axis=2, keepdims=True)) * np.eye(actions)
+        reproduced = np.einsum("sat,stb->sab", wanted, does)
+        left: np.ndarray = reproduced + (1.0 - reproduced.sum(axis=2, keepdims=True)) * np.eye(actions)
         return left
 
-    def grounded(self, table: Table) -> Table:
+    def ground(self, table: Table) -> Table:
         """Return the simulator as it is with the grounding in front of it."""
-        sent = self.sent
+        sent = self.chances
         chances = np.einsum("sab,sbt->sat", sent, table.chances)
         paid = np.einsum("sab,sbt->sat", sent, table.chances * table.rewards)
         return Table.paying(chances, paid, table.terminal, table.start)
@@ -119,7 +119,7 @@ class TableTransformation:
         """
         if self.forward.seen.shape[:2] != (layout.cells, layout.choices):
             raise ConfigError("grounding", "the models are of other states or actions than the world")
-        return TableTransformationRun(self.sent, rng)
+        return TableTransformationRun(self.chances, rng)
 
 
 class TableTransformationRun:

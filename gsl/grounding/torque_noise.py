@@ -50,7 +50,7 @@ class TorqueNoise:
 
     def prepare(self, world: World, settled: Mapping[str, Any]) -> Prepared:
         """Return the world with this noise in it."""
-        return Prepared(self.switched_on(world), NoGrounding())
+        return Prepared(self.switch_on(world), NoGrounding())
 
     def without_margins(self) -> NoGrounding:
         """Return no grounding: noise is all that it is."""
@@ -64,7 +64,7 @@ class TorqueNoise:
         """
         raise ConfigError("grounding", "its noise is not switched on; a stage that uses it has to do that")
 
-    def switched_on(self, world: Any) -> Any:
+    def switch_on(self, world: Any) -> Any:
         """Return the world with this noise in it.
 
         Raises:

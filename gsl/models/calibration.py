@@ -27,11 +27,11 @@ def calibrate(network: Network, head: Head, episodes: Sequence[Samples]) -> tupl
         head: How its outputs are read.
         episodes: Inputs, shape (T, n), and outputs, shape (T, m), of trajectories it was not fitted to.
     """
-    errors = [_standardise(network, head, *one) for one in episodes]
+    errors = [_standardise(network, head, *episode) for episode in episodes]
     together = np.concatenate(errors)
     scale = np.clip(np.sqrt(np.mean(together**2, axis=0)), *SCALE)
     mean, variance = together.mean(axis=0), together.var(axis=0)
-    steps = np.concatenate([(one[:-1] - mean) * (one[1:] - mean) for one in errors])
+    steps = np.concatenate([(series[:-1] - mean) * (series[1:] - mean) for series in errors])
     memory = np.zeros_like(scale)
     if len(steps):  # an error that never changes, as of a joint that is quite still, has no memory
         np.divide(steps.mean(axis=0), variance, out=memory, where=variance > 0.0)
@@ -62,7 +62,7 @@ def _standardise(network: Network, head: Head, inputs: np.ndarray, outputs: np.n
     """Return errors in units of the standard deviation that the model has for them, shape (T, m)."""
     raw = network.predict_many(inputs)
     weights, means, sds = head.parts(raw)
-    expected = head.expected(raw)
+    expected = head.expect(raw)
     variance = (weights[..., None] * (sds**2 + (means - expected[:, None]) ** 2)).sum(axis=-2)
-    found: np.ndarray = (outputs - expected) / np.sqrt(variance)
-    return found
+    errors: np.ndarray = (outputs - expected) / np.sqrt(variance)
+    return errors

@@ -60,6 +60,6 @@ def best(config: ModelConfig, fit: Callable[[ModelConfig, bool], M], score: Call
     variants = config.variants
     models = {name: fit(variant, False) for name, variant in variants.items()}
     scores = {name: score(model) for name, model in models.items()}
-    name = min(scores, key=lambda one: scores[one])
+    name = min(scores, key=lambda variant: scores[variant])
     chosen = variants[name]
     return fit(chosen, True) if chosen.learns_from_all else models[name], Choice(chosen, scores)

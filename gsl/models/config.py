@@ -91,9 +91,9 @@ class ModelConfig:
         if self.multi_step > 1:
             for name, only in (("likelihood", "point"), ("encoding", "plain"), ("horizon", 1)):
                 if getattr(self, name) != only:
-                    given = str(getattr(self, name))
+                    value = str(getattr(self, name))
                     raise ConfigError(
-                        name, f"answers that are fed back are {name}={only}; or multi_step=1", given=given
+                        name, f"answers that are fed back are {name}={only}; or multi_step=1", given=value
                     )
             if self.family == "linear":
                 raise ConfigError("multi_step", "is for an MLP; take family=mlp or auto", given=str(self.multi_step))

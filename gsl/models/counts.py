@@ -30,23 +30,23 @@ class Counts:
     def chances(self) -> np.ndarray:
         """P(s' | s, a), shape (S, A, S); rows of 0 where nothing was seen."""
         total = self.seen.sum(axis=2, keepdims=True)
-        found: np.ndarray = np.divide(self.seen, total, out=np.zeros(self.seen.shape), where=total > 0)
-        return found
+        chances: np.ndarray = np.divide(self.seen, total, out=np.zeros(self.seen.shape), where=total > 0)
+        return chances
 
     @property
     def modes(self) -> np.ndarray:
         """P(s' | s, a) with all of it on the likeliest state, the first of equally likely ones, shape (S, A, S)."""
-        found: np.ndarray = np.eye(len(self.seen))[self.seen.argmax(axis=2)] * (
+        modes: np.ndarray = np.eye(len(self.seen))[self.seen.argmax(axis=2)] * (
             self.seen.sum(axis=2, keepdims=True) > 0
         )
-        return found
+        return modes
 
     @property
     def undo(self) -> np.ndarray:
         """Action that leads from one state to another likeliest, -1 where none was seen to, shape (S, S)."""
         chances = self.chances
-        found: np.ndarray = np.where(chances.max(axis=1) > 0.0, chances.argmax(axis=1), -1)
-        return found
+        undo: np.ndarray = np.where(chances.max(axis=1) > 0.0, chances.argmax(axis=1), -1)
+        return undo
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint stores."""
@@ -69,17 +69,17 @@ def count_transitions(episodes: Sequence[Trajectory], cells: int, choices: int) 
         InputError: A state or an action is not the number of one.
     """
     seen = np.zeros((cells, choices, cells))
-    for one in episodes:
-        assert one.state is not None, "a world of cells has states"
-        sent = one.action if one.grounded_action is None else one.grounded_action
-        state, chosen = _numbers(one.state[:, 0], cells, "state"), _numbers(sent[:, 0], choices, "action")
+    for episode in episodes:
+        assert episode.state is not None, "a world of cells has states"
+        sent = episode.action if episode.grounded_action is None else episode.grounded_action
+        state, chosen = _numbers(episode.state[:, 0], cells, "state"), _numbers(sent[:, 0], choices, "action")
         np.add.at(seen, (state[:-1], chosen, state[1:]), 1.0)
     return seen
 
 
 def _numbers(values: np.ndarray, count: int, what: str) -> np.ndarray:
-    found = values.astype(int)
-    wrong = (found != values) | (found < 0) | (found >= count)
+    numbers = values.astype(int)
+    wrong = (numbers != values) | (numbers < 0) | (numbers >= count)
     if wrong.any():
         raise InputError(f"{what} {values[wrong.argmax()]:g} is not one of the {count}, 0 to {count - 1}")
-    return found
+    return numbers

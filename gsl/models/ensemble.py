@@ -80,10 +80,10 @@ class Ensemble:
         """Return the negative log likelihood of changes as `ForwardModel.surprise` does; any member may have drawn."""
         width = changes.shape[1] if self.members[0].encoding == "plain" else 2 * changes.shape[1]
         each = -width * np.array([member.surprise(windows, changes) for member in self.members])
-        found: np.ndarray = -(np.logaddexp.reduce(each, axis=0) - np.log(len(each))) / width
-        return found
+        surprise: np.ndarray = -(np.logaddexp.reduce(each, axis=0) - np.log(len(each))) / width
+        return surprise
 
-    def judged(self, window: np.ndarray, draws: Draws | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def judge(self, window: np.ndarray, draws: Draws | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return what `effect` does, and the members' disagreement, 1 where it is as large as data explain."""
         each = [member.effect(window) for member in self.members]
         change = np.mean(each, axis=0) if draws is None else self.effect(window, draws)
@@ -95,8 +95,8 @@ class Ensemble:
             "usual": self.usual,
             **{
                 f"member_{k}.{name}": array
-                for k, one in enumerate(self.members)
-                for name, array in one.arrays().items()
+                for k, member in enumerate(self.members)
+                for name, array in member.arrays().items()
             },
         }
 

@@ -50,25 +50,27 @@ def fit_mlp(
 def _fit(
     training: Samples, validation: Samples, config: ModelConfig, head: Head, pieces: tuple[Segments, Segments] | None
 ) -> Network:
-    given, wanted = scaling(training[0]), scaling(training[1])
-    known, unseen = ((_tensor(given.apply(x)), _tensor(wanted.apply(y))) for x, y in (training, validation))
+    input_scaling, output_scaling = scaling(training[0]), scaling(training[1])
+    seen, unseen = (
+        (_tensor(input_scaling.apply(x)), _tensor(output_scaling.apply(y))) for x, y in (training, validation)
+    )
     network = _network((training[0].shape[1], *config.hidden, head.width(training[1].shape[1])))
     loss = _surprise(head) if head.draws else torch.nn.functional.mse_loss
     weighted = _surprise(head, config.beta) if head.likelihood == "gaussian" else loss
     _descend(
         network,
-        len(known[0]),
+        len(seen[0]),
         config,
-        lambda chosen: weighted(network(known[0][chosen]), known[1][chosen]),
+        lambda chosen: weighted(network(seen[0][chosen]), seen[1][chosen]),
         lambda: loss(network(unseen[0]), unseen[1]),
     )
     if pieces is not None:
-        answer, scale = answering(network, given, wanted), measure_travel(pieces[0])
+        answer, scale = answering(network, input_scaling, output_scaling), measure_travel(pieces[0])
         fitted, judging = (MultiStep(part, scale) for part in pieces)
         _descend(network, len(fitted), config, partial(fitted.loss, answer), partial(judging.loss, answer))
     affine = [layer for layer in network if isinstance(layer, torch.nn.Linear)]
     layers = [(_array(layer.weight), _array(layer.bias)) for layer in affine]
-    return unscale(layers, given, head.scaling(wanted))
+    return unscale(layers, input_scaling, head.scaling(output_scaling))
 
 
 def _descend(

@@ -56,14 +56,14 @@ class ForwardModel:
     def effect(self, window: np.ndarray, draws: Draws | None = None) -> np.ndarray:
         """Return the expected change [rad], shape (n_joints,); with `draws`, one of what may happen."""
         raw = self.network.predict(window)
-        change = decode(self.head.expected(raw) if draws is None else self.head.drawn(raw, draws), self.encoding)
+        change = decode(self.head.expect(raw) if draws is None else self.head.draw(raw, draws), self.encoding)
         return change if self.base is None else change + self.base.effect(window[: self.base.network.inputs])
 
     def effects(self, windows: np.ndarray) -> np.ndarray:
         """Return the expected changes [rad], shape (N, n_joints), for many windows."""
-        return decode(self.head.expected(self.network.predict_many(windows)), self.encoding) + self.known(windows)
+        return decode(self.head.expect(self.network.predict_many(windows)), self.encoding) + self.predict_base(windows)
 
-    def known(self, windows: np.ndarray) -> np.ndarray | float:
+    def predict_base(self, windows: np.ndarray) -> np.ndarray | float:
         """Return what the base says of many windows [rad], shape (N, n_joints), or 0."""
         return 0.0 if self.base is None else self.base.effects(windows[:, : self.base.network.inputs])
 
@@ -72,7 +72,7 @@ class ForwardModel:
 
         Only a model with a distribution has one.
         """
-        outputs = encode(changes - self.known(windows), self.encoding)
+        outputs = encode(changes - self.predict_base(windows), self.encoding)
         return self.head.surprise(self.network.predict_many(windows), outputs) / outputs.shape[1]
 
     def arrays(self) -> dict[str, np.ndarray]:
@@ -99,7 +99,7 @@ class ForwardModel:
         network, history = Network.from_arrays(arrays), history_from(about["history"])
         head, base = Head(about["likelihood"], about["components"]), None
         if "base" in about:
-            below = {name.removeprefix(BASE): one for name, one in arrays.items() if name.startswith(BASE)}
+            below = {name.removeprefix(BASE): array for name, array in arrays.items() if name.startswith(BASE)}
             base = cls.from_arrays(below, about["base"])
         joints, multi_step = tuple(about["joints"]), about.get("multi_step", 1)
         return cls(

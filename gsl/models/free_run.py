@@ -47,9 +47,9 @@ def segments(
 ) -> Segments:
     """Cut trajectories into pieces of some ticks to be predicted and their past, a piece `every` so many ticks."""
     length, parts = history.span + ticks + 1, []
-    for one in episodes:
-        columns = one.position, actions(one, carried_out=carried_out), read_sensors(one, history.sensors)
-        cuts = range(0, usable(one) - length + 1, every)
+    for episode in episodes:
+        columns = episode.position, actions(episode, carried_out=carried_out), read_sensors(episode, history.sensors)
+        cuts = range(0, usable(episode) - length + 1, every)
         parts += [tuple(column[cut : cut + length] for column in columns) for cut in cuts]
     position, action, body = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Segments(history, ticks, position, action, body, history.span + length * np.arange(len(parts)))

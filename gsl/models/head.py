@@ -69,15 +69,15 @@ class Head:
         weights = grown / grown.sum(axis=-1, keepdims=True) if logits else np.ones((*raw.shape[:-1], 1))
         return weights, rest[..., 0, :, :], np.exp(rest[..., 1, :, :])
 
-    def expected(self, raw: np.ndarray) -> np.ndarray:
+    def expect(self, raw: np.ndarray) -> np.ndarray:
         """Return the outputs to expect, shape (..., m); of a Gaussian they are its mode too."""
         if self.likelihood == "point":
             return raw
         if self.likelihood == "gaussian":
             return raw[..., : raw.shape[-1] // 2]
         weights, means, _ = self.parts(raw)
-        found: np.ndarray = (weights[..., None] * means).sum(axis=-2)
-        return found
+        mean: np.ndarray = (weights[..., None] * means).sum(axis=-2)
+        return mean
 
     def surprise(self, raw: np.ndarray, outputs: np.ndarray) -> np.ndarray:
         """Return the negative log likelihood of outputs, shape (N, m), under raw outputs (N, width), in nats, (N,)."""
@@ -85,10 +85,10 @@ class Head:
         squares = ((outputs[:, None] - means) / sds) ** 2
         each = np.log(weights) - 0.5 * (squares + np.log(2.0 * np.pi * sds**2)).sum(axis=-1)
         highest = each.max(axis=-1)
-        found: np.ndarray = -highest - np.log(np.exp(each - highest[:, None]).sum(axis=-1))
-        return found
+        surprise: np.ndarray = -highest - np.log(np.exp(each - highest[:, None]).sum(axis=-1))
+        return surprise
 
-    def drawn(self, raw: np.ndarray, draws: Draws, mixing: np.ndarray | None = None) -> np.ndarray:
+    def draw(self, raw: np.ndarray, draws: Draws, mixing: np.ndarray | None = None) -> np.ndarray:
         """Return one draw, shape (m,).
 
         Args:

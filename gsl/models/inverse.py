@@ -60,15 +60,15 @@ class Regression:
         """
         n = len(wanted)
         window[:n] = wanted
-        found: np.ndarray = window[n : 2 * n] + decode(self.network.predict(window), self.encoding)
-        return found
+        targets: np.ndarray = window[n : 2 * n] + decode(self.network.predict(window), self.encoding)
+        return targets
 
     def actions(self, windows: np.ndarray, actions: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the actions [rad], shape (N, n_joints), for many windows."""
         n = wanted.shape[1]
         inputs = np.concatenate([wanted, windows[:, n:]], axis=1)
-        found: np.ndarray = windows[:, n : 2 * n] + decode(self.network.predict_many(inputs), self.encoding)
-        return found
+        targets: np.ndarray = windows[:, n : 2 * n] + decode(self.network.predict_many(inputs), self.encoding)
+        return targets
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint stores."""
@@ -122,8 +122,8 @@ class Solver:
 
     def actions(self, windows: np.ndarray, actions: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the actions [rad], shape (N, n_joints), for many windows."""
-        found: np.ndarray = actions + (wanted - self.simulator.effects(windows)) @ self.correction.T
-        return found
+        targets: np.ndarray = actions + (wanted - self.simulator.effects(windows)) @ self.correction.T
+        return targets
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint stores."""

@@ -18,11 +18,11 @@ def fit_linear(inputs: np.ndarray, targets: np.ndarray, *, ridge: float) -> Netw
         targets: Shape (N, m).
         ridge: Of collinear inputs (a gait makes all joints nearly so), not of noise; at least 0.
     """
-    given, wanted = scaling(inputs), scaling(targets)
-    z, y = given.apply(inputs), wanted.apply(targets)
+    input_scaling, output_scaling = scaling(inputs), scaling(targets)
+    z, y = input_scaling.apply(inputs), output_scaling.apply(targets)
     square = z.T @ z / len(z) + ridge * np.eye(z.shape[1])
     weight = np.linalg.solve(square, z.T @ y / len(z)).T
-    return unscale([(weight, np.zeros(targets.shape[1]))], given, wanted)
+    return unscale([(weight, np.zeros(targets.shape[1]))], input_scaling, output_scaling)
 
 
 def with_spread(network: Network, inputs: np.ndarray, targets: np.ndarray) -> Network:

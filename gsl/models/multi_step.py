@@ -20,9 +20,11 @@ Answer = Callable[[torch.Tensor], torch.Tensor]
 """From windows, shape (N, inputs), to changes of the joint positions [rad], shape (N, n_joints)."""
 
 
-def answering(network: torch.nn.Module, given: Scaling, wanted: Scaling) -> Answer:
+def answering(network: torch.nn.Module, input_scaling: Scaling, output_scaling: Scaling) -> Answer:
     """Return what a network that takes and gives scaled values answers in plain ones."""
-    (mean, sd), (shift, scale) = (tuple(map(_tensor, (one.mean, one.sd))) for one in (given, wanted))
+    (mean, sd), (shift, scale) = (
+        tuple(map(_tensor, (scaling.mean, scaling.sd))) for scaling in (input_scaling, output_scaling)
+    )
     return lambda windows: network((windows - mean) / sd) * scale + shift
 
 

@@ -42,8 +42,8 @@ class ServoMembers:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return what a checkpoint holds, by name: the first member as if it were alone, further ones by number."""
-        first, *further = (one.arrays() for one in self.members)
-        numbered = {_name(k, name): values for k, one in enumerate(further, 1) for name, values in one.items()}
+        first, *further = (member.arrays() for member in self.members)
+        numbered = {_name(k, name): values for k, arrays in enumerate(further, 1) for name, values in arrays.items()}
         return {**first, **numbered}
 
     def description(self) -> dict[str, Any]:

@@ -46,14 +46,14 @@ class StateForward:
 
     def change(self, state: np.ndarray, action: np.ndarray, draws: Draws | None = None) -> np.ndarray:
         """Return the expected change of the variables, shape (n_variables,); with `draws`, one that may happen."""
-        raw = self.network.predict(np.concatenate([state, self.encoded(action[None])[0]]))
-        return self.head.expected(raw) if draws is None else self.head.drawn(raw, draws, self.mixing)
+        raw = self.network.predict(np.concatenate([state, self.encode(action[None])[0]]))
+        return self.head.expect(raw) if draws is None else self.head.draw(raw, draws, self.mixing)
 
     def changes(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """Return the expected changes, shape (N, n_variables), for many states and actions."""
-        return self.head.expected(self.network.predict_many(np.hstack([states, self.encoded(actions)])))
+        return self.head.expect(self.network.predict_many(np.hstack([states, self.encode(actions)])))
 
-    def encoded(self, actions: np.ndarray) -> np.ndarray:
+    def encode(self, actions: np.ndarray) -> np.ndarray:
         """Return actions as the network sees them, (N, n_entries) -> (N, actions)."""
         return encode(actions, self.choices)
 
@@ -149,7 +149,7 @@ class NearestChoice:
     def actions_for(self, states: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the choices for many states and wanted changes, shape (N, 1)."""
         f = self.simulator
-        each = [f.changes(states, np.full((len(states), 1), float(one))) for one in range(f.choices)]
+        each = [f.changes(states, np.full((len(states), 1), float(choice))) for choice in range(f.choices)]
         off = np.array([np.square((change - wanted) / f.scale).sum(axis=1) for change in each])
         return off.argmin(axis=0).astype(float)[:, None]
 

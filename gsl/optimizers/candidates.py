@@ -20,15 +20,15 @@ def check_candidates(asked: Any, count: int) -> list[np.ndarray]:
         ConfigError: There is none, or one has another shape or a number that is not finite.
     """
     try:
-        candidates = [np.asarray(one, dtype=float) for one in asked]
+        candidates = [np.asarray(candidate, dtype=float) for candidate in asked]
     except (TypeError, ValueError) as error:
         raise ConfigError("optimizer", f"its ask() returned no list of candidates: {error}") from error
     if not candidates:
         raise ConfigError("optimizer", "its ask() returned no candidate")
-    for one in candidates:
-        if one.shape != (count,):
-            problem = f"its ask() returned a candidate of shape {one.shape}; the policy has {count} parameters"
+    for candidate in candidates:
+        if candidate.shape != (count,):
+            problem = f"its ask() returned a candidate of shape {candidate.shape}; the policy has {count} parameters"
             raise ConfigError("optimizer", problem)
-        if not np.isfinite(one).all():
+        if not np.isfinite(candidate).all():
             raise ConfigError("optimizer", "its ask() returned a candidate with a number that is not finite")
     return candidates

@@ -22,7 +22,7 @@ class PolicyIteration:
         return 1
 
     @property
-    def taken(self) -> int:
+    def steps_taken(self) -> int:
         """None."""
         return 0
 
@@ -39,4 +39,4 @@ class PolicyIteration:
         """Yield the optimal actions, see `Learner`."""
         if not isinstance(policy, ActionTable):
             raise ConfigError("policy", "policy iteration improves an action_table; say policy=action_table")
-        yield simulator.table().solved(parameters.astype(int)).astype(float)
+        yield simulator.table().solve(parameters.astype(int)).astype(float)

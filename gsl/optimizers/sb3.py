@@ -36,7 +36,7 @@ class Sb3:
     ] = field(default_factory=dict)
 
     @property
-    def taken(self) -> int:
+    def steps_taken(self) -> int:
         """Steps that it is asked to take; an algorithm may round them up to whole rollouts."""
         return self.generations * max(self.steps // self.generations, 1)
 
@@ -73,7 +73,7 @@ class Sb3:
         if policy.normalise:
             env = VecNormalize.load(policy.normalise, env)
             env.training = False
-        threads, left = torch.get_num_threads(), [self.taken]
+        threads, left = torch.get_num_threads(), [self.steps_taken]
         torch.set_num_threads(1)
 
         def count(*_: Any) -> bool:

@@ -43,7 +43,7 @@ class Trpo:
                 raise ConfigError(f"optimizer.{name}", f"must divide the rollout of {self.rollout}", given=str(parts))
 
     @property
-    def taken(self) -> int:
+    def steps_taken(self) -> int:
         """Steps that it takes: whole rollouts, in every generation."""
         each = max(self.steps // self.generations, 1)
         return self.generations * -(-each // self.rollout) * self.rollout
@@ -77,7 +77,7 @@ class Trpo:
         torch.set_num_threads(1)
         env = VecNormalize(DummyVecEnv([simulator.env] * self.envs), norm_obs=bold, gamma=self.discount)
 
-        def stepped(*_: Any) -> bool:
+        def step(*_: Any) -> bool:
             advance(self.envs)
             return True  # goes on
 
@@ -105,7 +105,7 @@ class Trpo:
             if not bold:
                 _put_layers(model, policy.layers(parameters))
             for _ in range(self.generations):
-                model.learn(max(self.steps // self.generations, 1), stepped, reset_num_timesteps=False)
+                model.learn(max(self.steps // self.generations, 1), step, reset_num_timesteps=False)
                 yield vector_of(_fold(_take_layers(model), env.obs_rms if bold else None, float(env.epsilon)))
         finally:
             env.close()

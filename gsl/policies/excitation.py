@@ -99,7 +99,7 @@ class Excitation:
         """Every variant of every motion once, then the repeats."""
         once = [(motion, variant) for motion in self.motions for variant in self.variants]
         again = [(motion, self.variants[0]) for motion in self.repeated if motion in self.motions]
-        return tuple(_piece(*one) for one in once + (self.repeats - 1) * again)
+        return tuple(_piece(*motion) for motion in once + (self.repeats - 1) * again)
 
     def posture(self, parameters: np.ndarray, layout: Layout) -> np.ndarray:
         """Return the rest, well inside all limits: arms forward and down, legs bent [rad], shape (n_joints,).

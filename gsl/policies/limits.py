@@ -62,7 +62,7 @@ class Limits:
 def limits(robot: Robot) -> Limits:
     """Return the limits of a robot; a joint that drives several motors has the narrowest of theirs."""
     motors = [robot.joint(name) for name in robot.motors]
-    ranges = [robot.commanded(name) for name in robot.motors]
+    ranges = [robot.bound_commands(name) for name in robot.motors]
     lower = -narrowest(robot, [-lower for lower, _ in ranges])
     upper = narrowest(robot, [upper for _, upper in ranges])
     usual = np.clip([robot.stance.get(name, 0.0) for name in robot.controlled], lower, upper)
@@ -116,17 +116,19 @@ def breach(bounds: Limits, targets: np.ndarray, period: float) -> Breach | None:
         (change - most, change, most, "the target jumps by {:.4g} rad, more than the {:.4g} rad allowed"),
         (path - far, path, far, "the target moves {:.4g} rad in 0.2 s, more than the {:.4g} rad allowed"),
     )
-    found = (_first(bounds, excess > _ROUNDING, text, values, bound) for excess, values, bound, text in rules)
-    return next((one for one in found if one is not None), None)
+    breaches = (_first(bounds, excess > _ROUNDING, text, values, bound) for excess, values, bound, text in rules)
+    return next((breach for breach in breaches if breach is not None), None)
 
 
-def _first(bounds: Limits, wrong: np.ndarray, text: str, *told: np.ndarray) -> Breach | None:
+def _first(bounds: Limits, wrong: np.ndarray, text: str, *quantities: np.ndarray) -> Breach | None:
     """Return the first entry that is wrong, its values and bounds put into the text."""
     if not wrong.any():
         return None
     step, joint = (int(index) for index in np.argwhere(wrong)[0])
     return Breach(
-        step, bounds.joints[joint], text.format(*(np.broadcast_to(one, wrong.shape)[step, joint] for one in told))
+        step,
+        bounds.joints[joint],
+        text.format(*(np.broadcast_to(quantity, wrong.shape)[step, joint] for quantity in quantities)),
     )
 
 

@@ -26,7 +26,7 @@ class Mlp:
     seed: Annotated[int, setting("of the first weights", ge=0)] = 0
     sizes: Annotated[tuple[int, int, int], setting("states, actions, choices; the world tells")] = (1, 1, 0)
 
-    def sized(self, layout: Layout) -> Mlp:
+    def size_for(self, layout: Layout) -> Mlp:
         """Return the policy for a world.
 
         Raises:
@@ -69,12 +69,12 @@ class Mlp:
 
     def layers(self, parameters: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return weights and biases, shapes (n_out, n_in) and (n_out,), of parameters."""
-        found, start = [], 0
+        layers, start = [], 0
         for wide, narrow in pairwise(self.widths):
             middle, end = start + wide * narrow, start + (wide + 1) * narrow
-            found.append((parameters[start:middle].reshape(narrow, wide), parameters[middle:end]))
+            layers.append((parameters[start:middle].reshape(narrow, wide), parameters[middle:end]))
             start = end
-        return found
+        return layers
 
     def posture(self, parameters: np.ndarray, layout: Layout) -> np.ndarray:
         """Return nothing: the environment has its own start."""

@@ -46,11 +46,11 @@ class Parts(NamedTuple):
         return self.sign * (0.7 + 0.3 * self.level)
 
 
-def parts(motion: str, variant: int, joints: int, found: tuple[Pair, ...]) -> Parts:
+def parts(motion: str, variant: int, joints: int, pairs: tuple[Pair, ...]) -> Parts:
     """Return the parts of a motion: a function of its name, its variant and the number of joints."""
     rng = np.random.default_rng(derive_seed("excitation", motion, variant))
     phase, tempo, level = ((rng.permutation(joints) + rng.random(joints)) / joints for _ in range(3))
-    return Parts(phase, tempo, level, 2.0 * (rng.permutation(joints) % 2) - 1.0, found, variant)
+    return Parts(phase, tempo, level, 2.0 * (rng.permutation(joints) % 2) - 1.0, pairs, variant)
 
 
 def steps(time: np.ndarray, length: float, these: Parts) -> np.ndarray:

@@ -49,7 +49,7 @@ class Graph:
             reason = " ".join(str(error).split())[:120]
             raise ConfigError("policy.file", f"is no ONNX that can be run: {reason}", given=str(path)) from error
         (self._input, *memory), self._where = self._session.get_inputs(), str(path)
-        self._memory = {one.name: [size if isinstance(size, int) else 1 for size in one.shape] for one in memory}
+        self._memory = {port.name: [size if isinstance(size, int) else 1 for size in port.shape] for port in memory}
         self._outputs = self._session.get_outputs()
         if len(memory) > len(self._outputs) - 1:
             problem = (
@@ -60,7 +60,7 @@ class Graph:
     @property
     def ports(self) -> Ports:
         """The last sizes of its input and output, where the graph says them."""
-        sizes = [(one.shape or [None])[-1] for one in (self._input, self._outputs[0])]
+        sizes = [(port.shape or [None])[-1] for port in (self._input, self._outputs[0])]
         inputs, outputs = (size if isinstance(size, int) else None for size in sizes)
         return Ports(inputs, outputs)
 

@@ -69,7 +69,7 @@ class Outside(ABC):
             ConfigError: It is not there, or cannot be read.
         """
 
-    def sized(self, layout: Layout) -> Self:
+    def size_for(self, layout: Layout) -> Self:
         """Return the policy for a world, its wiring audited.
 
         Raises:

@@ -14,13 +14,13 @@ from gsl.core.layout import Layout
 class Sized(Protocol):
     """A policy with as many parameters as a world has states and actions."""
 
-    def sized(self, layout: Layout) -> Policy:
+    def size_for(self, layout: Layout) -> Policy:
         """Return the policy for a world."""
 
 
 def size(policy: Policy, world: World) -> Policy:
     """Return a policy that knows its world, if it has to; only then has the world to say what it observes."""
-    return policy.sized(world.layout) if isinstance(policy, Sized) else policy
+    return policy.size_for(world.layout) if isinstance(policy, Sized) else policy
 
 
 def neighbour(policy: Policy, parameters: np.ndarray, spread: float, rng: np.random.Generator) -> np.ndarray:

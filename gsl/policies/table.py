@@ -19,7 +19,7 @@ class ActionTable:
     action: Annotated[int, setting("action of π0", ge=0)] = 0
     sizes: Annotated[tuple[int, int], setting("states and actions; the world tells")] = (0, 0)
 
-    def sized(self, layout: Layout) -> ActionTable:
+    def size_for(self, layout: Layout) -> ActionTable:
         """Return the policy for a world.
 
         Raises:

@@ -64,7 +64,7 @@ class TorchScript:
     @property
     def ports(self) -> Ports:
         """The width of its first and last linear layer, where these can be seen."""
-        matrices = [one for _, one in self._module.named_parameters() if one.dim() == 2]
+        matrices = [matrix for _, matrix in self._module.named_parameters() if matrix.dim() == 2]
         if self._remembers or not matrices:
             return Ports(None, None)
         return Ports(int(matrices[0].shape[1]), int(matrices[-1].shape[0]))

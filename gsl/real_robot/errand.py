@@ -62,7 +62,7 @@ def answer_parents(world: World) -> Mapping[str, Path]:
         return {}
     base = Path(world.requests)
     folders = [path.parent for path in [base / NAME, *sorted(base.glob(f"*/{NAME}"))] if path.is_file()]
-    return {f"answer.{path.relative_to(base).as_posix()}": path for one in folders for path in answer_files(one)}
+    return {f"answer.{path.relative_to(base).as_posix()}": path for folder in folders for path in answer_files(folder)}
 
 
 def ask(
@@ -76,7 +76,7 @@ def ask(
     """
     folder, request = _folder(scenario, errand), _request(scenario, orders, errand)
     if not _write_request(folder, request):
-        warnings = foreseen(scenario, orders, request, workers=workers, console=console)
+        warnings = foresee_refusals(scenario, orders, request, workers=workers, console=console)
         write_request(folder, request, warnings)
     elif restore(folder, request):
         console.status(f"{folder.as_posix()}: parts of its runner were missing; they are written anew")
@@ -88,17 +88,24 @@ def ask(
         for episode in request["episodes"]
         if episode["name"] in answers
     }
-    done = {name: one for name, one in verdicts.items() if one is not None and (one.trajectory or not errand.logs)}
-    missing = [one["name"] for one in due(request, done, {name for name, one in done.items() if one.episode.fell})]
+    done = {
+        name: verdict
+        for name, verdict in verdicts.items()
+        if verdict is not None and (verdict.trajectory or not errand.logs)
+    }
+    missing = [
+        verdict["name"]
+        for verdict in due(request, done, {name for name, episode in done.items() if episode.episode.fell})
+    ]
     if missing:
         raise Waiting(_describe_errand(folder, request, missing, answers), folder, missing)
-    for path in sorted({one.path.parent for one in answers.values()}):
+    for path in sorted({answer.path.parent for answer in answers.values()}):
         if (path / manifest.NAME).is_file() and manifest.read(path).kind == REHEARSAL:
             console.status(f"{path.as_posix()}: this is a rehearsal: no real robot has acted")
     return [done.get(episode["name"]) for episode in request["episodes"]]
 
 
-def foreseen(
+def foresee_refusals(
     scenario: Scenario, orders: Sequence[Order], request: Mapping[str, Any], *, workers: int, console: Console
 ) -> list[str]:
     """Return, and tell, which policies ask in a nominal simulator for what the runner will refuse on the robot."""
@@ -110,19 +117,21 @@ def foreseen(
     replay = Scenario(nominal, scenario.task, scenario.policy, scenario.role, scenario.grounding)
     with console.progress(len(first), "looking in simulation for targets that the robot's limits forbid") as progress:
         done = trajectories(replay, [orders[index].job for index in first.values()], workers=workers, progress=progress)
-    told = []
+    warnings = []
     for (policy, index), trajectory in zip(first.items(), done, strict=True):
         guard = Guard(request["joints"], request["limits"], request["control_period"])
         guard.start(np.array(request["episodes"][index]["posture"]))
         sent = trajectory.action if trajectory.grounded_action is None else trajectory.grounded_action
         for time, target in zip(trajectory.time[:-1], sent, strict=True):
             if problem := guard.refusal(target, time):
-                told.append(f"{policy} asks in simulation after {time:.2f} s for what the runner refuses: {problem}")
+                warnings.append(
+                    f"{policy} asks in simulation after {time:.2f} s for what the runner refuses: {problem}"
+                )
                 break
             guard.take(target, time)
-    for one in told:
-        console.status(f"warning: {one}; an episode that is stopped counts as a fall")
-    return told
+    for warning in warnings:
+        console.status(f"warning: {warning}; an episode that is stopped counts as a fall")
+    return warnings
 
 
 def _folder(scenario: Scenario, errand: Errand) -> Path:
@@ -174,15 +183,15 @@ def _episode(scenario: Scenario, order: Order) -> dict[str, Any]:
     """Return all that a runner needs of an episode; a policy that plays commands goes out as these."""
     layout, parameters = scenario.world.layout, order.job.parameters
     posture = scenario.policy.posture(parameters, layout)
-    told = {"policy": order.policy, "parameters": parameters, "seed": order.job.seed, "posture": posture}
+    message = {"policy": order.policy, "parameters": parameters, "seed": order.job.seed, "posture": posture}
     try:
         run = scenario.policy.start(parameters, layout)
     except KeyError as error:
         problem = f"needs {error.args[0]}, which the robot does not tell; say world.sensors=[...] if it does"
         raise ConfigError("policy", problem) from error
     if isinstance(run, OpenLoopRun):
-        return {**told, "steps": run.ticks, "commands": [run.act(np.zeros(0)) for _ in range(run.ticks)]}
-    return {**told, "steps": scenario.ticks}
+        return {**message, "steps": run.ticks, "commands": [run.act(np.zeros(0)) for _ in range(run.ticks)]}
+    return {**message, "steps": scenario.ticks}
 
 
 def _noise(grounding: Grounding) -> float:

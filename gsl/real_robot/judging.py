@@ -28,12 +28,12 @@ class Verdict(NamedTuple):
 
 def observe(layout: Layout, trajectory: Trajectory) -> Layout:
     """Return a layout with all that a log knows of the base."""
-    known = {
+    extras = {
         part: size
         for part, size in _BASE.items()
         if all(column in trajectory.sensors for column in Layout((), {part: size}, 1.0).columns[part])
     }
-    return replace(layout, sizes={**layout.sizes, **known})
+    return replace(layout, sizes={**layout.sizes, **extras})
 
 
 def by_distance(task: Task, layout: Layout) -> bool:
@@ -58,8 +58,8 @@ def judge(scenario: Scenario, answer: Answered, steps: int) -> Verdict | None:
         return Verdict(Episode(answer.value, down, length, {}), _pay(trajectory, answer.value))
     distance = 0.0 if answer.distance is None and down else answer.distance
     if isinstance(task, ByDistance) and distance is not None and (trajectory is None or not _sees_itself(trajectory)):
-        found = task.measured(distance, fell=down)
-        return Verdict(Episode(found.value, down, length, found.outcome), _pay(trajectory, found.value))
+        score = task.judge_distance(distance, fell=down)
+        return Verdict(Episode(score.value, down, length, score.outcome), _pay(trajectory, score.value))
     if trajectory is None or (isinstance(task, ByDistance) and not _sees_itself(trajectory)):
         return None
     layout = observe(scenario.world.layout, trajectory)

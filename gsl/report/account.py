@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from gsl.core.budget import DOCUMENT_BYTES, read_json, read_text
 from gsl.core.unit import Unit
@@ -18,41 +18,33 @@ from gsl.report.diagnosis_text import summary_lines
 from gsl.report.evaluation_cells import cells, columns
 from gsl.report.headline import unit_of
 from gsl.report.markdown import read_table
+from gsl.report.tables import Table
 from gsl.storage.artifact import METRICS, Artifact
 from gsl.storage.diagnosis_report import report_of
 from gsl.storage.hashing import CIRCUMSTANCES, PAGE
 
 
-class Told(NamedTuple):
-    """A table with its title and what is said below it."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
-    caption: str | None = None
-
-
-def account(artifact: Artifact) -> list[Told]:
+def account(artifact: Artifact) -> list[Table]:
     """Return the results of an artifact; where no table tells them, its metrics by name."""
     tell = _TELLERS.get(artifact.manifest.kind, _of_others)
     try:
-        told = tell(artifact.folder, artifact.metrics, unit_of(artifact))
-        return [told] if isinstance(told, Told) else told
+        result = tell(artifact.folder, artifact.metrics, unit_of(artifact))
+        return [result] if isinstance(result, Table) else result
     except (InputError, OSError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, StopIteration):
         return [_plain(artifact)]
 
 
-def _collect(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+def _collect(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
     row = {"episodes": metrics["episodes"], "steps": f"{metrics['steps']:,}"}
     if unit.falls:
         row["falls"] = metrics["falls"]
     if metrics["value"] is not None:
         value = f"value of π0{' with noise' * bool(metrics.get('action_noise'))}"
         row[in_unit(value, unit.name)] = unit.bare(metrics["value"])
-    return Told("trajectories", tuple(row), [tuple(map(str, row.values()))])
+    return Table("trajectories", tuple(row), [tuple(map(str, row.values()))])
 
 
-def _import(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+def _import(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
     row = {
         "episodes": metrics["episodes"],
         "files": metrics["files"],
@@ -61,23 +53,23 @@ def _import(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
         "control period [s]": f"{metrics['control_period']:g}",
     }
     caption = "; ".join([metrics["time"], f"velocities {metrics['velocity']}", *metrics["warnings"]])
-    return Told("imported trajectories", tuple(row), [tuple(map(str, row.values()))], caption)
+    return Table("imported trajectories", tuple(row), [tuple(map(str, row.values()))], caption)
 
 
-def _of_states(metrics: Mapping[str, Any], what: str) -> Told | None:
+def _of_states(metrics: Mapping[str, Any], what: str) -> Table | None:
     """Return how a model of states does on held-out steps; none for one of joints."""
-    found = metrics["heldout"]
-    if "space" not in metrics or not {"r2", "action_r2"} & found.keys():
+    heldout = metrics["heldout"]
+    if "space" not in metrics or not {"r2", "action_r2"} & heldout.keys():
         return None
-    each = [(f"state.{name}", value) for name, value in found.get("r2_by_variable", {}).items()]
-    rows = [*each, ("all", found["r2"])] if "r2" in found else [("actions", found["action_r2"])]
+    each = [(f"state.{name}", value) for name, value in heldout.get("r2_by_variable", {}).items()]
+    rows = [*each, ("all", heldout["r2"])] if "r2" in heldout else [("actions", heldout["action_r2"])]
     shown = [(name, f"{100.0 * value:.1f} %") for name, value in rows]
-    return Told(f"{what} ({metrics['family']}) on held-out trajectories", ("of", "variance explained"), shown)
+    return Table(f"{what} ({metrics['family']}) on held-out trajectories", ("of", "variance explained"), shown)
 
 
-def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    if told := _of_states(metrics, "forward model"):
-        return told
+def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
+    if table := _of_states(metrics, "forward model"):
+        return table
     names = {
         "one_step_deg": "one tick [°]",
         "one_step_no_change_deg": "no change, one tick [°]",
@@ -95,39 +87,44 @@ def _train_forward(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told
         for group, measured in metrics["heldout"].items()
     ]
     title = f"forward model ({metrics['family']}) on held-out real trajectories"
-    return Told(title, ("policy", "trajectories", *names.values(), "worst joint"), rows)
+    return Table(title, ("policy", "trajectories", *names.values(), "worst joint"), rows)
 
 
-def _train_inverse(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    if told := _of_states(metrics, "inverse model"):
-        return told
+def _train_inverse(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
+    if table := _of_states(metrics, "inverse model"):
+        return table
     measured = metrics["heldout"]
     title = f"inverse model ({metrics['method']}, {metrics['family']}) on held-out simulated trajectories"
     row = (_number(measured["recovered_action_deg"]), _worst(measured["recovered_action_by_joint_deg"]))
-    return Told(title, ("action error [°]", "worst joint"), [row])
+    return Table(title, ("action error [°]", "worst joint"), [row])
 
 
-def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
     groups = {"all": metrics, **metrics["groups"]}
     rows = [
-        (name, f"{one['floors_before']:.2f}", f"{one['floors_after']:.2f}", "yes" if one["learned"] else "no")
-        for name, one in groups.items()
+        (
+            name,
+            f"{figures['floors_before']:.2f}",
+            f"{figures['floors_after']:.2f}",
+            "yes" if figures["learned"] else "no",
+        )
+        for name, figures in groups.items()
     ]
     titles = ("joints", "simulator", "with the learned servo", "learned")
     below = f"what it has learned: {folder.as_posix()}/servo.png"
-    return Told("distance from held-out motions [noise floors]", titles, rows, below)
+    return Table("distance from held-out motions [noise floors]", titles, rows, below)
 
 
-def _optimize(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+def _optimize(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
     document = read_json(folder / "policies.json")
     rows = [
-        (str(one["generation"]), str(one["name"]), unit.bare(one["value_sim"]))
-        for one in document["policies"]
-        if one["generation"]
+        (str(policy["generation"]), str(policy["name"]), unit.bare(policy["value_sim"]))
+        for policy in document["policies"]
+        if policy["generation"]
     ]
     titles = ("generation", "policy", in_unit("in simulation", unit.name))
     problems = _problems(folder)
-    return Told("best of each generation", titles, rows, f"the grounding: {problems}" if problems else None)
+    return Table("best of each generation", titles, rows, f"the grounding: {problems}" if problems else None)
 
 
 def _problems(folder: Path) -> str:
@@ -135,18 +132,18 @@ def _problems(folder: Path) -> str:
     return "; ".join(read_json(report)["problems"]) if report.is_file() else ""
 
 
-def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
     document = read_json(folder / "evaluation.json")
-    return Told("policies in the real world", *evaluation_table(document, unit), describe_choice(metrics, unit))
+    return Table("policies in the real world", *evaluation_table(document, unit), describe_choice(metrics, unit))
 
 
 def evaluation_table(document: Mapping[str, Any], unit: Unit) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return titles and rows of what evaluation.json holds."""
     phases = {"policies": "", "check": ", checked", "confirmation": ", fresh"}
-    found = [(one, f"{one['name']}{purpose}") for phase, purpose in phases.items() for one in document[phase]]
-    told = list(dict.fromkeys(name for one, _ in found for name in one["outcome"]))
-    rows = [tuple(cells(one | {"interval": _bounds(one["interval"])}, name, unit, told)) for one, name in found]
-    return tuple(columns(told, unit)), rows
+    named = [(row, f"{row['name']}{purpose}") for phase, purpose in phases.items() for row in document[phase]]
+    outcomes = list(dict.fromkeys(name for row, _ in named for name in row["outcome"]))
+    rows = [tuple(cells(row | {"interval": _bounds(row["interval"])}, name, unit, outcomes)) for row, name in named]
+    return tuple(columns(outcomes, unit)), rows
 
 
 def _bounds(interval: list[float | None]) -> list[float]:
@@ -162,13 +159,13 @@ def describe_choice(metrics: Mapping[str, Any], unit: Unit) -> str:
         return f"no {better}: {metrics['best']} is returned; {spent}"
     gain, after, before = metrics["gain"], metrics["returned"], metrics["baseline"]
     bounds = unit.interval(gain["interval"], sign=True)
-    values = f"{unit.shown(after['value'])}, {unit.ended(after)}; π0 {unit.shown(before['value'])}"
-    told = f"on fresh episodes {values}; gain {unit.shown(gain['value'], sign=True)}, 95 % interval {bounds}"
+    values = f"{unit.format(after['value'])}, {unit.describe_ends(after)}; π0 {unit.format(before['value'])}"
+    worth = f"on fresh episodes {values}; gain {unit.format(gain['value'], sign=True)}, 95 % interval {bounds}"
     doubt = "" if gain["interval"][0] > 0.0 else ", not surely a gain" if gain["value"] > 0.0 else ": worse than π0"
-    return f"{metrics['best']} is returned: {told}{doubt}; {spent}"
+    return f"{metrics['best']} is returned: {worth}{doubt}; {spent}"
 
 
-def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
     titles, rows = _markdown(folder / "table.md")
     spent, learned, flight = metrics["real_episodes"], metrics["learned_from"], metrics.get("excitation")
     why = "to diagnose" if metrics.get("diagnosis") else "to learn the servo from"
@@ -185,18 +182,18 @@ def _iterate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
         f"plots: {folder.as_posix()}/ ({plots})",
         f"page: {(folder / PAGE).as_posix()}",
     ]
-    return Told(in_unit("grounded simulation learning", unit.name), titles, rows, "\n".join(below))
+    return Table(in_unit("grounded simulation learning", unit.name), titles, rows, "\n".join(below))
 
 
-def _of_others(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
+def _of_others(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
     """Return the first table that a stage of another package has written, and where the rest is."""
     page = min(folder.glob("*.md"))
     others = ", ".join(sorted(path.name for path in folder.iterdir() if path.name not in (*CIRCUMSTANCES, METRICS)))
-    return Told(str(metrics.get("headline", "what came out")), *_markdown(page), f"{folder.as_posix()}/: {others}")
+    return Table(str(metrics.get("headline", "what came out")), *_markdown(page), f"{folder.as_posix()}/: {others}")
 
 
-def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    return Told(in_unit("worlds", unit.name), *_markdown(folder / "table.md"))
+def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
+    return Table(in_unit("worlds", unit.name), *_markdown(folder / "table.md"))
 
 
 def _markdown(path: Path) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -205,8 +202,8 @@ def _markdown(path: Path) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     return read_table(list(itertools.takewhile(lambda line: line.startswith("|"), below_title)))
 
 
-def _plain(artifact: Artifact) -> Told:
-    return Told("metrics", ("metric", "value"), list(flat(artifact.metrics)))
+def _plain(artifact: Artifact) -> Table:
+    return Table("metrics", ("metric", "value"), list(flat(artifact.metrics)))
 
 
 def flat(values: Any, path: str = "") -> Iterator[tuple[str, str]]:
@@ -238,17 +235,15 @@ def _worst(by_joint: Mapping[str, float]) -> str:
     return f"{joint} {by_joint[joint]:.2f}°"
 
 
-def _diagnose(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> list[Told]:
-    parts = summary_lines(report_of(folder))
-    return [Told(part[0], tuple(part[1]), [tuple(row) for row in part[2]], part[3]) for part in parts]
+def _diagnose(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> list[Table]:
+    return summary_lines(report_of(folder))
 
 
-def _audit(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Told:
-    document = read_json(folder / "audit.json")
-    return Told(*audit_table(document))
+def _audit(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
+    return audit_table(read_json(folder / "audit.json"))
 
 
-_TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Told | list[Told]]] = {
+_TELLERS: Mapping[str, Callable[[Path, Mapping[str, Any], Unit], Table | list[Table]]] = {
     "audit": _audit,
     "collect": _collect,
     "import": _import,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
+
+from gsl.report.tables import Table
 
 HEADLINES = {
     "clean": "The wiring is in order",
@@ -11,25 +13,25 @@ HEADLINES = {
     "wiring": "It is wiring",
 }
 
-Table = tuple[str, tuple[str, ...], Sequence[tuple[str, ...]], str]
-
 
 def audit_table(document: Mapping[str, Any]) -> Table:
     """Return title, columns, rows and what is said below them."""
-    rows = [(one["kind"], _sentence(one), one["remedy"], _floors(one)) for one in document["findings"]]
+    rows = [
+        (finding["kind"], _sentence(finding), finding["remedy"], _floors(finding)) for finding in document["findings"]
+    ]
     below = list(document["remarks"])
     if not rows:
-        return HEADLINES[document["verdict"]], ("", ""), [("audit", document["summary"])], "\n".join(below)
+        return Table(HEADLINES[document["verdict"]], ("", ""), [("audit", document["summary"])], "\n".join(below))
     below.append("Mend this first: a diagnosis would take it for physics.")
     columns = ("kind", "what is wrong", "what to do", "gap / noise")
-    return HEADLINES[document["verdict"]], columns, rows, "\n".join(below)
+    return Table(HEADLINES[document["verdict"]], columns, rows, "\n".join(below))
 
 
-def _sentence(one: Mapping[str, Any]) -> str:
-    return " Or: ".join([one["sentence"], *one["or"]])
+def _sentence(finding: Mapping[str, Any]) -> str:
+    return " Or: ".join([finding["sentence"], *finding["or"]])
 
 
-def _floors(one: Mapping[str, Any]) -> str:
-    if one["before"] is None:
+def _floors(finding: Mapping[str, Any]) -> str:
+    if finding["before"] is None:
         return ""
-    return f"{one['before']:.1f} -> {one['after']:.1f}"
+    return f"{finding['before']:.1f} -> {finding['after']:.1f}"

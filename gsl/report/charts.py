@@ -114,11 +114,11 @@ def bar_chart(bars: Sequence[Bar], *, mark: float | None = None) -> Markup | Non
         whole = figure(0.3 + ROW * sum(max(1.0, 0.8 * row) + 0.25 for row in rows), WIDTH)
         axes = whole.subplots()
         for place, bar in enumerate(bars):
-            known = [(kind, max(0.0, length)) for kind, length in bar.lengths if length is not None]
-            for index, (kind, length) in enumerate(known):
-                height = 0.8 / len(known)
+            lengths = [(kind, max(0.0, length)) for kind, length in bar.lengths if length is not None]
+            for index, (kind, length) in enumerate(lengths):
+                height = 0.8 / len(lengths)
                 axes.barh(place - 0.4 + (index + 0.5) * height, length, 0.9 * height, color=_FILLS[kind])
-            end = max((length for _, length in known), default=0.0)
+            end = max((length for _, length in lengths), default=0.0)
             axes.annotate(bar.text, (end, place), (5, 0), textcoords="offset points", va="center", fontsize=9.5)
         if mark is not None:
             axes.axvline(mark, color=INK, linewidth=1.0, linestyle=(0, (4, 3)))

@@ -56,7 +56,7 @@ class Fold:
         through = np.all([np.isfinite(values) for values in errors.values()], axis=0)
         return {way: values[through] for way, values in errors.items()}
 
-    def told(self) -> dict[str, Any]:
+    def document(self) -> dict[str, Any]:
         """Return it as a JSON document."""
         return asdict(self)
 
@@ -67,15 +67,15 @@ def table(folds: Sequence[Fold], by: str) -> str:
     columns = (f"{by} held out", *(f"{way} [mrad]" for way in ways), "excess removed", "learned residual", "causes")
     rows = [
         (
-            one.held_out,
-            *(_mean(one.replayed[way]) for way in ways),
-            _percent(one.removed),
-            _percent(one.ceiling),
-            f"{', '.join(one.causes) or '-'}{SAID.get(one.verdict, '')}",
+            fold.held_out,
+            *(_mean(fold.replayed[way]) for way in ways),
+            _percent(fold.removed),
+            _percent(fold.ceiling),
+            f"{', '.join(fold.causes) or '-'}{SAID.get(fold.verdict, '')}",
         )
-        for one in folds
+        for fold in folds
     ]
-    every = {way: np.concatenate([one.replayed[way] for one in folds]) for way in ways}
+    every = {way: np.concatenate([fold.replayed[way] for fold in folds]) for way in ways}
     rows.append(("all", *(_mean(every[way]) for way in ways), "", "", ""))
     below = "Mean absolute error of the joints in open-loop replays of whole trajectories that no fit has seen."
     return "\n".join(
@@ -85,14 +85,14 @@ def table(folds: Sequence[Fold], by: str) -> str:
 
 def _list_lost(folds: Sequence[Fold]) -> Iterator[str]:
     """Tell how many trajectories are in no mean, and why."""
-    every = {way: np.concatenate([one.errors[way] for one in folds]) for way in folds[0].errors}
+    every = {way: np.concatenate([fold.errors[way] for fold in folds]) for way in folds[0].errors}
     lost = {way: ~np.isfinite(np.asarray(values, dtype=float)) for way, values in every.items()}
     some, whole = np.any(list(lost.values()), axis=0), np.all(list(lost.values()), axis=0)
     if some.any():
-        told = ", ".join(f"{way} {int(values.sum())}" for way, values in lost.items())
+        counts = ", ".join(f"{way} {int(values.sum())}" for way, values in lost.items())
         yield (
             f"{int(some.sum())} of {len(some)} trajectories are in no mean: a replay diverged or the torque was never "
-            f"on ({told}; {int(whole.sum())} in every replay)."
+            f"on ({counts}; {int(whole.sum())} in every replay)."
         )
 
 
@@ -102,7 +102,7 @@ def _compare(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterator
         return
     others = [way for way in every if way not in (DIAGNOSED, DIAGNOSED_GAT, DIAGNOSED_SERVO)]
     rival = min(others, key=lambda way: float(np.mean(every[way])))
-    change = _change([one for one in folds if len(one.replayed[rival])], DIAGNOSED, rival)
+    change = _change([fold for fold in folds if len(fold.replayed[rival])], DIAGNOSED, rival)
     yield (
         f"The diagnosed simulator's mean error against the best of the others ({rival}): {100.0 * change.mean:+.0f} % "
         f"({100.0 * change.lower:+.0f} to {100.0 * change.upper:+.0f} %, bootstrap over folds and "
@@ -114,10 +114,10 @@ def _on_top(folds: Sequence[Fold], every: Mapping[str, np.ndarray]) -> Iterator[
     """Tell what a learned servo does on top of the diagnosis."""
     if DIAGNOSED_SERVO not in every or not len(every[DIAGNOSED]):
         return
-    some = [one for one in folds if len(one.replayed[DIAGNOSED])]
+    some = [fold for fold in folds if len(fold.replayed[DIAGNOSED])]
     change = _change(some, DIAGNOSED_SERVO, DIAGNOSED)
-    means = [[float(np.mean(one.replayed[way])) for way in (DIAGNOSED_SERVO, DIAGNOSED)] for one in some]
-    worse = [one.held_out for one, (after, before) in zip(some, means, strict=True) if after > before]
+    means = [[float(np.mean(fold.replayed[way])) for way in (DIAGNOSED_SERVO, DIAGNOSED)] for fold in some]
+    worse = [fold.held_out for fold, (after, before) in zip(some, means, strict=True) if after > before]
     yield (
         f"A learned servo on top changes the diagnosed simulator's mean error by {100.0 * change.mean:+.0f} % "
         f"({100.0 * change.lower:+.0f} to {100.0 * change.upper:+.0f} %); folds that get worse: "
@@ -133,18 +133,18 @@ def _change(folds: Sequence[Fold], way: str, rival: str) -> Interval:
     """Return the relative change of the mean error, with an interval over folds and the trajectories in them."""
     rng = np.random.default_rng(0)
 
-    def drawn(index: np.ndarray) -> float:
-        errors = {one: [np.asarray(folds[k].replayed[one]) for k in index] for one in (rival, way)}
-        again = [rng.integers(len(one), size=len(one)) for one in errors[rival]]
+    def resample(index: np.ndarray) -> float:
+        errors = {name: [np.asarray(folds[k].replayed[name]) for k in index] for name in (rival, way)}
+        again = [rng.integers(len(fold), size=len(fold)) for fold in errors[rival]]
         after, before = (
-            np.mean(np.concatenate([one[chosen] for one, chosen in zip(errors[name], again, strict=True)]))
+            np.mean(np.concatenate([fold[chosen] for fold, chosen in zip(errors[name], again, strict=True)]))
             for name in (way, rival)
         )
         return float(after / before) - 1.0
 
-    every = {one: np.mean(np.concatenate([fold.replayed[one] for fold in folds])) for one in (rival, way)}
-    found = bootstrap_interval(drawn, len(folds), np.random.default_rng(0))
-    return found._replace(mean=float(every[way] / every[rival]) - 1.0)
+    every = {name: np.mean(np.concatenate([fold.replayed[name] for fold in folds])) for name in (rival, way)}
+    interval = bootstrap_interval(resample, len(folds), np.random.default_rng(0))
+    return interval._replace(mean=float(every[way] / every[rival]) - 1.0)
 
 
 def _percent(share: float | None) -> str:

@@ -51,7 +51,7 @@ def report_html(document: Document) -> str:
     sides = [str(data[key]) for key in ("sim", "source") if data.get(key)]
     return page(
         "diagnosis.html",
-        [*(told(document) for told in _SECTIONS), *describe_origin(origin())],
+        [*(section(document) for section in _SECTIONS), *describe_origin(origin())],
         title=f"Diagnosis: {headline(document)}",
         kind=kind,
         mark=_MARKS[kind],

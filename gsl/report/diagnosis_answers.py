@@ -22,7 +22,7 @@ from gsl.report.parts import Part, bullets, command, element, join, prose
 def cards(document: Document) -> list[tuple[str, Markup]]:
     """Return the questions of the first screen with their answers."""
     if verdict(document) == "wiring":
-        sentences = [prose(read_word(one, "sentence")) for one in entries(document, "wiring")]
+        sentences = [prose(read_word(finding, "sentence")) for finding in entries(document, "wiring")]
         steps_to_take = element("ol", *(_step(step) for step in steps(document)))
         return [("What is wrong?", join(bullets(sentences))), ("What next?", steps_to_take)]
     extent = "How large is it?" if verdict(document) == "no_gap" else "How far does it shrink?"
@@ -35,8 +35,8 @@ def cards(document: Document) -> list[tuple[str, Markup]]:
 
 
 def _aside(document: Document) -> Markup | None:
-    told = comparison_sentence(document)
-    return element("p", prose(told), kind="note") if told else None
+    sentence = comparison_sentence(document)
+    return element("p", prose(sentence), kind="note") if sentence else None
 
 
 def _cause(document: Document) -> Markup:
@@ -55,7 +55,7 @@ def _nothing(document: Document) -> str:
 
 
 def _one(cause: Document) -> Markup:
-    rows = [_parameter(key, found or {}) for key, found in part(cause, "parameters").items()]
+    rows = [_parameter(key, estimate or {}) for key, estimate in part(cause, "parameters").items()]
     return element(
         "div",
         element("p", element("strong", cause_name(cause)), kind="cause"),
@@ -65,9 +65,9 @@ def _one(cause: Document) -> Markup:
     )
 
 
-def _parameter(key: str, found: Document) -> tuple[Part, ...]:
-    bounds = interval(found)
-    shown = element("span", name(key), " ", element("b", value(found)), f" ({bounds})" if bounds else None)
+def _parameter(key: str, estimate: Document) -> tuple[Part, ...]:
+    bounds = interval(estimate)
+    shown = element("span", name(key), " ", element("b", value(estimate)), f" ({bounds})" if bounds else None)
     return shown, " "
 
 

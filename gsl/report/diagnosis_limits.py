@@ -14,12 +14,12 @@ def limits(document: Document) -> Markup | None:
     """Return the effects of which there is little or none."""
     rows = [
         (
-            name(read_word(one, "effect")),
-            element("code", read_word(one, "parameter")),
-            _at(one, "most"),
-            _at(one, "documented"),
+            name(read_word(limit, "effect")),
+            element("code", read_word(limit, "parameter")),
+            _at(limit, "most"),
+            _at(limit, "documented"),
         )
-        for one in entries(document, "limits")
+        for limit in entries(document, "limits")
     ]
     note = (
         "If the causes are right and nothing else is at work: more of an effect, in all joints alike, makes held-out "
@@ -32,13 +32,13 @@ def limits(document: Document) -> Markup | None:
 
 def limits_sentence(document: Document) -> str | None:
     """Return the tightest limits in a sentence, None if there are none."""
-    found = entries(document, "limits")
-    told = [f"{name(read_word(one, 'effect'))} {_at(one, 'most')}" for one in found[:TOLD]]
-    more = [f"{len(found) - TOLD} more, in the report"] if len(found) > TOLD else []
-    given = "If these causes are right, all" if entries(document, "causes") else "All"
-    return f"{given} joints alike have at most: {list_words([*told, *more], most=99)}." if told else None
+    tightest = entries(document, "limits")
+    phrases = [f"{name(read_word(limit, 'effect'))} {_at(limit, 'most')}" for limit in tightest[:TOLD]]
+    more = [f"{len(tightest) - TOLD} more, in the report"] if len(tightest) > TOLD else []
+    subject = "If these causes are right, all" if entries(document, "causes") else "All"
+    return f"{subject} joints alike have at most: {list_words([*phrases, *more], most=99)}." if phrases else None
 
 
-def _at(one: Document, key: str) -> str:
-    value = finite(one.get(key)) or 0.0
-    return in_unit({"unit": one.get("unit"), "value": value, "low": 0.0, "high": 2.0 * value})(value)
+def _at(limit: Document, key: str) -> str:
+    value = finite(limit.get(key)) or 0.0
+    return in_unit({"unit": limit.get("unit"), "value": value, "low": 0.0, "high": 2.0 * value})(value)

@@ -15,26 +15,26 @@ _ENGINES = {"chain": "chain model, robot in the air", "bullet": "Bullet, with th
 
 def caveats(document: Document) -> Markup | None:
     """Return what to be careful with."""
-    told: list[Part] = [str(caveat) for caveat in entries(document, "caveats")]
+    sentences: list[Part] = [str(caveat) for caveat in entries(document, "caveats")]
     unseen = entries(document, "invisible")
     if unseen:
-        told.append(f"This log cannot show: {list_words([name(effect) for effect in unseen], most=99)}.")
-    return section("Caveats", bullets(told))
+        sentences.append(f"This log cannot show: {list_words([name(effect) for effect in unseen], most=99)}.")
+    return section("Caveats", bullets(sentences))
 
 
 def calibration(document: Document) -> Markup | None:
     """Return every joint's own small deviations."""
     rows = [
         (
-            read_word(one, "joint"),
-            _scale(one.get("kp"), 1.0, decimals=3),
-            _scale(one.get("kd"), 1.0, decimals=3),
-            _scale(one.get("coulomb"), 1.0, decimals=4),
-            _scale(one.get("viscous"), 1.0, decimals=4),
-            _scale(one.get("zero"), 180.0 / math.pi, decimals=2),
-            _scale(one.get("inertia"), 1000.0, decimals=2),
+            read_word(row, "joint"),
+            _scale(row.get("kp"), 1.0, decimals=3),
+            _scale(row.get("kd"), 1.0, decimals=3),
+            _scale(row.get("coulomb"), 1.0, decimals=4),
+            _scale(row.get("viscous"), 1.0, decimals=4),
+            _scale(row.get("zero"), 180.0 / math.pi, decimals=2),
+            _scale(row.get("inertia"), 1000.0, decimals=2),
         )
-        for one in entries(document, "calibration")
+        for row in entries(document, "calibration")
     ]
     columns = (
         *("joint", "kp, factor", "kd, factor", "Coulomb friction, added [N·m]", "viscous friction, added [N·m·s/rad]"),
@@ -50,13 +50,13 @@ def calibration(document: Document) -> Markup | None:
 
 def noise_floor(document: Document) -> Markup | None:
     """Return the noise of each joint's log."""
-    found = part(document, "floor")
+    floor = part(document, "floor")
     rows = [
         (str(joint), _scale(sd, 1000.0, decimals=2), _scale(sd, 180.0 / math.pi, decimals=3))
-        for joint, sd in part(found, "sd").items()
+        for joint, sd in part(floor, "sd").items()
     ]
-    pairs = found.get("pairs")
-    if found.get("source") == "repeats":
+    pairs = floor.get("pairs")
+    if floor.get("source") == "repeats":
         note = f"Measured: {pairs or 'some'} repeats of the same commands, and how far their logs differ."
     else:
         note = "Estimated from the roughness of the log: no motion was repeated. Repeats would make it sure."
@@ -70,12 +70,12 @@ def _scale(value: object, factor: float, *, decimals: int) -> str:
 
 def self_test(document: Document) -> Markup | None:
     """Return how the diagnosis did on simulated logs whose cause it was not told."""
-    found = part(document, "self_test")
+    test = part(document, "self_test")
     rows = [
-        (name(one.get("truth") or NONE), _answer(one), read_word(one, "count"))
-        for one in sorted(entries(found, "confusions"), key=lambda one: read_word(one, "truth"))
+        (name(case.get("truth") or NONE), _answer(case), read_word(case, "count"))
+        for case in sorted(entries(test, "confusions"), key=lambda case: read_word(case, "truth"))
     ]
-    gain = finite(found.get("null_gain"))
+    gain = finite(test.get("null_gain"))
     null = (
         f" Where nothing was wrong, chance saved {short(gain)} in cost at most; an effect has to save 1.3 times that."
         if gain is not None
@@ -84,15 +84,15 @@ def self_test(document: Document) -> Markup | None:
     return section(
         "Self-test",
         table(("true cause", "answer", "cases"), rows) if rows else None,
-        element("p", f"{found.get('cases') or len(rows)} simulated logs of the same commands and noise.{null}")
-        if found
+        element("p", f"{test.get('cases') or len(rows)} simulated logs of the same commands and noise.{null}")
+        if test
         else None,
     )
 
 
-def _answer(one: Document) -> Markup:
-    told = name(one.get("answer") or NONE)
-    return element("span", told) if one.get("answer") == one.get("truth") else element("strong", f"{told} ✗")
+def _answer(case: Document) -> Markup:
+    answer = name(case.get("answer") or NONE)
+    return element("span", answer) if case.get("answer") == case.get("truth") else element("strong", f"{answer} ✗")
 
 
 def method(document: Document) -> Markup | None:
@@ -116,17 +116,17 @@ def _data(data: Document) -> Iterable[tuple[str, Part]]:
     yield "replayed by", _ENGINES.get(engine, engine)
 
 
-def _describe_verified(found: Document) -> str:
-    if not found:
+def _describe_verified(check: Document) -> str:
+    if not check:
         return ""
-    windows, apart = found.get("windows"), short(found.get("chain_rms_mrad"), 2)
-    return f"{windows or 'some'} windows: {apart} mrad from the chain model, {level(found.get('rms'))} the noise floor"
+    windows, apart = check.get("windows"), short(check.get("chain_rms_mrad"), 2)
+    return f"{windows or 'some'} windows: {apart} mrad from the chain model, {level(check.get('rms'))} the noise floor"
 
 
 def _budget(data: Document) -> str:
     seconds = finite(data.get("seconds"))
-    told = _count(data, (("records", "records"),))
-    return ", ".join(filter(None, [told, f"{seconds:.0f} s of motion" if seconds is not None else ""]))
+    counts = _count(data, (("records", "records"),))
+    return ", ".join(filter(None, [counts, f"{seconds:.0f} s of motion" if seconds is not None else ""]))
 
 
 def _count(data: Document, keys: Sequence[tuple[str, str]]) -> str:

@@ -28,9 +28,9 @@ class Step(NamedTuple):
 
 def steps(document: Document) -> list[Step]:
     """Return what to do, most important first: the document's `commands` if it has some."""
-    given = entries(document, "commands")
-    if given:
-        return [Step(str(one.get("why") or ""), str(one.get("command") or "")) for one in given]
+    commands = entries(document, "commands")
+    if commands:
+        return [Step(str(entry.get("why") or ""), str(entry.get("command") or "")) for entry in commands]
     if verdict(document) == "wiring":
         return [*_mending(document), Step("Import again, and let gsl audit look once more.")]
     first = {"no_gap": _as_it_is, "causes": _advise_correction, "inseparable": _either, "unknown": _advise_learning}[
@@ -43,34 +43,34 @@ def steps(document: Document) -> list[Step]:
 
 
 def _mending(document: Document) -> list[Step]:
-    remedies = dict.fromkeys(read_word(one, "remedy") for one in entries(document, "wiring"))
+    remedies = dict.fromkeys(read_word(finding, "remedy") for finding in entries(document, "wiring"))
     return [Step(remedy) for remedy in remedies if remedy]
 
 
 def _as_it_is(document: Document) -> Step:
-    told = "Train in the simulator as it is: as far as this log shows, it is the robot."
-    return Step(told) if _own(document) else Step(told, "gsl optimize grounding=none")
+    advice = "Train in the simulator as it is: as far as this log shows, it is the robot."
+    return Step(advice) if _own(document) else Step(advice, "gsl optimize grounding=none")
 
 
 def _advise_correction(document: Document) -> Step:
-    told = f"Train in the simulator with the effects switched on{_place(document)}{_yours(document)}"
-    far = [read_word(one, "part") for one in entries(document, "unexplained")]
+    advice = f"Train in the simulator with the effects switched on{_place(document)}{_yours(document)}"
+    far = [read_word(gap, "part") for gap in entries(document, "unexplained")]
     mind = f", not where it is still far from the robot: {', '.join(far)}" if far else ""
-    return Step(f"{told}{mind}.", _training(document))
+    return Step(f"{advice}{mind}.", _training(document))
 
 
 def _surer(document: Document) -> list[Step]:
     """What would make unsure causes surer, where no experiment of ours does."""
     return [
-        Step(f"To be surer of {name(one['effect'])}, which is confused with {one['confused']}.")
-        for one in entries(document, "causes")
-        if one.get("confused")
+        Step(f"To be surer of {name(cause['effect'])}, which is confused with {cause['confused']}.")
+        for cause in entries(document, "causes")
+        if cause.get("confused")
     ]
 
 
 def _either(document: Document) -> Step:
-    told = "Until then train with one of them on: whichever it is, it predicts as well"
-    return Step(f"{told}{_place(document)}{_yours(document)}.", _training(document))
+    advice = "Until then train with one of them on: whichever it is, it predicts as well"
+    return Step(f"{advice}{_place(document)}{_yours(document)}.", _training(document))
 
 
 def _yours(document: Document) -> str:
@@ -150,10 +150,10 @@ def _robot(document: Document) -> str:
 def _again(document: Document) -> str:
     """The same diagnosis of what the next experiment records."""
     try:
-        given = shlex.split(str(document.get("command") or ""))
+        words = shlex.split(str(document.get("command") or ""))
     except ValueError:
-        given = []
-    kept = [word for word in given[2:] if not word.startswith(("real=", "name=", "out=", "force="))]
+        words = []
+    kept = [word for word in words[2:] if not word.startswith(("real=", "name=", "out=", "force="))]
     own, folder = _own(document), _folder(document)
     sim = ["--config-dir", folder, f"sim={own['world']}"] if own and folder else []
     return shlex.join(["gsl", "diagnose", *sim, "real=next/collect_real", *kept, "name=next"])

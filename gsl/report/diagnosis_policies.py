@@ -16,14 +16,14 @@ _COLUMNS = {"sim": "simulator", "diagnosed": "", "real": "real"}  # the second i
 
 def policies(document: Document) -> Markup | None:
     """Return the table, the plot and what is to be said of them."""
-    found = part(document, "policy_gap")
-    rows, unit = entries(found, "rows"), read_word(found, "unit")
+    comparison = part(document, "policy_gap")
+    rows, unit = entries(comparison, "rows"), read_word(comparison, "unit")
     if not rows:
         return None
-    told = _values(found)
-    titles = [f"{words or _second(found)} [{unit}]" for words in _COLUMNS.values()]
-    columns = ["policy", *(title for one in titles for title in (one, "95 % interval")), "falls"]
-    cells = [[read_word(row, "name"), *_cells(row, told), _falls(row)] for row in rows]
+    form = _values(comparison)
+    titles = [f"{words or _second(comparison)} [{unit}]" for words in _COLUMNS.values()]
+    columns = ["policy", *(title for heading in titles for title in (heading, "95 % interval")), "falls"]
+    cells = [[read_word(row, "name"), *_cells(row, form), _falls(row)] for row in rows]
     note = (
         "Returns of the same policies in three worlds, counted as in real. Both simulators play the same seeds. A "
         "simulator in which policies can be chosen has its dots on the thin line, or at least in the right order."
@@ -32,20 +32,20 @@ def policies(document: Document) -> Markup | None:
         "Policies",
         *(element("p", prose(line)) for line in policy_lines(document)),
         table(columns, cells),
-        _plot(found, rows),
-        bullets([str(one) for one in entries(found, "caveats")]),
+        _plot(comparison, rows),
+        bullets([str(caveat) for caveat in entries(comparison, "caveats")]),
         note=note,
     )
 
 
 def policy_lines(document: Document) -> list[str]:
     """Return gap and rank correlation before and after, a sentence each; nothing if no policies were given."""
-    found = part(document, "policy_gap")
-    gap, order, unit = part(found, "gap"), part(found, "correlation"), read_word(found, "unit")
+    comparison = part(document, "policy_gap")
+    gap, order, unit = part(comparison, "gap"), part(comparison, "correlation"), read_word(comparison, "unit")
     if not gap:
         return []
-    count, told, second = read_word(found, "policies"), _values(found), _second(found)
-    before, after = (_format_bounds(part(gap, when), told) for when in ("before", "after"))
+    count, form, second = read_word(comparison, "policies"), _values(comparison), _second(comparison)
+    before, after = (_format_bounds(part(gap, when), form) for when in ("before", "after"))
     many = "policy" if count == "1" else "policies"
     lines = [f"{count} {many}: returns are {before} {unit} from real in the simulator, {after} in the {second} one."]
     if any(part(order, when) for when in ("before", "after")):
@@ -58,19 +58,19 @@ def policy_lines(document: Document) -> list[str]:
     return lines
 
 
-def _second(found: Document) -> str:
-    return str(found.get("simulator") or "diagnosed")
+def _second(comparison: Document) -> str:
+    return str(comparison.get("simulator") or "diagnosed")
 
 
-def _values(found: Document) -> Callable[[Any], str]:
+def _values(comparison: Document) -> Callable[[Any], str]:
     """Return how returns are told, in the unit of the task."""
-    factor = finite(found.get("shown")) or 1.0
+    factor = finite(comparison.get("shown")) or 1.0
 
-    def told(value: Any) -> str:
+    def form(value: Any) -> str:
         number = finite(value)
         return NONE if number is None else short(factor * number)
 
-    return told
+    return form
 
 
 def _format_bounds(bounds: Document, form: Callable[[Any], str]) -> str:
@@ -78,9 +78,9 @@ def _format_bounds(bounds: Document, form: Callable[[Any], str]) -> str:
     return form(bounds.get("value")) + (f" ({interval})" if interval else "")
 
 
-def _cells(row: Document, told: Callable[[Any], str]) -> list[str]:
+def _cells(row: Document, form: Callable[[Any], str]) -> list[str]:
     sides = [part(row, key) for key in _COLUMNS]
-    return [cell for side in sides for cell in (told(side.get("value")), between(side, told))]
+    return [cell for side in sides for cell in (form(side.get("value")), between(side, form))]
 
 
 def _falls(row: Document) -> str:
@@ -91,9 +91,9 @@ def _falls(row: Document) -> str:
     return ", ".join(f"{read_word(side, 'falls')} of {read_word(side, 'episodes')}" for side in sides)
 
 
-def _plot(found: Document, rows: list[Any]) -> Markup | None:
-    factor, unit = finite(found.get("shown")) or 1.0, read_word(found, "unit")
-    legend = {"before": "simulator as it was", "after": f"{_second(found)} simulator"}
+def _plot(comparison: Document, rows: list[Any]) -> Markup | None:
+    factor, unit = finite(comparison.get("shown")) or 1.0, read_word(comparison, "unit")
+    legend = {"before": "simulator as it was", "after": f"{_second(comparison)} simulator"}
     pairs = []
     for key, kind in (("sim", "before"), ("diagnosed", "after")):
         for row in rows:

@@ -43,23 +43,23 @@ def _parameters(cause: Document) -> list[tuple[Part, ...]]:
     whole = (probability(cause.get("probability")), share(part(cause, "gain").get("value")))
     rows: list[tuple[Part, ...]] = []
     for key in part(cause, "parameters"):
-        found = part(part(cause, "parameters"), key)
-        number = finite(found.get("value"))
-        file = element("code", NONE if number is None else f"{number:.4g} {found.get('unit') or ''}".strip())
-        fitted = (element("code", str(key)), shown(found), interval(found) or NONE, file)
+        estimate = part(part(cause, "parameters"), key)
+        number = finite(estimate.get("value"))
+        file = element("code", NONE if number is None else f"{number:.4g} {estimate.get('unit') or ''}".strip())
+        fitted = (element("code", str(key)), shown(estimate), interval(estimate) or NONE, file)
         rows.append((None, *fitted, None, None) if rows else (cause_name(cause), *fitted, *whole))
     return rows
 
 
 def ranking(document: Document) -> Markup | None:
     """Return the hypotheses with what each explains, as dots with whiskers."""
-    found = entries(document, "ranking")
+    hypotheses = entries(document, "ranking")
     least = finite(document.get("least_gain")) or 20.0
-    shares = all(abs(finite(part(one, "gain").get("value")) or 0.0) <= 1.5 for one in found)
+    shares = all(abs(finite(part(hypothesis, "gain").get("value")) or 0.0) <= 1.5 for hypothesis in hypotheses)
     form = share if shares else short
     chosen = sorted((str(cause.get("effect")), read_word(cause, "scope")) for cause in entries(document, "causes"))
-    dots = [_dot(one, chosen=_what(one) == chosen) for one in found[:SHOWN]]
-    rows = [_row(one, form, chosen=_what(one) == chosen) for one in found[:SHOWN]]
+    dots = [_dot(hypothesis, chosen=_what(hypothesis) == chosen) for hypothesis in hypotheses[:SHOWN]]
+    rows = [_row(hypothesis, form, chosen=_what(hypothesis) == chosen) for hypothesis in hypotheses[:SHOWN]]
     share_of = "the share of what a calibration of each joint leaves that it explains (outliers count for less)"
     measure = share_of if shares else "the cost that it saves"
     note = (
@@ -68,7 +68,7 @@ def ranking(document: Document) -> Markup | None:
         f"to save {least:,.0f} over calibration alone here, to be more than chance; how sure a difference between two "
         "explanations is, is the probability of the causes."
     )
-    rest = f"{len(found) - SHOWN} more did worse." if len(found) > SHOWN else None
+    rest = f"{len(hypotheses) - SHOWN} more did worse." if len(hypotheses) > SHOWN else None
     return section(
         "Explanations that competed",
         dot_chart(dots, form),
@@ -80,32 +80,36 @@ def ranking(document: Document) -> Markup | None:
     )
 
 
-def _dot(one: Document, *, chosen: bool) -> Dot:
-    value, low, high = (finite(part(one, "gain").get(key)) for key in ("value", "low", "high"))
-    return Dot(_name(one), value, low, high, "after" if chosen else "other")
+def _dot(hypothesis: Document, *, chosen: bool) -> Dot:
+    value, low, high = (finite(part(hypothesis, "gain").get(key)) for key in ("value", "low", "high"))
+    return Dot(_name(hypothesis), value, low, high, "after" if chosen else "other")
 
 
-def _row(one: Document, form: Callable[[Any], str], *, chosen: bool) -> tuple[Part, ...]:
-    gain, behind = part(one, "gain"), finite(one.get("behind"))
-    fitted = str(one.get("parameters") or "")
+def _row(hypothesis: Document, form: Callable[[Any], str], *, chosen: bool) -> tuple[Part, ...]:
+    gain, behind = part(hypothesis, "gain"), finite(hypothesis.get("behind"))
+    fitted = str(hypothesis.get("parameters") or "")
     return (
-        join(_name(one), element("span", f" {fitted}", kind="note") if fitted else None),
+        join(_name(hypothesis), element("span", f" {fitted}", kind="note") if fitted else None),
         form(gain.get("value")),
         between(gain, form),
         "" if behind is None or chosen else f"{behind:+,.0f}".replace("-", "−"),
-        probability(one["probability"]) if finite(one.get("probability")) is not None else "",
-        f"passed over: {one['passed_over']}" if one.get("passed_over") else "the verdict" if chosen else "",
+        probability(hypothesis["probability"]) if finite(hypothesis.get("probability")) is not None else "",
+        f"passed over: {hypothesis['passed_over']}"
+        if hypothesis.get("passed_over")
+        else "the verdict"
+        if chosen
+        else "",
     )
 
 
-def _what(one: Document) -> list[tuple[str, str]]:
-    return sorted(zip(map(str, entries(one, "effects")), map(str, entries(one, "scopes")), strict=False))
+def _what(hypothesis: Document) -> list[tuple[str, str]]:
+    return sorted(zip(map(str, entries(hypothesis, "effects")), map(str, entries(hypothesis, "scopes")), strict=False))
 
 
-def _name(one: Document) -> str:
-    effects, scopes = entries(one, "effects"), [str(scope) for scope in entries(one, "scopes")]
+def _name(hypothesis: Document) -> str:
+    effects, scopes = entries(hypothesis, "effects"), [str(scope) for scope in entries(hypothesis, "scopes")]
     scopes += [""] * (len(effects) - len(scopes))
-    told = " + ".join(
+    names = " + ".join(
         cause_name({"effect": effect, "joints": scope}) for effect, scope in zip(effects, scopes, strict=False)
     )
-    return name(told) or "calibration alone"
+    return name(names) or "calibration alone"

@@ -23,23 +23,23 @@ _LINES = (
 
 def replays(document: Document) -> Markup | None:
     """Return the replays, angles in degrees."""
-    drawn = [_replay(one) for one in entries(document, "replays")[:SHOWN]]
+    drawn = [_replay(entry) for entry in entries(document, "replays")[:SHOWN]]
     note = "Held-out records; at every jump the simulator is put where the robot was, then it hears only the commands."
     return section("Replays", *drawn, note=note)
 
 
-def _replay(one: Document) -> Markup | None:
-    time, real = [finite(at) for at in one.get("time") or []], _degrees(one.get("real"))
-    curves = [Curve(label, kind, time, _degrees(one.get(key))) for key, label, kind in _LINES if one.get(key)]
-    chart = line_chart(curves, x="time [s]", y=f"{read_word(one, 'joint')} [°]")
+def _replay(entry: Document) -> Markup | None:
+    time, real = [finite(at) for at in entry.get("time") or []], _degrees(entry.get("real"))
+    curves = [Curve(label, kind, time, _degrees(entry.get(key))) for key, label, kind in _LINES if entry.get(key)]
+    chart = line_chart(curves, x="time [s]", y=f"{read_word(entry, 'joint')} [°]")
     if chart is None:
         return None
     distances = [
         f"{short(distance, 2)}° {label}"
         for key, label in (("before", "from the robot as it was"), ("after", "with the effects"))
-        if (distance := _rms(_degrees(one.get(key)), real)) is not None
+        if (distance := _rms(_degrees(entry.get(key)), real)) is not None
     ]
-    title = f"{read_word(one, 'joint')} in {read_word(one, 'record')}" + (
+    title = f"{read_word(entry, 'joint')} in {read_word(entry, 'record')}" + (
         f": {', '.join(distances)}" if distances else ""
     )
     return element("div", element("h3", title), chart, kind="replay")

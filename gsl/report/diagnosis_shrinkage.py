@@ -17,24 +17,24 @@ FLOOR = 1.0
 
 def shrinkage(document: Document) -> Markup | None:
     """Return the gap before, with calibration alone, with the effects, and with a learned residual."""
-    found = part(document, "shrinkage")
-    drawn = bar_chart(_bars(found), mark=finite(found.get("floor")) or FLOOR)
+    figures = part(document, "shrinkage")
+    drawn = bar_chart(_bars(figures), mark=finite(figures.get("floor")) or FLOOR)
     note = (
         "Gap / noise on held-out records; the dashed line is the noise, below which nothing can be seen. Calibration "
         "is each joint's own small gains, friction and zero. The learned residual is a black box, the forward model of "
         "GAT, fitted to the same records: short logs do not teach it much. Percentages are shares of the squared gap."
     )
-    told = element("p", prose(shrinkage_sentence(document))) if drawn else None
-    return section("How far the gap shrinks", told, drawn, note=note)
+    sentence = element("p", prose(shrinkage_sentence(document))) if drawn else None
+    return section("How far the gap shrinks", sentence, drawn, note=note)
 
 
-def _bars(found: Document) -> list[Bar]:
-    ceiling = _ceiling(found)
+def _bars(figures: Document) -> list[Bar]:
+    ceiling = _ceiling(figures)
     rows = (
-        ("simulator as it was", "before", found.get("before"), ""),
-        ("calibration alone", "other", found.get("calibration"), ""),
-        ("with the effects", "after", found.get("after"), ""),
-        ("learned residual, no cause named", "quiet", ceiling, f", {share(found.get('ceiling_fraction'))}"),
+        ("simulator as it was", "before", figures.get("before"), ""),
+        ("calibration alone", "other", figures.get("calibration"), ""),
+        ("with the effects", "after", figures.get("after"), ""),
+        ("learned residual, no cause named", "quiet", ceiling, f", {share(figures.get('ceiling_fraction'))}"),
     )
     return [
         Bar(label, [(kind, finite(value))], f"{level(value)}{more}")
@@ -43,21 +43,21 @@ def _bars(found: Document) -> list[Bar]:
     ]
 
 
-def _ceiling(found: Document) -> float | None:
+def _ceiling(figures: Document) -> float | None:
     """The gap / noise that the learned residual leaves: shares of the excess are shares of squares."""
-    before, fraction = finite(found.get("before")), finite(found.get("ceiling_fraction"))
+    before, fraction = finite(figures.get("before")), finite(figures.get("ceiling_fraction"))
     if before is None or fraction is None:
         return None
-    floor = finite(found.get("floor")) or FLOOR
+    floor = finite(figures.get("floor")) or FLOOR
     return math.sqrt(max(0.0, before**2 - fraction * (before**2 - floor**2)))
 
 
 def parts(document: Document) -> Markup | None:
     """Return the gap before and after, joint by joint and regime by regime."""
-    found = part(document, "shrinkage")
-    by_joint = [(read_word(one, "joint"), one) for one in entries(found, "by_joint")]
-    kinds = [one for one in entries(found, "by_regime") if one.get("regime") != "all"]
-    by_regime = [(regime(read_word(one, "regime")), one) for one in kinds]
+    figures = part(document, "shrinkage")
+    by_joint = [(read_word(entry, "joint"), entry) for entry in entries(figures, "by_joint")]
+    kinds = [entry for entry in entries(figures, "by_regime") if entry.get("regime") != "all"]
+    by_regime = [(regime(read_word(entry, "regime")), entry) for entry in kinds]
     drawn = [_pairs(title, rows) for title, rows in (("By joint", by_joint), ("By what the joint did", by_regime))]
     note = "Gap / noise of the simulator as it was (above) and with the effects (below), the worst first."
     return section("Before and after", *drawn, note=note)
@@ -68,10 +68,10 @@ def _pairs(title: str, rows: Sequence[tuple[str, Document]]) -> Markup | None:
     bars = [
         Bar(
             label,
-            [(kind, finite(one.get(kind))) for kind in ("before", "after")],
-            f"{level(one.get('before'))} → {level(one.get('after'))}",
+            [(kind, finite(entry.get(kind))) for kind in ("before", "after")],
+            f"{level(entry.get('before'))} → {level(entry.get('after'))}",
         )
-        for label, one in ordered
+        for label, entry in ordered
     ]
     drawn = bar_chart(bars, mark=FLOOR)
     return join(element("h3", title), drawn) if drawn else None

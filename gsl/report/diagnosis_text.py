@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator
 
 from gsl.report.diagnosis_limits import limits_sentence
 from gsl.report.diagnosis_next import steps
@@ -31,40 +30,34 @@ from gsl.report.diagnosis_words import (
     share,
     value,
 )
+from gsl.report.tables import Table
 
 CAUSES, JOINTS, CAVEATS = 8, 5, 3  # rows at most
 
 
-class Told(NamedTuple):
-    """A table with its title and what is said below it: the arguments of the console's `table`."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    caption: str | None = None
-
-
-def summary_lines(document: Document) -> list[Told]:
+def summary_lines(document: Document) -> list[Table]:
     """Return what a terminal shows: what was found, where, and what to do next."""
     where = _where(document)
     return [_causes(document), *([where] if where.rows else []), _next(document)]
 
 
-def _causes(document: Document) -> Told:
+def _causes(document: Document) -> Table:
     summary = "\n".join(filter(None, [str(document.get("summary") or ""), *policy_lines(document)])) or None
     if verdict(document) == "wiring":
-        found = [(read_word(one, "kind"), read_word(one, "sentence")) for one in entries(document, "wiring")]
-        return Told(headline(document), ("kind", "what is wrong"), found)
+        findings = [
+            (read_word(finding, "kind"), read_word(finding, "sentence")) for finding in entries(document, "wiring")
+        ]
+        return Table(headline(document), ("kind", "what is wrong"), findings)
     rows = [*_list_causes(document)]
     if not rows:
         alike = [("either", alternatives(group)) for group in entries(document, "inseparable")]
         alike += [("nearest", nearest(document))] if nearest(document) else []
-        return Told(headline(document), ("", ""), [*alike, *_shrinkage(document)], summary)
+        return Table(headline(document), ("", ""), [*alike, *_shrinkage(document)], summary)
     columns = ("cause", "parameter", "value", "95 % interval", "probability", "of the rest, back without it")
     caption = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
     more = [f"and {len(rows) - CAUSES} more, in the report"] if len(rows) > CAUSES else []
-    told = "\n".join([*more, *filter(None, [summary]), *caption])
-    return Told(headline(document), columns, rows[:CAUSES], told or None)
+    lines = "\n".join([*more, *filter(None, [summary]), *caption])
+    return Table(headline(document), columns, rows[:CAUSES], lines or None)
 
 
 def _list_causes(document: Document) -> Iterator[tuple[str, ...]]:
@@ -79,11 +72,11 @@ def _list_causes(document: Document) -> Iterator[tuple[str, ...]]:
 
 def _shrinkage(document: Document) -> list[tuple[str, str]]:
     sentences = {"gap": shrinkage_sentence(document), "beside": comparison_sentence(document)}
-    return [(key, told) for key, told in sentences.items() if told]
+    return [(key, sentence) for key, sentence in sentences.items() if sentence]
 
 
-def _where(document: Document) -> Told:
-    found = places(document)
+def _where(document: Document) -> Table:
+    worst = places(document)
     rows = [
         (
             place.joint,
@@ -92,21 +85,21 @@ def _where(document: Document) -> Told:
             level(place.cell.get("rms")),
             place.when,
         )
-        for place in found[:JOINTS]
+        for place in worst[:JOINTS]
     ]
     columns = ("joint", "share of the excess", "95 % interval", "gap / noise", "most when")
-    more = f" (and {len(found) - JOINTS} more joints)" if len(found) > JOINTS else ""
+    more = f" (and {len(worst) - JOINTS} more joints)" if len(worst) > JOINTS else ""
     shrinks = shrinkage_sentence(document) if entries(document, "causes") else None
-    return Told(f"where the gap is{more}", columns, rows, shrinks)
+    return Table(f"where the gap is{more}", columns, rows, shrinks)
 
 
-def _next(document: Document) -> Told:
+def _next(document: Document) -> Table:
     files = {"report": "report", "world_file": "corrected simulator"}
     rows = [(words, str(document[key])) for key, words in files.items() if document.get(key)]
-    doubts = [str(one) for one in entries(document, "caveats")]
+    doubts = [str(caveat) for caveat in entries(document, "caveats")]
     more = [f"{len(doubts) - CAVEATS} more of these in the report"] if len(doubts) > CAVEATS else []
-    told = [*filter(None, [limits_sentence(document)]), *(f"Mind: {one}" for one in doubts[:CAVEATS]), *more]
-    told += [
-        line for step in steps(document) for line in (step.why, *(f"    {one}" for one in step.command.splitlines()))
+    lines = [*filter(None, [limits_sentence(document)]), *(f"Mind: {caveat}" for caveat in doubts[:CAVEATS]), *more]
+    lines += [
+        text for step in steps(document) for text in (step.why, *(f"    {line}" for line in step.command.splitlines()))
     ]
-    return Told("what next", ("", ""), rows or [("report", "report.html")], "\n".join(told))
+    return Table("what next", ("", ""), rows or [("report", "report.html")], "\n".join(lines))

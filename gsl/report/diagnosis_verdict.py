@@ -27,8 +27,8 @@ VERDICTS = ("no_gap", "causes", "inseparable", "unknown", "wiring")
 
 def verdict(document: Document) -> str:
     """Return one of the verdicts; what is not one is `unknown`."""
-    given = document.get("verdict")
-    return given if given in VERDICTS else "unknown"
+    word = document.get("verdict")
+    return word if word in VERDICTS else "unknown"
 
 
 def headline(document: Document) -> str:
@@ -38,8 +38,9 @@ def headline(document: Document) -> str:
 
 
 def _wiring(document: Document) -> str:
-    found = entries(document, "wiring")
-    return f"Wiring, before any physics: {list_words(list(dict.fromkeys(read_word(one, 'kind') for one in found)))}"
+    findings = entries(document, "wiring")
+    kinds = dict.fromkeys(read_word(finding, "kind") for finding in findings)
+    return f"Wiring, before any physics: {list_words(list(kinds))}"
 
 
 def _no_gap(document: Document) -> str:
@@ -47,19 +48,19 @@ def _no_gap(document: Document) -> str:
 
 
 def _causes(document: Document) -> str:
-    found = [cause_name(cause) for cause in entries(document, "causes")]
-    if not found:
+    names = [cause_name(cause) for cause in entries(document, "causes")]
+    if not names:
         return "There is a gap, and its cause was found"
     if document.get("sure", True):
-        return f"{'Cause' if len(found) == 1 else f'{len(found)} causes'} found: {list_words(found)}"
+        return f"{'Cause' if len(names) == 1 else f'{len(names)} causes'} found: {list_words(names)}"
     how = "possible" if document.get("doubt") == "possibly" else "probable"
-    return f"{f'{how.capitalize()} cause' if len(found) == 1 else f'{len(found)} {how} causes'}: {list_words(found)}"
+    return f"{f'{how.capitalize()} cause' if len(names) == 1 else f'{len(names)} {how} causes'}: {list_words(names)}"
 
 
 def _inseparable(document: Document) -> str:
     groups = [alternatives(group) for group in entries(document, "inseparable")]
-    told = "There is a gap, but this log cannot tell its possible causes apart"
-    return f"{told}: {list_words(groups, most=3)}" if groups else told
+    sentence = "There is a gap, but this log cannot tell its possible causes apart"
+    return f"{sentence}: {list_words(groups, most=3)}" if groups else sentence
 
 
 def _unknown(document: Document) -> str:
@@ -70,13 +71,15 @@ def _unknown(document: Document) -> str:
 
 def cause_name(cause: Document) -> str:
     """Return an effect, where it acts, and what else was chosen of it (the side of a joint's limit, say)."""
-    given = cause.get("scope")
-    acts = scope(cause.get("joints") if given is None else given)
+    where = cause.get("scope")
+    acts = scope(cause.get("joints") if where is None else where)
     chosen = [
-        f"{name(key)} {one}" for key, one in part(cause, "fixed").items() if isinstance(one, str) and one != given
+        f"{name(key)} {choice}"
+        for key, choice in part(cause, "fixed").items()
+        if isinstance(choice, str) and choice != where
     ]
-    told = " of ".join(filter(None, [name(cause.get("effect") or NONE), acts]))
-    return f"{told} ({', '.join(chosen)})" if chosen else told
+    words = " of ".join(filter(None, [name(cause.get("effect") or NONE), acts]))
+    return f"{words} ({', '.join(chosen)})" if chosen else words
 
 
 def nearest(document: Document) -> str:
@@ -92,14 +95,14 @@ def alternatives(group: Sequence[str]) -> str:
 def sureness(cause: Document) -> str:
     """Return how sure a cause is and how much of what a calibration leaves comes back without it."""
     gain = part(cause, "gain")
-    told = []
+    words = []
     if finite(cause.get("probability")) is not None:
-        told.append(f"{probability(cause['probability'])} sure")
+        words.append(f"{probability(cause['probability'])} sure")
     if finite(gain.get("value")) is not None:
         bounds = between(gain, share)
         back = f"{share(gain['value'])} of what a calibration leaves comes back without it"
-        told.append(back + (f" ({bounds})" if bounds else ""))
-    return ", ".join(told)
+        words.append(back + (f" ({bounds})" if bounds else ""))
+    return ", ".join(words)
 
 
 class Place(NamedTuple):
@@ -119,26 +122,26 @@ class Place(NamedTuple):
 def places(document: Document) -> list[Place]:
     """Return the joints that stand out of the noise, as a whole or in some regime, worst first."""
     cells = sorted(entries(document, "where"), key=lambda cell: -(finite(cell.get("share")) or 0.0))
-    found = []
+    places = []
     for joint in dict.fromkeys(read_word(cell, "joint") for cell in cells):
         own = [cell for cell in cells if read_word(cell, "joint") == joint]
         whole = next((cell for cell in own if cell.get("regime") == "all"), own[0])
         named = [cell for cell in own if cell.get("named")]
         worst = next((cell for cell in named if cell is not whole), None)
         when = f"{regime(read_word(worst, 'regime'))}, {level(worst.get('rms'))}" if worst else ""
-        found += [Place(joint, whole, when)] if named else []
-    return sorted(found, key=lambda place: -(finite(place.cell.get("share")) or 0.0))
+        places += [Place(joint, whole, when)] if named else []
+    return sorted(places, key=lambda place: -(finite(place.cell.get("share")) or 0.0))
 
 
 def where_sentence(document: Document) -> str:
     """Return where the gap lies."""
-    found = places(document)
-    if not found:
+    named = places(document)
+    if not named:
         return "No joint stands out of the noise."
     of = len({read_word(cell, "joint") for cell in entries(document, "where")})
-    whole = [place for place in found if place.cell.get("named")]
-    parts = [f"{place.joint} when {place.when}" for place in found if place not in whole]
-    within = " The others are not surely beyond the noise." if of > len(found) else ""
+    whole = [place for place in named if place.cell.get("named")]
+    parts = [f"{place.joint} when {place.when}" for place in named if place not in whole]
+    within = " The others are not surely beyond the noise." if of > len(named) else ""
     only = f" Surely beyond the noise only at times: {list_words(parts)}." if parts else ""
     if not whole:
         return f"No joint stands out as a whole.{only}{within}"
@@ -150,24 +153,24 @@ def where_sentence(document: Document) -> str:
 
 def shrinkage_sentence(document: Document) -> str:
     """Return how far the gap shrinks on records that no fit has seen."""
-    found = part(document, "shrinkage")
-    before, after, gone = (finite(found.get(key)) for key in ("before", "after", "fraction"))
+    figures = part(document, "shrinkage")
+    before, after, gone = (finite(figures.get(key)) for key in ("before", "after", "fraction"))
     if before is None:
         return "Not measured."
     if verdict(document) == "no_gap" or after is None:
         return f"The simulator is at {level(before)} the noise floor, measured on held-out records."
-    told = f"From {level(before)} to {level(after)} the noise floor on held-out records"
-    bounds = between(found, share)
-    return told + (
+    sentence = f"From {level(before)} to {level(after)} the noise floor on held-out records"
+    bounds = between(figures, share)
+    return sentence + (
         f": {share(gone)} of the excess is gone{f' ({bounds})' if bounds else ''}." if gone is not None else "."
     )
 
 
 def comparison_sentence(document: Document) -> str:
     """Return what calibration alone and a learned residual do; nothing if neither was measured."""
-    found, told = part(document, "shrinkage"), []
-    if finite(found.get("calibration")) is not None:
-        told.append(f"Calibration alone leaves {level(found['calibration'])}.")
-    if finite(found.get("ceiling_fraction")) is not None:
-        told.append(f"A learned residual, a black box, takes away {share(found['ceiling_fraction'])}.")
-    return " ".join(told)
+    figures, sentences = part(document, "shrinkage"), []
+    if finite(figures.get("calibration")) is not None:
+        sentences.append(f"Calibration alone leaves {level(figures['calibration'])}.")
+    if finite(figures.get("ceiling_fraction")) is not None:
+        sentences.append(f"A learned residual, a black box, takes away {share(figures['ceiling_fraction'])}.")
+    return " ".join(sentences)

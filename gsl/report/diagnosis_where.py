@@ -30,7 +30,7 @@ DRAWN = 4  # joints with a colour of their own
 
 def where(document: Document) -> Markup | None:
     """Return the map and the list of its named cells."""
-    cells = {(read_word(one, "joint"), read_word(one, "regime")): one for one in entries(document, "where")}
+    cells = {(read_word(cell, "joint"), read_word(cell, "regime")): cell for cell in entries(document, "where")}
     if not cells:
         return None
     named = [_name_place(place) for place in places(document)]
@@ -53,9 +53,9 @@ def _name_place(place: Place) -> Sequence[str]:
 
 
 def _map(cells: Mapping[tuple[str, str], Document]) -> Markup:
-    known = list(REGIMES)
+    order = list(REGIMES)
     regimes = sorted(
-        dict.fromkeys(kind for _, kind in cells), key=lambda kind: known.index(kind) if kind in known else len(known)
+        dict.fromkeys(kind for _, kind in cells), key=lambda kind: order.index(kind) if kind in order else len(order)
     )
     joints = sorted(dict.fromkeys(joint for joint, _ in cells), key=lambda joint: -_worst(cells, joint))
     top = max((_share(cell) for cell in cells.values() if cell.get("named")), default=0.0)
@@ -65,7 +65,7 @@ def _map(cells: Mapping[tuple[str, str], Document]) -> Markup:
 
 def _worst(cells: Mapping[tuple[str, str], Document], joint: str) -> float:
     whole = cells.get((joint, "all"))
-    return _share(whole) if whole else max(_share(cell) for (one, _), cell in cells.items() if one == joint)
+    return _share(whole) if whole else max(_share(cell) for (name, _), cell in cells.items() if name == joint)
 
 
 def _share(cell: Document) -> float:
@@ -75,18 +75,18 @@ def _share(cell: Document) -> float:
 def _cell(cell: Document | None, top: float) -> Markup:
     if cell is None:
         return element("td", "·", kind="noise")
-    told = f"{100.0 * max(0.0, _share(cell)):.0f}"
+    number = f"{100.0 * max(0.0, _share(cell)):.0f}"
     if not cell.get("named"):
-        return element("td", "·" if told == "0" else told, kind="noise")
+        return element("td", "·" if number == "0" else number, kind="noise")
     opacity = DARKEST * max(0.0, _share(cell)) / top if top > 0.0 else 0.0
-    return element("td", told, kind="named", style=f"--share:{opacity:.2f}")
+    return element("td", number, kind="named", style=f"--share:{opacity:.2f}")
 
 
 def growth(document: Document) -> Markup | None:
     """Return how the gap grows with the time since a replay began."""
-    found = part(document, "horizon")
-    time = [finite(at) for at in found.get("time") or []]
-    by_joint = {joint: [finite(one) for one in rms or []] for joint, rms in part(found, "rms").items()}
+    horizon = part(document, "horizon")
+    time = [finite(at) for at in horizon.get("time") or []]
+    by_joint = {joint: [finite(level) for level in rms or []] for joint, rms in part(horizon, "rms").items()}
     order = sorted(by_joint, key=lambda joint: -_last(by_joint[joint]))
     curves = [Curve(joint, f"joint{index}", time, by_joint[joint]) for index, joint in enumerate(order[:DRAWN])]
     rest = [Curve("other joints", "quiet", time, by_joint[joint]) for joint in order[DRAWN:]]
@@ -102,14 +102,20 @@ def growth(document: Document) -> Markup | None:
 
 
 def _last(values: Sequence[Any]) -> float:
-    return next((number for one in reversed(values) if (number := finite(one)) is not None), 0.0)
+    return next((number for value in reversed(values) if (number := finite(value)) is not None), 0.0)
 
 
 def sides(document: Document) -> Markup | None:
     """Return the joints of the left side against those of the right."""
     rows = [
-        (read_word(one, "pair"), level(one.get("left")), level(one.get("right")), probability(one.get("p")), _side(one))
-        for one in sorted(entries(document, "sides"), key=_milder)
+        (
+            read_word(pair, "pair"),
+            level(pair.get("left")),
+            level(pair.get("right")),
+            probability(pair.get("p")),
+            _side(pair),
+        )
+        for pair in sorted(entries(document, "sides"), key=_milder)
     ]
     columns = ("pair", "left", "right", "chance alone", "so")
     note = (
@@ -119,12 +125,12 @@ def sides(document: Document) -> Markup | None:
     return section("Left against right", table(columns, rows) if rows else None, note=note)
 
 
-def _milder(one: Document) -> float:
-    return -max(finite(one.get("left")) or 0.0, finite(one.get("right")) or 0.0)
+def _milder(pair: Document) -> float:
+    return -max(finite(pair.get("left")) or 0.0, finite(pair.get("right")) or 0.0)
 
 
-def _side(one: Document) -> Markup:
-    left, right, p = (finite(one.get(key)) for key in ("left", "right", "p"))
+def _side(pair: Document) -> Markup:
+    left, right, p = (finite(pair.get(key)) for key in ("left", "right", "p"))
     if left is None or right is None or p is None or p >= 0.05:
         return join("alike")
     if max(left, right) < 1.0:

@@ -44,8 +44,8 @@ def finite(value: Any) -> float | None:
 
 def read_word(document: Document, key: str) -> str:
     """Return a word of a document, a dash if it is absent or None."""
-    given = document.get(key)
-    return NONE if given is None else str(given)
+    value = document.get(key)
+    return NONE if value is None else str(value)
 
 
 def short(value: Any, digits: int = 3) -> str:
@@ -98,16 +98,16 @@ def name(effect: str) -> str:
 
 def list_words(words: Sequence[Any], last: str = "and", *, most: int = 4) -> str:
     """Return words with commas, those beyond `most` only counted."""
-    told = [str(word) for word in words]
-    if len(told) > most:
-        told = [*told[: most - 1], f"{len(told) - most + 1} more"]
-    return f" {last} ".join(filter(None, [", ".join(told[:-1]), told[-1]])) if told else ""
+    shown = [str(word) for word in words]
+    if len(shown) > most:
+        shown = [*shown[: most - 1], f"{len(shown) - most + 1} more"]
+    return f" {last} ".join(filter(None, [", ".join(shown[:-1]), shown[-1]])) if shown else ""
 
 
 def scope(joints: Any) -> str:
     """Return where an effect acts, in words; nothing if that is nowhere in particular."""
-    found = [joints] if isinstance(joints, str) else list(joints or [])
-    return list_words(["all joints" if joint == "all" else joint for joint in found if joint])
+    names = [joints] if isinstance(joints, str) else list(joints or [])
+    return list_words(["all joints" if joint == "all" else joint for joint in names if joint])
 
 
 def regime(kind: str) -> str:
@@ -128,7 +128,7 @@ def in_unit(parameter: Document) -> Callable[[Any], str]:
     low, high = finite(parameter.get("low")), finite(parameter.get("high"))
     width = 0.0 if low is None or high is None else factor * (high - low)
 
-    def told(value: Any) -> str:
+    def form(value: Any) -> str:
         number = finite(value)
         if number is None:
             return NONE
@@ -137,7 +137,7 @@ def in_unit(parameter: Document) -> Callable[[Any], str]:
         )
         return (digits or short(factor * number)) + shown.rstrip()
 
-    return told
+    return form
 
 
 def _decimals(number: float, count: int) -> str:

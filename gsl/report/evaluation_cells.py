@@ -22,14 +22,14 @@ def ends(unit: Unit) -> str:
     return "falls" if unit.falls else "episodes"
 
 
-def format_ends(one: Mapping[str, Any], unit: Unit) -> str:
+def format_ends(row: Mapping[str, Any], unit: Unit) -> str:
     """Return a cell for people: falls of episodes, or episodes alone."""
-    return f"{one['falls']} of {one['episodes']}" if unit.falls else str(one["episodes"])
+    return f"{row['falls']} of {row['episodes']}" if unit.falls else str(row["episodes"])
 
 
-def cells(one: Mapping[str, Any], name: str, unit: Unit, outcomes: Sequence[str]) -> list[str]:
+def cells(row: Mapping[str, Any], name: str, unit: Unit, outcomes: Sequence[str]) -> list[str]:
     """Return a row for people; a policy that stopped at its fall has no interval."""
-    interval = unit.interval(one["interval"]) if np.isfinite(one["interval"]).all() and not one["falls"] else ""
-    simulated = "" if one["value_sim"] is None else unit.bare(one["value_sim"])
-    outcome = [f"{one['outcome'][name]:.1f}" if name in one["outcome"] else "" for name in outcomes]
-    return [name, simulated, unit.bare(one["value"]), interval, format_ends(one, unit), *outcome]
+    interval = unit.interval(row["interval"]) if np.isfinite(row["interval"]).all() and not row["falls"] else ""
+    simulated = "" if row["value_sim"] is None else unit.bare(row["value_sim"])
+    outcome = [f"{row['outcome'][name]:.1f}" if name in row["outcome"] else "" for name in outcomes]
+    return [name, simulated, unit.bare(row["value"]), interval, format_ends(row, unit), *outcome]

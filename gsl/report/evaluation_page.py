@@ -27,15 +27,15 @@ def write_evaluation_page(
         change: Of the policy, from the first to the best.
         unit: Of the task.
     """
-    question, told = "Which of these policies is the best on the real side?", describe_choice(metrics, unit)
-    sentence, sure = f"{told[0].upper()}{told[1:]}.", False
+    question, choice = "Which of these policies is the best on the real side?", describe_choice(metrics, unit)
+    sentence, sure = f"{choice[0].upper()}{choice[1:]}.", False
     if metrics["best_generation"]:
         after, before, gain = (metrics[key] for key in ("returned", "baseline", "gain"))
         sentence, sure = describe_gain(metrics["best"], after, before, gain, unit)
     answer = Answer(question, sentence, sure)
     columns, rows = evaluation_table(document, unit)
     searched = search("all policies", document, shown=unit.factor, returned=metrics["best"], start="π0")
-    spent = [(words, str(sum(one["episodes"] for one in document[phase]))) for phase, words in _PHASES.items()]
+    spent = [(words, str(sum(row["episodes"] for row in document[phase]))) for phase, words in _PHASES.items()]
     sections = [
         section("Policies on the real side", table(columns, rows)),
         curves([searched], unit.name),

@@ -34,7 +34,7 @@ class Flight(NamedTuple):
         if self.diagnosis is None:
             return ""
         verdict = self.diagnosis.verdict.replace("_", " ")
-        return f"Diagnosis: {verdict}. {self.diagnosis.summary} {self.diagnosis.told}"
+        return f"Diagnosis: {verdict}. {self.diagnosis.summary} {self.diagnosis.sentence}"
 
     @property
     def gap(self) -> str:

@@ -29,10 +29,10 @@ def headline(artifact: Artifact) -> str:
 
 
 def _collect(metrics: Metrics, unit: Unit) -> str:
-    told = several(metrics["episodes"], "episode") + (f", {falls(metrics['falls'])}" if unit.falls else "")
+    line = several(metrics["episodes"], "episode") + (f", {falls(metrics['falls'])}" if unit.falls else "")
     if metrics["value"] is None:
-        return told
-    return f"{told}, π0 {'with noise ' * bool(metrics.get('action_noise'))}{unit.shown(metrics['value'])}"
+        return line
+    return f"{line}, π0 {'with noise ' * bool(metrics.get('action_noise'))}{unit.format(metrics['value'])}"
 
 
 def _import(metrics: Metrics, unit: Unit) -> str:
@@ -64,10 +64,10 @@ def _train_forward(metrics: Metrics, unit: Unit) -> str:
 def _of_states(metrics: Metrics) -> str:
     if metrics["space"] == "counts":
         return f"{metrics['steps']:,} steps counted, {100 * metrics['visited']:.0f} % of all states and actions visited"
-    found = metrics["heldout"]
+    heldout = metrics["heldout"]
     shown = {"r2": "of the variance", "action_r2": "of the variance", "recovered_choices": "of the choices"}
-    told = next(f"{100 * found[name]:.1f} % {what}" for name, what in shown.items() if name in found)
-    return f"{metrics['family']}, held out: {told}"
+    score = next(f"{100 * heldout[name]:.1f} % {what}" for name, what in shown.items() if name in heldout)
+    return f"{metrics['family']}, held out: {score}"
 
 
 def _train_servo(metrics: Metrics, unit: Unit) -> str:
@@ -86,29 +86,29 @@ def _train_inverse(metrics: Metrics, unit: Unit) -> str:
 
 
 def _optimize(metrics: Metrics, unit: Unit) -> str:
-    best = unit.shown(metrics["best_value_sim"])
-    told = f"{several(metrics['generations'], 'generation')}, best {best} in simulation"
+    best = unit.format(metrics["best_value_sim"])
+    line = f"{several(metrics['generations'], 'generation')}, best {best} in simulation"
     if "effects" in metrics:
-        told += f"; {name_causes(metrics['effects'])} switched on" if metrics["effects"] else "; joints calibrated"
+        line += f"; {name_causes(metrics['effects'])} switched on" if metrics["effects"] else "; joints calibrated"
     alpha, passed = metrics.get("alpha"), metrics.get("grounding_acceptable", True)
     if alpha is None and passed:
-        return told
+        return line
     far = "" if alpha is None else f" (alpha {alpha:g})"
     verdict = "passed" if metrics.get("grounding_compared", True) else "passed, by the falls of π0 alone"
-    return f"{told}; grounding{far} {verdict if passed else 'failed its check'}"
+    return f"{line}; grounding{far} {verdict if passed else 'failed its check'}"
 
 
 def _evaluate(metrics: Metrics, unit: Unit) -> str:
     after, gain = metrics["returned"], metrics["gain"]
-    told = f"{metrics['best']} {unit.shown(after['value'])}, {unit.ended(after)}"
+    line = f"{metrics['best']} {unit.format(after['value'])}, {unit.describe_ends(after)}"
     share = format_gain(gain["share"]) if gain["share"] else ""
-    return f"{told}; {share} over the start" if share else told
+    return f"{line}; {share} over the start" if share else line
 
 
 def _iterate(metrics: Metrics, unit: Unit) -> str:
     before, after = metrics["baseline"], metrics["returned"]
-    told = f"π0 {unit.shown(before['value'])} -> {unit.shown(after['value'])}"
-    return f"{told}, {unit.ended(after)}; {metrics['real_episodes']} real episodes"
+    line = f"π0 {unit.format(before['value'])} -> {unit.format(after['value'])}"
+    return f"{line}, {unit.describe_ends(after)}; {metrics['real_episodes']} real episodes"
 
 
 def _values(metrics: Metrics, unit: Unit) -> str:
@@ -116,7 +116,9 @@ def _values(metrics: Metrics, unit: Unit) -> str:
 
 
 def _survey(metrics: Metrics, unit: Unit) -> str:
-    return ", ".join(f"{name}: π0 {unit.shown(one['pi0'])}, rank {one['rank']:.2f}" for name, one in metrics.items())
+    return ", ".join(
+        f"{name}: π0 {unit.format(figures['pi0'])}, rank {figures['rank']:.2f}" for name, figures in metrics.items()
+    )
 
 
 def _answer(metrics: Metrics, unit: Unit) -> str:

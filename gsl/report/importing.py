@@ -29,46 +29,50 @@ SHOWN = 40  # rows of a table
 Document = dict[str, Any]
 
 
-def report(found: Sequence[Episode], files: int, period: float | None, turning: Collection[str] = ()) -> Document:
+def report(episodes: Sequence[Episode], files: int, period: float | None, turning: Collection[str] = ()) -> Document:
     """Return what there is to say of the trajectories.
 
     Args:
-        found: In order, of the same joints.
+        episodes: In order, of the same joints.
         files: How many files they come from.
         period: What they were resampled to [s], None if their rows are as they were.
         turning: Joints of which the mapping says that they are in radians however far they turn.
     """
-    lags = [lags_of(one) for one in found]
-    told = suspicions(found, lags, turning)
+    lags = [lags_of(episode) for episode in episodes]
+    doubts = suspicions(episodes, lags, turning)
     return {
         "files": files,
-        "episodes": [_episode(one, row) for one, row in zip(found, lags, strict=True)],
-        "channels": list(_channels(found)),
-        "control_period": nominal(found, period),
-        "refused": [_words(one) for one in told if one.refused],
-        "warnings": [*(_words(one) for one in told if not one.refused), *_of_rates(found, period), *_stuck(found)],
+        "episodes": [_episode(episode, row) for episode, row in zip(episodes, lags, strict=True)],
+        "channels": list(_channels(episodes)),
+        "control_period": nominal(episodes, period),
+        "refused": [_words(doubt) for doubt in doubts if doubt.refused],
+        "warnings": [
+            *(_words(doubt) for doubt in doubts if not doubt.refused),
+            *_of_rates(episodes, period),
+            *_stuck(episodes),
+        ],
     }
 
 
-def nominal(found: Sequence[Episode], period: float | None) -> float:
+def nominal(episodes: Sequence[Episode], period: float | None) -> float:
     """Return the control period of the file [s]: what was resampled to, or the median step."""
-    middle = np.quantile(np.concatenate([one.steps for one in found]), 0.5, method="lower")
+    middle = np.quantile(np.concatenate([episode.steps for episode in episodes]), 0.5, method="lower")
     return period or float(np.round(middle, 6))
 
 
-def _words(one: Suspicion) -> str:
-    return f"{one.column}: {one.problem}"
+def _words(doubt: Suspicion) -> str:
+    return f"{doubt.column}: {doubt.problem}"
 
 
-def _episode(one: Episode, lags: Sequence[Lag]) -> Document:
-    steps = one.steps
+def _episode(episode: Episode, lags: Sequence[Lag]) -> Document:
+    steps = episode.steps
     clear = [lag.seconds for lag in lags if is_clear(lag)]
     return {
-        **one.label,
+        **episode.label,
         "rows": len(steps) + 1,
-        "rows_written": len(one.trajectory.time),
-        "dropped": one.dropped,
-        "seconds": float(one.trajectory.time[-1]),
+        "rows_written": len(episode.trajectory.time),
+        "dropped": episode.dropped,
+        "seconds": float(episode.trajectory.time[-1]),
         "rate": float(1.0 / np.median(steps)),
         "jitter": float(np.std(steps)),
         "longest_step": float(steps.max()),
@@ -76,9 +80,9 @@ def _episode(one: Episode, lags: Sequence[Lag]) -> Document:
     }
 
 
-def _channels(found: Sequence[Episode]) -> Iterator[Document]:
+def _channels(episodes: Sequence[Episode]) -> Iterator[Document]:
     """Return for each column its range, and whether it is constant or stuck at an end."""
-    for name, parts, commands in _columns(found):
+    for name, parts, commands in _columns(episodes):
         values = np.concatenate(parts).astype(float)
         group = name.partition(".")[0]
         at_end = measure_stops if group == "position" else measure_saturation
@@ -93,79 +97,85 @@ def _channels(found: Sequence[Episode]) -> Iterator[Document]:
         }
 
 
-def _columns(found: Sequence[Episode]) -> Iterator[tuple[str, list[np.ndarray], list[np.ndarray]]]:
+def _columns(episodes: Sequence[Episode]) -> Iterator[tuple[str, list[np.ndarray], list[np.ndarray]]]:
     """Return each column, an array an episode, and the commands of its joint beside it where it has one."""
-    joints = found[0].joints
+    joints = episodes[0].joints
     for group in ("action", "position", "velocity"):
         for k, joint in enumerate(joints):
-            parts = [getattr(one.trajectory, group)[: len(one.trajectory), k] for one in found]
-            yield f"{group}.{joint}", parts, _commands(found, k) if group == "position" else []
-    for name in found[0].trajectory.sensors:
-        parts = [one.trajectory.sensors[name][: len(one.trajectory)] for one in found if name in one.trajectory.sensors]
+            parts = [getattr(episode.trajectory, group)[: len(episode.trajectory), k] for episode in episodes]
+            yield f"{group}.{joint}", parts, _commands(episodes, k) if group == "position" else []
+    for name in episodes[0].trajectory.sensors:
+        parts = [
+            episode.trajectory.sensors[name][: len(episode.trajectory)]
+            for episode in episodes
+            if name in episode.trajectory.sensors
+        ]
         joint = name.rpartition(".")[2]
-        commands = _commands(found, joints.index(joint)) if name.startswith("torque.") and joint in joints else []
+        commands = _commands(episodes, joints.index(joint)) if name.startswith("torque.") and joint in joints else []
         yield name, parts, commands if len(commands) == len(parts) else []
 
 
-def _commands(found: Sequence[Episode], k: int) -> list[np.ndarray]:
-    return [one.trajectory.action[:, k] for one in found]
+def _commands(episodes: Sequence[Episode], k: int) -> list[np.ndarray]:
+    return [episode.trajectory.action[:, k] for episode in episodes]
 
 
-def _stuck(found: Sequence[Episode]) -> Iterator[str]:
-    for channel in _channels(found):
+def _stuck(episodes: Sequence[Episode]) -> Iterator[str]:
+    for channel in _channels(episodes):
         if channel["saturated"] > STUCK:
             share = f"{100 * channel['saturated']:.0f} %"
-            told = f"at one end in {share} of the rows while its command moves: saturated, or a stop?"
-            yield f"{channel['column']}: {told}"
-    for k, joint in enumerate(found[0].joints):
-        others = [one.trajectory.sensors.get(f"{group}.{joint}", 0.0) for one in found for group in OTHER_COMMANDS]
-        if all(np.ptp(one) < MOVES for one in [*_commands(found, k), *others]):
+            problem = f"at one end in {share} of the rows while its command moves: saturated, or a stop?"
+            yield f"{channel['column']}: {problem}"
+    for k, joint in enumerate(episodes[0].joints):
+        others = [
+            episode.trajectory.sensors.get(f"{group}.{joint}", 0.0) for episode in episodes for group in OTHER_COMMANDS
+        ]
+        if all(np.ptp(commands) < MOVES for commands in [*_commands(episodes, k), *others]):
             yield f"action.{joint}: hardly ever changes, so that nothing can be learned of this joint"
 
 
-def _of_rates(found: Sequence[Episode], period: float | None) -> Iterator[str]:
-    usual = np.array([np.median(one.steps) for one in found])
+def _of_rates(episodes: Sequence[Episode], period: float | None) -> Iterator[str]:
+    usual = np.array([np.median(episode.steps) for episode in episodes])
     if period is not None:
         if period < 0.8 * usual.max():
             rows = f"rows come every {usual.max():.4g} s"
             yield f"time: resampled to {period:g} s, but {rows}: what is between is made up"
         return
-    step = nominal(found, period)
-    far = max(float(np.abs(one.steps - step).max()) for one in found)
+    step = nominal(episodes, period)
+    far = max(float(np.abs(episode.steps - step).max()) for episode in episodes)
     alike = np.ptp(usual) < RATES * step
     if far > UNEVEN * step or not alike:
-        told = f"steps differ from {step:g} s by up to {far:.3g} s" if alike else _rates(usual)
-        yield f"time: {told}; gsl diagnose wants even rows: mapping.period={step:.2g} resamples"
+        problem = f"steps differ from {step:g} s by up to {far:.3g} s" if alike else _rates(usual)
+        yield f"time: {problem}; gsl diagnose wants even rows: mapping.period={step:.2g} resamples"
 
 
 def _rates(usual: np.ndarray) -> str:
     return f"episodes have rates of {1.0 / usual.max():.0f} to {1.0 / usual.min():.0f} Hz"
 
 
-def tables(told: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]], str | None]]:
+def tables(document: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]], str | None]]:
     """Return title, columns, rows and caption of each table."""
-    episodes, channels = told["episodes"], told["channels"]
-    rows = [_row(one) for one in episodes[:SHOWN]]
+    episodes, channels = document["episodes"], document["channels"]
+    rows = [_row(episode) for episode in episodes[:SHOWN]]
     titles = ("episode", "name", "rows", "time [s]", "rate [Hz]", "jitter [ms]", "longest step [ms]", "lag [ms]")
     more = f"and {len(episodes) - SHOWN} more" if len(episodes) > SHOWN else None
-    yield f"{len(episodes)} episodes in {told['files']} files", titles, rows, more
-    yield "channels", ("column", "unit", "least", "most", ""), [_channel(one) for one in channels], None
+    yield f"{len(episodes)} episodes in {document['files']} files", titles, rows, more
+    yield "channels", ("column", "unit", "least", "most", ""), [_channel(channel) for channel in channels], None
 
 
-def _row(one: Mapping[str, Any]) -> tuple[str, ...]:
-    part = f" part {one['part']}" if "part" in one else ""
+def _row(episode: Mapping[str, Any]) -> tuple[str, ...]:
+    part = f" part {episode['part']}" if "part" in episode else ""
     return (
-        f"{one['file']}{part}",
-        one["policy"] if one["policy"] != one["file"] else "",
-        str(one["rows"]),
-        f"{one['seconds']:.2f}",
-        f"{one['rate']:.1f}",
-        f"{1e3 * one['jitter']:.2f}",
-        f"{1e3 * one['longest_step']:.1f}",
-        "-" if one["lag"] is None else f"{1e3 * one['lag']:.0f}",
+        f"{episode['file']}{part}",
+        episode["policy"] if episode["policy"] != episode["file"] else "",
+        str(episode["rows"]),
+        f"{episode['seconds']:.2f}",
+        f"{episode['rate']:.1f}",
+        f"{1e3 * episode['jitter']:.2f}",
+        f"{1e3 * episode['longest_step']:.1f}",
+        "-" if episode["lag"] is None else f"{1e3 * episode['lag']:.0f}",
     )
 
 
-def _channel(one: Mapping[str, Any]) -> tuple[str, ...]:
-    remark = "constant" if one["constant"] else "saturated?" if one["saturated"] > STUCK else ""
-    return one["column"], one["unit"], f"{one['least']:.4g}", f"{one['most']:.4g}", remark
+def _channel(channel: Mapping[str, Any]) -> tuple[str, ...]:
+    remark = "constant" if channel["constant"] else "saturated?" if channel["saturated"] > STUCK else ""
+    return channel["column"], channel["unit"], f"{channel['least']:.4g}", f"{channel['most']:.4g}", remark

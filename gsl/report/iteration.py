@@ -51,7 +51,7 @@ class Rounds:
         """Where the policy is that the next iteration goes on from, none while π0 is the best."""
         return None if self.best is None else str(self.best.folder)
 
-    def diagnosed(self, flight: Flight) -> None:
+    def add_diagnosis(self, flight: Flight) -> None:
         """Take in the diagnosis on which the iterations stand; what it cost goes into the first one's row."""
         self._flight = flight
         self._spent += flight.episodes
@@ -68,7 +68,7 @@ class Rounds:
         in_the_air = f" + {self._flight.episodes} in the air" if first and self._flight else ""
         return self._add(str(len(self._done)), evaluation.metrics, f"{cost}{in_the_air}", first=first)
 
-    def refused(self, why: str, collected: int) -> tuple[str, ...]:
+    def add_refusal(self, why: str, collected: int) -> tuple[str, ...]:
         """Take in an iteration that ended at its grounding, after some real episodes, and return its row."""
         self._spent += collected
         self._collected += collected
@@ -100,11 +100,11 @@ class Rounds:
         last = " ".join(filter(None, ["gain of the last step", bounds, name, "(95 %)"]))
         of = f" by iteration {1 + self._done.index(self.best)}" if len(self._done) > 1 else ""
         fell = f"{after['falls']} falls in " if unit.falls else ""
-        end = f"{fell}{after['episodes']} fresh episodes. {self._ended}{cost}"
-        return f"In real: π0 {unit.bare(before['value'])}, returned{of} {unit.shown(after['value'])}, {last}, {end}"
+        end = f"{fell}{after['episodes']} fresh episodes. {self._end}{cost}"
+        return f"In real: π0 {unit.bare(before['value'])}, returned{of} {unit.format(after['value'])}, {last}, {end}"
 
     @property
-    def _ended(self) -> str:
+    def _end(self) -> str:
         """Why no iteration followed: the last one's gain is not sure, or the next one's grounding was refused."""
         unsure = f"The gain of iteration {len(self._done)} is not sure: no other follows. "
         return self._refusal if self.rising else unsure
@@ -145,10 +145,10 @@ class Rounds:
         if self._flight is None:
             return {"excitation": None, "diagnosis": None, "servo": None}
         flight = self._flight
-        found, servo = flight.diagnosis, flight.servo
+        causes, servo = flight.diagnosis, flight.servo
         diagnosis = gap = None
-        if found is not None:
-            diagnosis = {"verdict": found.verdict, "causes": list(found.causes), "told": flight.verdict}
+        if causes is not None:
+            diagnosis = {"verdict": causes.verdict, "causes": list(causes.causes), "told": flight.verdict}
         if servo is not None:
             gap = {"floors_before": servo["floors_before"], "floors_after": servo["floors_after"], "told": flight.gap}
         excitation = {"episodes": flight.episodes, "real_seconds": flight.seconds}
@@ -156,16 +156,16 @@ class Rounds:
 
     def searches(self) -> list[Search]:
         """Return the panels of the learning curve."""
-        found = [self._search(f"iteration {k + 1}", one, f"π{k}") for k, one in enumerate(self._done)]
+        panels = [self._search(f"iteration {k + 1}", evaluation, f"π{k}") for k, evaluation in enumerate(self._done)]
         if self._beside is not None:
-            found.append(self._search("without grounding", self._beside, "π0"))
-        return found
+            panels.append(self._search("without grounding", self._beside, "π0"))
+        return panels
 
     @property
     def title(self) -> str:
         """What came out, in a line, with the figures of the table."""
         figures, unit = self.metrics(), self._unit
-        before, after = unit.bare(figures["baseline"]["value"]), unit.shown(figures["returned"]["value"])
+        before, after = unit.bare(figures["baseline"]["value"]), unit.format(figures["returned"]["value"])
         with_it = " with grounding" if self._beside else ""
         without = f", {unit.bare(self._beside.metrics['returned']['value'])} without" if self._beside else ""
         if self.best is None:
@@ -180,7 +180,7 @@ class Rounds:
         question = "Does grounded simulation learning find a better policy for the real side?"
         after, before, gain = figures["returned"], figures["baseline"], figures["gain"]
         if self.best is None:
-            reached = f"{unit.shown(after['value'])} (95 % {unit.interval(after['interval'])})"
+            reached = f"{unit.format(after['value'])} (95 % {unit.interval(after['interval'])})"
             sentence = f"No policy better than π0 was found. π0 is returned; it reaches {reached} on the real side."
             return Answer(question, sentence, sure=False, more=[self.verdict])
         over = "π0" if figures["returned_iteration"] == 1 else "the iteration before"
@@ -211,11 +211,11 @@ class Rounds:
     def _add(self, label: str, metrics: Mapping[str, Any], cost: str, *, first: bool) -> list[tuple[str, ...]]:
         simulated, gain = metrics["returned_value_sim"], metrics["gain"]
         expected = "" if simulated is None else self._unit.bare(simulated)
-        told = format_gain(gain["share"]) or self._unit.shown(gain["value"], sign=True)
+        improvement = format_gain(gain["share"]) or self._unit.format(gain["value"], sign=True)
         zero: tuple[str, ...] = ("0", "π0", "", *self._format_measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
         name = BEGUN.get(metrics["best"], metrics["best"])
-        rows.append((label, name, expected, *self._format_measured(metrics["returned"]), told, cost))
+        rows.append((label, name, expected, *self._format_measured(metrics["returned"]), improvement, cost))
         self.rows += rows
         return rows
 
@@ -230,8 +230,8 @@ class Rounds:
 def write_table(folder: Path, rounds: Rounds, remarks: Sequence[str] = ()) -> None:
     """Write the table, the diagnosis if there was one, the verdict, broken promises and further remarks as markdown."""
     below = [*rounds.diagnosis, rounds.verdict, *rounds.broken_promises, *remarks]
-    told = "\n\n".join([table(rounds.columns, rounds.rows).rstrip(), *below])
-    (folder / MARKDOWN).write_text(f"{told}\n", encoding="utf-8")
+    text = "\n\n".join([table(rounds.columns, rounds.rows).rstrip(), *below])
+    (folder / MARKDOWN).write_text(f"{text}\n", encoding="utf-8")
 
 
 def write_curve(folder: Path, rounds: Rounds) -> None:

@@ -84,14 +84,14 @@ def search(
     fresh = {row["name"]: row for row in evaluation["confirmation"]}
     best = fresh.get(returned or "")
     confirmed = _point(best, shown) if best and best["generation"] else None
-    later = [(one["name"], one["falls"]) for phase in ("check", "confirmation") for one in evaluation[phase]]
-    found = [
+    later = [(row["name"], row["falls"]) for phase in ("check", "confirmation") for row in evaluation[phase]]
+    winners = [
         point._replace(later=sum(falls for name, falls in later if name == row["name"]))
         for row, point in zip(evaluation["policies"], points(evaluation["policies"], shown=shown), strict=True)
     ]
     if (begun := evaluation["policies"][0]["name"]) in fresh:
-        found[0] = _point(fresh[begun], shown)._replace(later=found[0].later)
-    return Search(label, found, confirmed, start)
+        winners[0] = _point(fresh[begun], shown)._replace(later=winners[0].later)
+    return Search(label, winners, confirmed, start)
 
 
 def points(rows: Sequence[Mapping[str, Any]], *, shown: float = 1.0) -> list[Point]:
@@ -119,10 +119,10 @@ def learning_curve_figure(
     with look():
         whole = curve_figure(width)
         panels = whole.subplots(1, len(searches), sharey=True, squeeze=False)[0]
-        falls = any(point.falls for one in (*searches, *among) for point in one.points)
+        falls = any(point.falls for search in (*searches, *among) for point in search.points)
         _scale(panels[0], *_limits([*searches, *among]), strip=falls)
-        for axes, one in zip(panels, searches, strict=True):
-            _draw(axes, one, label_gap(0.12, whole))
+        for axes, search in zip(panels, searches, strict=True):
+            _draw(axes, search, label_gap(0.12, whole))
             axes.tick_params(labelleft=True)
         panels[0].set_ylabel(in_unit("value", unit) if unit else "return of an episode")
         headline(whole, title)
@@ -145,10 +145,10 @@ def _limits(searches: Sequence[Search]) -> tuple[float, float]:
     """Least and greatest value that is drawn."""
     points = [point for search in searches for point in search.points]
     again = [search.confirmed for search in searches if search.confirmed]
-    values = [one.simulated for one in (*points, *again) if one.simulated is not None]
-    values += [one.points[0].real for one in searches]
-    for one in (*again, *(point for point in points if not point.falls)):  # winners that fell are in the strip
-        values += [bound for bound in (one.real, one.lower, one.upper) if math.isfinite(bound)]
+    values = [point.simulated for point in (*points, *again) if point.simulated is not None]
+    values += [search.points[0].real for search in searches]
+    for point in (*again, *(point for point in points if not point.falls)):  # winners that fell are in the strip
+        values += [bound for bound in (point.real, point.lower, point.upper) if math.isfinite(bound)]
     return min(values), max(values)
 
 
@@ -163,25 +163,25 @@ def _scale(axes: Axes, low: float, high: float, *, strip: bool) -> None:
     axes.set_ylim(bottom, top)
 
 
-def _draw(axes: Axes, one: Search, gap: float) -> None:
-    start, last = one.points[0], one.points[-1].generation
-    simulated = [(point.generation, point.simulated) for point in one.points if point.simulated is not None]
-    standing = [point for point in one.points if not point.falls]
-    axes.axhline(start.real, color=COMMAND, linewidth=1.2, linestyle=(0, (5, 4)), zorder=1, label=one.start)
+def _draw(axes: Axes, search: Search, gap: float) -> None:
+    start, last = search.points[0], search.points[-1].generation
+    simulated = [(point.generation, point.simulated) for point in search.points if point.simulated is not None]
+    standing = [point for point in search.points if not point.falls]
+    axes.axhline(start.real, color=COMMAND, linewidth=1.2, linestyle=(0, (5, 4)), zorder=1, label=search.start)
     if simulated:
         axes.plot(*zip(*simulated, strict=True), "-o", color=SIMULATION, markersize=4.5, label="simulation")
     _draw_standing(axes, standing)
-    _draw_falls(axes, [point for point in one.points if point.falls])
-    if one.confirmed is not None:
-        _draw_confirmed(axes, one.confirmed)
-    axes.set_title(one.label, loc="left", fontsize=10.5)
+    _draw_falls(axes, [point for point in search.points if point.falls])
+    if search.confirmed is not None:
+        _draw_confirmed(axes, search.confirmed)
+    axes.set_title(search.label, loc="left", fontsize=10.5)
     axes.set_xlabel("generation")
-    axes.set_xticks([point.generation for point in one.points])
+    axes.set_xticks([point.generation for point in search.points])
     axes.set_xlim(-0.4, max(1, last) + 0.4)
-    ends = [(start.real, f"{one.start} in real", COMMAND)]
+    ends = [(start.real, f"{search.start} in real", COMMAND)]
     ends += [(simulated[-1][1], "best in\nsimulation", SIMULATION)] if simulated else []
     ends += [(standing[-1].real, "the same\nin real", REAL)] if standing and standing[-1].generation > 0 else []
-    ends += [(one.confirmed.real, "chosen,\nmeasured again", INK)] if one.confirmed else []
+    ends += [(search.confirmed.real, "chosen,\nmeasured again", INK)] if search.confirmed else []
     label_ends(axes, axes.get_xlim()[1], ends, gap=gap)
 
 

@@ -23,8 +23,8 @@ def page(template: str, sections: Sequence[Part], **values: object) -> str:
         sections: From above; those that are None are left out.
         values: Whatever else the template shows.
     """
-    present = [one for one in sections if one]
-    script = _source(_SCRIPT) if any("data-choice" in one for one in present) else ""
+    present = [section for section in sections if section]
+    script = _source(_SCRIPT) if any("data-choice" in section for section in present) else ""
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     style = render("style.css", light=_declare(LIGHT), dark=_declare(DARK))
     text = render(template, sections=present, style=style, script=Markup(script), script_hash=digest, **values)

@@ -59,8 +59,8 @@ def describe_gain(
     """
     low = gain["interval"][0]
     sure = low is not None and low > 0.0
-    reached = f"{unit.shown(after['value'])}{_bound(unit, after['interval'])}"
-    more = f"{unit.shown(gain['value'], sign=True)}{_bound(unit, gain['interval'], sign=True)}"
+    reached = f"{unit.format(after['value'])}{_bound(unit, after['interval'])}"
+    more = f"{unit.format(gain['value'], sign=True)}{_bound(unit, gain['interval'], sign=True)}"
     significant = f"the gain over {over}, {more}, is {'' if sure else 'not '}significant"
     start = unit.bare(before["value"])
     return f"{name} reaches {reached} on the real side, π0 {start}: {significant}.", sure
@@ -100,8 +100,8 @@ def describe_origin(how: Origin | None) -> list[Part]:
     """Return the sections with lineage, settings and command; none where no stage is at work."""
     if how is None:
         return []
-    rows = [(f"made from {one.role}", one.path, one.hash[:SHORT]) for one in how.parents]
-    rows += [(f"built {one.role}", one.path, one.hash[:SHORT]) for one in how.links]
+    rows = [(f"made from {parent.role}", parent.path, parent.hash[:SHORT]) for parent in how.parents]
+    rows += [(f"built {link.role}", link.path, link.hash[:SHORT]) for link in how.links]
     typed = not how.command.endswith(")") or how.command.startswith("gsl.")
     again = command(how.command) if typed else element("p", f"A part of {how.command.partition(' (')[0]}.")
     settings = fold("all settings", element("pre", element("code", how.settings)))
@@ -122,8 +122,8 @@ def _fold_long(shown: Markup, rows: int) -> Markup:
 def curves(searches: Sequence[Search], unit: str) -> Markup | None:
     """Return the section with the learning curves."""
     drawn = [
-        svg(learning_curve_figure([one], unit=unit, width=WIDTH, among=searches), f"learning curve, {one.label}")
-        for one in searches
+        svg(learning_curve_figure([search], unit=unit, width=WIDTH, among=searches), f"learning curve, {search.label}")
+        for search in searches
     ]
     note = (
         "The best of each generation in simulation, and the same policies on the real side with 95 % intervals. "
@@ -135,8 +135,8 @@ def curves(searches: Sequence[Search], unit: str) -> Markup | None:
 def joints(traces: Mapping[str, Traces], note: str) -> Markup | None:
     """Return the section with the traces of each joint, of which the reader chooses one."""
     pictures = {
-        joint: svg(joint_trace_figure(one, joint, title="", width=WIDTH), f"traces of {joint}")
-        for joint, one in traces.items()
+        joint: svg(joint_trace_figure(traces, joint, title="", width=WIDTH), f"traces of {joint}")
+        for joint, traces in traces.items()
     }
     return section("Joint by joint", choice("joint", pictures), note=note)
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 STEP, SECONDS = 0.1, 0.5  # of the answer to a step [rad], [s]
 SETTLE = 50  # control periods at rest before it
-SLOPE = 1.0  # of the ramps whose following error tells friction, at most this share of the fastest speed
 
 
 def servo_curves(path: Path, plant: Plant, model: ServoModel, step: float, period: float) -> None:
@@ -42,10 +41,10 @@ def servo_curves_figure(plant: Plant, model: ServoModel, step: float, period: fl
         axes = whole.subplots(2, len(groups), squeeze=False)
         for column, g in enumerate(groups):
             joint = int(np.argmax(_members(model, plant) == g))
-            for label, one, colour in plants:
-                time, answer = step_response(one, joint, step, period)
+            for label, drives, colour in plants:
+                time, answer = step_response(drives, joint, step, period)
                 axes[0, column].plot(time, np.degrees(answer), color=colour, label=label, linewidth=1.8)
-                speed, torque = motion_cost(one, joint, step, period)
+                speed, torque = motion_cost(drives, joint, step, period)
                 axes[1, column].plot(speed, torque, color=colour, label=label, linewidth=1.8)
             axes[0, column].set_title(f"{model.groups[g]}: {model.joints[joint]}", loc="left")
             axes[0, column].set_xlabel("time after a step [s]")
@@ -77,7 +76,7 @@ def motion_cost(plant: Plant, joint: int, step: float, period: float) -> tuple[n
 
     That is kp times the following error, the part of it left out that a delayed command makes.
     """
-    rest, speeds, found = _stance(plant), np.linspace(0.1, 2.0, 8), []
+    rest, speeds, lags = _stance(plant), np.linspace(0.1, 2.0, 8), []
     toward = _room(plant, joint, rest)
     for speed in speeds:
         ticks = round(0.3 / speed / period) + 4
@@ -86,8 +85,8 @@ def motion_cost(plant: Plant, joint: int, step: float, period: float) -> tuple[n
         played = Held.of(plant, step, period).play([path], [rest], SETTLE)[0]
         middle = slice(ticks // 2, ticks - 3)
         behind = float(np.mean(toward * (path[middle, joint] - played[1:][middle, joint])))
-        found.append(behind - speed * plant.servo.delay[joint])
-    return speeds, plant.servo.kp[joint] * np.array(found)
+        lags.append(behind - speed * plant.servo.delay[joint])
+    return speeds, plant.servo.kp[joint] * np.array(lags)
 
 
 def _stance(plant: Plant) -> np.ndarray:

@@ -25,7 +25,7 @@ def write_study_page(folder: Path, answer: Answer, files: Sequence[str], picture
         files: Names of markdown files, whose tables and sentences are shown.
         pictures: Its figures.
     """
-    drawn = section("Pictures", *(svg(one, "figure of the study") for one in pictures))
+    drawn = section("Pictures", *(svg(picture, "figure of the study") for picture in pictures))
     texts = {Path(name).stem.capitalize(): (folder / name).read_text(encoding="utf-8") for name in files}
     write_page(folder, answer, [drawn, *(section(title, *read_markdown(text)) for title, text in texts.items())])
 
@@ -40,4 +40,6 @@ def read_markdown(text: str) -> Iterator[Part]:
             yield from (element("h3", line.lstrip("# ")) for line in block)
         else:
             paragraphs = "\n".join(block).split("\n\n")
-            yield from (element("p", prose(" ".join(one.split()))) for one in paragraphs if one.strip())
+            yield from (
+                element("p", prose(" ".join(paragraph.split()))) for paragraph in paragraphs if paragraph.strip()
+            )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from gsl.core.visible import visible
 
@@ -16,6 +16,15 @@ WORD = 16
 """Longest word that is kept whole."""
 EDGE, APART = 1, 3
 """Characters that a drawn table takes besides its cells: in all, and for each column."""
+
+
+class Table(NamedTuple):
+    """A table with its title and what stands below it: the arguments of the console's `table`."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str | None = None
 
 
 class LineTable:

@@ -20,8 +20,8 @@ _NOT_ROBOTS = (
 def names() -> tuple[str, ...]:
     """Return the names of the robots that come with gsl."""
     package = importlib.import_module("gsl.robots")
-    found = (module.name for module in pkgutil.iter_modules(package.__path__))
-    return tuple(sorted(set(found) - set(_NOT_ROBOTS)))
+    modules = (module.name for module in pkgutil.iter_modules(package.__path__))
+    return tuple(sorted(set(modules) - set(_NOT_ROBOTS)))
 
 
 def is_file(name: str) -> bool:

@@ -39,24 +39,26 @@ def torque_unit(effort: float) -> float:
     return effort / NAO
 
 
-def with_gains(robot: Robot, given: Mapping[str, tuple[float | None, float | None]]) -> Robot:
+def with_gains(robot: Robot, settings: Mapping[str, tuple[float | None, float | None]]) -> Robot:
     """Return the robot with gains for all motors: those given, the others derived.
 
     Args:
         robot: With everything else.
-        given: kp [N·m/rad] and kd [N·m·s/rad] by motor, None where it is left open.
+        settings: kp [N·m/rad] and kd [N·m·s/rad] by motor, None where it is left open.
     """
     body = lump(robot)
     carried = np.diag(mass_matrix(body, robot.stance))[6:]
     gains = {}
     for name, inertia in zip(robot.motors, carried.tolist(), strict=True):
-        joint, (kp, kd) = robot.joint(name), given.get(name, (None, None))
+        joint, (kp, kd) = robot.joint(name), settings.get(name, (None, None))
         kp = joint.effort / FULL_AT if kp is None else kp
         kd = 2.0 * DAMPING * float(np.sqrt(kp * (inertia + joint.armature))) if kd is None else kd
         gains[name] = (kp, kd)
     peak = max(robot.joint(name).effort for name in robot.motors)
     made = replace(robot, gains=gains, torque_unit=torque_unit(peak))
-    return replace(made, ranges={**(softer_gains(made) if any(kp for kp, _ in given.values()) else {}), **made.ranges})
+    return replace(
+        made, ranges={**(softer_gains(made) if any(kp for kp, _ in settings.values()) else {}), **made.ranges}
+    )
 
 
 def softer_gains(robot: Robot) -> dict[str, dict[str, tuple[float, float]]]:

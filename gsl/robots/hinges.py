@@ -42,7 +42,7 @@ class JointSettings:
 
 
 def from_description(
-    told: Description,
+    description: Description,
     joints: Mapping[str, JointSettings] | None,
     held: Mapping[str, float],
     stance: Mapping[str, float],
@@ -50,7 +50,7 @@ def from_description(
     """Return the robot of a URDF.
 
     Args:
-        told: What the file says.
+        description: What the file says.
         joints: The controlled joints in order, with what is known of them; None for all that turn and follow no other.
         held: Where others are held [rad], or [m] if they slide.
         stance: A usual posture [rad].
@@ -58,18 +58,18 @@ def from_description(
     Raises:
         ConfigError: A joint does not exist, cannot be driven, or lacks a limit; or a link that moves has no mass.
     """
-    known = {hinge.name: hinge for hinge in told.hinges}
-    chosen = joints if joints is not None else {name: JointSettings() for name in drivable(told.hinges)}
-    _check(chosen, held, known)
-    follows = {hinge.name: leader for hinge in told.hinges if (leader := leader_of(hinge, known))}
+    hinges = {hinge.name: hinge for hinge in description.hinges}
+    chosen = joints if joints is not None else {name: JointSettings() for name in drivable(description.hinges)}
+    _check(chosen, held, hinges)
+    follows = {hinge.name: leader for hinge in description.hinges if (leader := leader_of(hinge, hinges))}
     coupled = {
         name: way.leader
         for name, way in follows.items()
-        if way.leader in chosen and abs(way.ratio) == 1.0 and known[name].kind in TURNING
+        if way.leader in chosen and abs(way.ratio) == 1.0 and hinges[name].kind in TURNING
     }
-    driven = {name: _driven(known[name], settings) for name, settings in chosen.items()}
-    mounts, remarks, soft = [], [*told.remarks], dict[str, tuple[float, float]]()
-    for hinge in told.hinges:
+    driven = {name: _make_driven(hinges[name], settings) for name, settings in chosen.items()}
+    mounts, remarks, soft = [], [*description.remarks], dict[str, tuple[float, float]]()
+    for hinge in description.hinges:
         if hinge.name in coupled:
             way = follows[hinge.name]
             own, missing = limits_like_leader(hinge, way, driven[way.leader])
@@ -80,17 +80,17 @@ def from_description(
             mounts.append(Mount(driven[hinge.name], hinge.turn))
             soft |= _soft(hinge, driven[hinge.name], Follows(hinge.name, 1.0, 0.0))
         else:
-            mounts.append(_hold(hinge, place := _place(hinge, held, follows, known)))
+            mounts.append(_hold(hinge, place := _place(hinge, held, follows, hinges)))
             if hinge.kind != "fixed" and hinge.name not in held:
-                remarks.append(_remark(hinge, place, follows.get(hinge.name), known))
-    links, placed = align(told.links, mounts)
+                remarks.append(_remark(hinge, place, follows.get(hinge.name), hinges))
+    links, placed = align(description.links, mounts)
     robot = Robot(
-        told.name, links, placed, tuple(chosen), coupled, stance=dict(stance), remarks=tuple(remarks), soft=soft,
+        description.name, links, placed, tuple(chosen), coupled, stance=dict(stance), remarks=tuple(remarks), soft=soft,
         torque_constant=_torque_constants(chosen, coupled),
     )  # fmt: skip
     _check_masses(robot)
     leaders = {name: chosen[coupled.get(name, name)] for name in robot.motors}
-    return with_gains(robot, {name: (one.kp, one.kd) for name, one in leaders.items()})
+    return with_gains(robot, {name: (settings.kp, settings.kd) for name, settings in leaders.items()})
 
 
 def lone(name: str, joints: Mapping[str, JointSettings]) -> Robot:
@@ -103,18 +103,18 @@ def lone(name: str, joints: Mapping[str, JointSettings]) -> Robot:
         raise ConfigError("joints", "names no joint; without a urdf they have to be named")
     nowhere, endless = np.zeros(3), {"lower": -ENDLESS, "upper": ENDLESS}
     hinges = [
-        Hinge(one, "revolute", "base", one, nowhere, np.eye(3), np.array([0.0, 1.0, 0.0]), endless, {}, None)
-        for one in joints
+        Hinge(joint, "revolute", "base", joint, nowhere, np.eye(3), np.array([0.0, 1.0, 0.0]), endless, {}, None)
+        for joint in joints
     ]
-    driven = {hinge.name: _driven(hinge, joints[hinge.name]) for hinge in hinges}
-    inertias = {one: joints[one].inertia or driven[one].armature for one in joints}
+    driven = {hinge.name: _make_driven(hinge, joints[hinge.name]) for hinge in hinges}
+    inertias = {joint: joints[joint].inertia or driven[joint].armature for joint in joints}
     links, placed = lone_servos(driven, inertias)
     remark = "no body: every joint turns a load of its own, which effects of the base's links may put off its axis"
     robot = Robot(
         name, links, placed, tuple(joints), ranges=unknown_loads(driven), remarks=(remark,),
         torque_constant=_torque_constants(joints, {}),
     )  # fmt: skip
-    return with_gains(robot, {one: (told.kp, told.kd) for one, told in joints.items()})
+    return with_gains(robot, {joint: (settings.kp, settings.kd) for joint, settings in joints.items()})
 
 
 def drivable(hinges: Sequence[Hinge]) -> list[str]:
@@ -122,18 +122,18 @@ def drivable(hinges: Sequence[Hinge]) -> list[str]:
     return [hinge.name for hinge in hinges if hinge.kind in TURNING and hinge.follows is None]
 
 
-def _check(chosen: Mapping[str, JointSettings], held: Mapping[str, float], known: Mapping[str, Hinge]) -> None:
+def _check(chosen: Mapping[str, JointSettings], held: Mapping[str, float], hinges: Mapping[str, Hinge]) -> None:
     for name in (*chosen, *held):
-        if name not in known:
+        if name not in hinges:
             role = "joints" if name in chosen else "held"
-            raise ConfigError(f"{role}.{name}", f"the URDF has no such joint{did_you_mean(name, known, listed=True)}")
+            raise ConfigError(f"{role}.{name}", f"the URDF has no such joint{did_you_mean(name, hinges, listed=True)}")
     for name in held:
-        if name in chosen or known[name].kind == "fixed":
+        if name in chosen or hinges[name].kind == "fixed":
             why = "is controlled" if name in chosen else "is fixed"
             raise ConfigError(f"held.{name}", f"the joint {why}; leave it out")
-    for name, told in chosen.items():
-        hinge = known[name]
-        if told.inertia is not None:
+    for name, settings in chosen.items():
+        hinge = hinges[name]
+        if settings.inertia is not None:
             raise ConfigError(f"joints.{name}.inertia", "is for servos without a body; the URDF says it of the links")
         if hinge.kind not in TURNING:
             problem = f"is {hinge.kind}; only joints that turn can be controlled, others are held"
@@ -144,8 +144,8 @@ def _check(chosen: Mapping[str, JointSettings], held: Mapping[str, float], known
         raise ConfigError("joints", "the URDF has no joint that turns, so nothing can be controlled")
 
 
-def _driven(hinge: Hinge, told: JointSettings) -> Joint:
-    own = {"effort": told.effort, "velocity": told.velocity, "lower": told.lower, "upper": told.upper}
+def _make_driven(hinge: Hinge, settings: JointSettings) -> Joint:
+    own = {"effort": settings.effort, "velocity": settings.velocity, "lower": settings.lower, "upper": settings.upper}
     limit = hinge.limit
     if hinge.kind == "continuous" and not is_range(limit):  # a URDF need not say one then
         limit = {**limit, "lower": -ENDLESS, "upper": ENDLESS}
@@ -154,7 +154,7 @@ def _driven(hinge: Hinge, told: JointSettings) -> Joint:
         raise ConfigError(f"joints.{hinge.name}", problem)
     lower, upper = limit["lower"], limit["upper"]
     effort, velocity = limit["effort"], limit["velocity"]
-    armature = armature_of(effort, velocity) if told.armature is None else told.armature
+    armature = armature_of(effort, velocity) if settings.armature is None else settings.armature
     origin, axis = hinge.origin, hinge.axis
     return Joint(hinge.name, hinge.parent, hinge.child, origin, axis, lower, upper, velocity, effort, armature)
 
@@ -175,7 +175,7 @@ def _soft(hinge: Hinge, joint: Joint, follows: Follows) -> dict[str, tuple[float
 
 def _couple(hinge: Hinge, follows: Follows, leader: JointSettings) -> Mount:
     """Return a joint that follows another, turned and shifted such that its angle is that of the leader."""
-    joint = _driven(hinge, replace(leader, lower=None, upper=None))
+    joint = _make_driven(hinge, replace(leader, lower=None, upper=None))
     lower, upper = sorted(follows.ratio * (end - follows.offset) for end in (joint.lower, joint.upper))
     shifted = hinge.turn @ rotation(hinge.axis, follows.offset)
     return Mount(replace(joint, axis=follows.ratio * joint.axis, lower=lower, upper=upper), shifted)
@@ -193,7 +193,7 @@ def _hold(hinge: Hinge, place: float) -> Mount:
 
 
 def _place(
-    hinge: Hinge, held: Mapping[str, float], follows: Mapping[str, Follows], known: Mapping[str, Hinge]
+    hinge: Hinge, held: Mapping[str, float], follows: Mapping[str, Follows], hinges: Mapping[str, Hinge]
 ) -> float:
     """Return where a joint is held [rad], or [m] if it slides.
 
@@ -202,15 +202,15 @@ def _place(
     if hinge.name in held:
         return held[hinge.name]
     at, way = 0.0, follows.get(hinge.name)
-    if way is not None and way.leader in known:
-        at = way.ratio * _place(known[way.leader], held, {}, known) + way.offset
+    if way is not None and way.leader in hinges:
+        at = way.ratio * _place(hinges[way.leader], held, {}, hinges) + way.offset
     lower, upper = hinge.limit.get("lower", -math.inf), hinge.limit.get("upper", math.inf)
     return min(max(at, lower), upper) if lower < upper else lower if math.isfinite(lower) else at
 
 
-def _remark(hinge: Hinge, place: float, follows: Follows | None, known: Mapping[str, Hinge]) -> str:
+def _remark(hinge: Hinge, place: float, follows: Follows | None, hinges: Mapping[str, Hinge]) -> str:
     why = f"{hinge.kind}, which cannot be driven" if hinge.kind not in TURNING else "not controlled"
-    if follows and follows.leader not in known:
+    if follows and follows.leader not in hinges:
         why = f"follows {follows.leader}, which does not exist"
     elif follows and abs(follows.ratio) != 1.0:
         why = f"follows {follows.leader} by a factor of {follows.ratio:g}; only 1 and -1 can be driven"

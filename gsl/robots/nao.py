@@ -91,7 +91,7 @@ CONTROLLED = (
 def nao() -> Robot:
     """Return the NAO: 15 controlled joints (the paper's section 6.1), the others held."""
     links = [_link(*row) for row in _LINKS]
-    joints = [_driven(*row) for row in _JOINTS] + [_hold(*row) for row in _HELD]
+    joints = [_make_driven(*row) for row in _JOINTS] + [_hold(*row) for row in _HELD]
     links += [_mirror_link(link) for link in links if link.name.startswith("L")]
     joints += [_mirror_joint(joint) for joint in joints if joint.name.startswith("L")]
     legs = tuple(j.name for j in joints if j.fixed_at is None and "Shoulder" not in j.name)
@@ -121,7 +121,7 @@ def _link(name: str, mass: float, com: Triple, moments: tuple[float, ...]) -> Li
     return Link(name, mass, np.array(com), inertia, SHAPES.get(name, ()))
 
 
-def _driven(
+def _make_driven(
     name: str, parent: str, child: str, origin: Triple, axis: Triple,
     lower: float, upper: float, speed: float, effort: float, motor: str,
 ) -> Joint:  # fmt: skip

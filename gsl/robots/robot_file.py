@@ -69,38 +69,40 @@ def from_file(path: Path) -> Robot:
     Raises:
         InputError: A file cannot be read, or what it says cannot be a robot.
     """
-    told = _settings(path) if path.suffix in YAML else RobotSettings(urdf=path.name)
+    settings = _settings(path) if path.suffix in YAML else RobotSettings(urdf=path.name)
     try:
-        joints = None if told.joints is None else _joints(told.joints)
-        if told.urdf is not None:
-            if not (path.parent / told.urdf).exists():
-                raise ConfigError("urdf", "there is no such file, as seen from the robot's file", given=told.urdf)
-            robot = from_description(read_description(path.parent / told.urdf), joints, told.held, told.stance)
+        joints = None if settings.joints is None else _joints(settings.joints)
+        if settings.urdf is not None:
+            if not (path.parent / settings.urdf).exists():
+                raise ConfigError("urdf", "there is no such file, as seen from the robot's file", given=settings.urdf)
+            robot = from_description(
+                read_description(path.parent / settings.urdf), joints, settings.held, settings.stance
+            )
         else:
-            robot = lone(told.name or path.stem, joints or {})
-        return _complete(robot, told)
+            robot = lone(settings.name or path.stem, joints or {})
+        return _complete(robot, settings)
     except ConfigError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def _complete(robot: Robot, told: RobotSettings) -> Robot:
-    for group, members in told.groups.items():
+def _complete(robot: Robot, settings: RobotSettings) -> Robot:
+    for group, members in settings.groups.items():
         for name in members:
             _check_motor(robot, name, f"groups.{group}")
-    for name in told.stance:
+    for name in settings.stance:
         _check_motor(robot, name, "stance")
-    for effect, ranges in told.ranges.items():
+    for effect, ranges in settings.ranges.items():
         check_ranges(effect, ranges)
     return replace(
         robot,
-        name=re.sub(r"[^\w-]+", "_", told.name or robot.name),
-        groups=dict(told.groups),
-        stance=dict(told.stance),
-        encoder_step=told.encoder_step,
-        encoder_side=told.encoder_side,
-        supply_voltage=told.supply_voltage,
-        no_load_speed=told.no_load_speed,
-        ranges={**robot.ranges, **told.ranges},
+        name=re.sub(r"[^\w-]+", "_", settings.name or robot.name),
+        groups=dict(settings.groups),
+        stance=dict(settings.stance),
+        encoder_step=settings.encoder_step,
+        encoder_side=settings.encoder_side,
+        supply_voltage=settings.supply_voltage,
+        no_load_speed=settings.no_load_speed,
+        ranges={**robot.ranges, **settings.ranges},
     )
 
 
@@ -110,17 +112,17 @@ def _check_motor(robot: Robot, name: str, where: str) -> None:
 
 
 def _settings(path: Path) -> RobotSettings:
-    told = yaml_tree(path, read_text(path))
-    if not isinstance(told, Mapping):
+    entries = yaml_tree(path, read_text(path))
+    if not isinstance(entries, Mapping):
         raise InputError(f"{path}: says nothing of a robot; see docs/howto/own-robot.md")
     try:
-        return make(RobotSettings, told)
+        return make(RobotSettings, entries)
     except ConfigError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def _joints(told: Mapping[str, Any]) -> dict[str, JointSettings]:
-    for name, entry in told.items():
+def _joints(entries: Mapping[str, Any]) -> dict[str, JointSettings]:
+    for name, entry in entries.items():
         if not isinstance(entry or {}, Mapping):
             raise ConfigError(f"joints.{name}", "must map its settings to values", given=str(entry))
-    return {str(name): make(JointSettings, entry or {}, where=f"joints.{name}") for name, entry in told.items()}
+    return {str(name): make(JointSettings, entry or {}, where=f"joints.{name}") for name, entry in entries.items()}

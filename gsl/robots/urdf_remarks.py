@@ -28,8 +28,8 @@ def _limits(hinges: Iterable[Hinge]) -> Iterator[str]:
     for hinge in hinges:
         ends = [hinge.limit[key] for key in ("lower", "upper") if key in hinge.limit]
         if hinge.kind == "revolute" and ends and max(map(abs, ends)) > FAR:
-            told = " and ".join(f"{end:g}" for end in ends)
-            yield f"joint {hinge.name} has the limits {told} rad: are they in degrees? A URDF's are in radians"
+            values = " and ".join(f"{end:g}" for end in ends)
+            yield f"joint {hinge.name} has the limits {values} rad: are they in degrees? A URDF's are in radians"
 
 
 def _soft(hinges: Iterable[Hinge]) -> Iterator[str]:
@@ -45,10 +45,10 @@ def _inertias(links: Iterable[Link]) -> Iterator[str]:
     for link in links:
         first, second, greatest = np.linalg.eigvalsh(link.inertia)
         if greatest > ROUNDED * (first + second):
-            told = ", ".join(f"{moment:.3g}" for moment in (first, second, greatest))
+            three = ", ".join(f"{moment:.3g}" for moment in (first, second, greatest))
             yield (
-                f"link {link.name} has the principal moments {told} kg·m²: no body has one that is more than the other "
-                "two together; look at its <inertia>"
+                f"link {link.name} has the principal moments {three} kg·m²: no body has one that is more than the "
+                "other two together; look at its <inertia>"
             )
 
 
@@ -61,11 +61,11 @@ def _meshes(root: xml.Element) -> list[str]:
 
 
 def _dynamics(root: xml.Element) -> list[str]:
-    found = [joint.get("name", "") for joint in root.findall("joint") if joint.find("dynamics") is not None]
-    if not found:
+    joints = [joint.get("name", "") for joint in root.findall("joint") if joint.find("dynamics") is not None]
+    if not joints:
         return []
-    told = ", ".join(found)
-    return [f"<dynamics> is friction, and the world's ({told}): gsl init writes it there, as effects; else add them"]
+    names = ", ".join(joints)
+    return [f"<dynamics> is friction, and the world's ({names}): gsl init writes it there, as effects; else add them"]
 
 
 def _floating(root: xml.Element) -> Iterator[str]:

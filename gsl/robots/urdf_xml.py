@@ -129,7 +129,7 @@ def _expressions(node: xml.Element) -> list[str]:
 
 
 def _each(root: xml.Element, tag: str, read: Callable[[str, xml.Element], T]) -> list[T]:
-    found: list[T] = []
+    parts: list[T] = []
     names: set[str] = set()
     for node in root.findall(tag):
         name = node.get("name")
@@ -141,10 +141,10 @@ def _each(root: xml.Element, tag: str, read: Callable[[str, xml.Element], T]) ->
             raise ValueError(f"two {tag}s are called '{name}'")
         names.add(name)
         try:
-            found.append(read(name, node))
+            parts.append(read(name, node))
         except ValueError as error:
             raise ValueError(f"{tag} '{name}': {error}") from error
-    return found
+    return parts
 
 
 def _link(name: str, node: xml.Element) -> Link:
@@ -198,7 +198,9 @@ def _hinge(name: str, node: xml.Element) -> Hinge:
     if kind != "fixed" and not np.linalg.norm(way) > 1e-9:
         raise ValueError("its axis has no direction")
     limit, mimic = node.find("limit"), node.find("mimic")
-    told = {key: _number(limit, key, "<limit>") for key in _LIMITS if limit is not None and limit.get(key) is not None}
+    limits = {
+        key: _number(limit, key, "<limit>") for key in _LIMITS if limit is not None and limit.get(key) is not None
+    }
     safety, follows = node.find("safety_controller"), None
     soft = {
         key: _number(safety, name, "<safety_controller>")
@@ -217,7 +219,7 @@ def _hinge(name: str, node: xml.Element) -> Hinge:
         for key in ("damping", "friction")
         if drag is not None and drag.get(key) is not None
     }
-    return Hinge(name, kind, parent, child, *_origin(node), unit, told, soft, follows, dynamics)
+    return Hinge(name, kind, parent, child, *_origin(node), unit, limits, soft, follows, dynamics)
 
 
 def _tree(links: dict[str, Link], hinges: Sequence[Hinge]) -> tuple[str, tuple[Hinge, ...]]:

@@ -139,8 +139,8 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
     parallel = joblib.Parallel(workers, batch_size=1, max_nbytes=None, return_as="generator_unordered", **ending)
     try:
         with processes_starting():
-            found = parallel(joblib.delayed(_run_numbered)(function, frozen, jobs[index], index) for index in missing)
-        yield from found
+            results = parallel(joblib.delayed(_run_numbered)(function, frozen, jobs[index], index) for index in missing)
+        yield from results
     except TerminatedWorkerError:
         return
 

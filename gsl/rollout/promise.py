@@ -41,6 +41,6 @@ def promise(
     room = ROOM * abs(value)
     broken = upper is not None and math.isfinite(upper) and value > upper + room
     returned = policy if best else policies[0].name
-    given = f"{returned} gives {unit.shown(measured['value'])} in real, {unit.shown(upper)} at most (95 %)"
-    warning = f"the search promised {unit.shown(value)} ({policy}), but {given}" if broken else ""
+    comparison = f"{returned} gives {unit.format(measured['value'])} in real, {unit.format(upper)} at most (95 %)"
+    warning = f"the search promised {unit.format(value)} ({policy}), but {comparison}" if broken else ""
     return {"policy": policy, "value_sim": value, "value": measured["value"], "upper": upper, "warning": warning}

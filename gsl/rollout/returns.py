@@ -28,8 +28,8 @@ def summary(done: Sequence[Episode]) -> dict[str, Any]:
     A value that somebody wrote down tells of nothing besides.
     """
     interval = mean_interval([episode.value for episode in done])
-    told = [name for name in done[0].outcome if all(name in episode.outcome for episode in done)]
-    outcome = {name: float(np.mean([episode.outcome[name] for episode in done])) for name in told}
+    measures = [name for name in done[0].outcome if all(name in episode.outcome for episode in done)]
+    outcome = {name: float(np.mean([episode.outcome[name] for episode in done])) for name in measures}
     bounds = [interval.lower, interval.upper]
     return {"value": interval.mean, "interval": bounds, "falls": falls(done), "episodes": len(done), "outcome": outcome}
 

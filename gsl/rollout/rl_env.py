@@ -49,7 +49,7 @@ class GroundedSimulator:
         if not isinstance(world, GymnasiumWorld):
             raise ConfigError("optimizer", "policy iteration needs a world of few states, with a table P")
         if isinstance(grounding, TableTransformation):
-            return grounding.grounded(world.table)
+            return grounding.ground(world.table)
         if not isinstance(grounding, NoGrounding):
             raise ConfigError("grounding", "policy iteration knows none, gat and sgat only")
         return world.table
@@ -80,8 +80,8 @@ class RewardedEnv(gymnasium.Env):
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Act; the reward is the task's."""
-        before, given = self._seen, np.atleast_1d(np.asarray(action, dtype=float))
-        self._seen, own, ended, cut, _ = self._env.step(given)
+        before, sent = self._seen, np.atleast_1d(np.asarray(action, dtype=float))
+        self._seen, own, ended, cut, _ = self._env.step(sent)
         judged = self._task.step(before, self._seen, ended)
         self._left -= 1
         reward = own if judged.reward is None else judged.reward

@@ -34,8 +34,8 @@ class Scenario:
         """Refuse an episode without a step."""
         if self.ticks < 1:
             period = self.world.layout.control_period
-            given = f"{self.task.duration:g}"
-            raise ConfigError("task.duration", f"must be at least one control period ({period:g} s)", given=given)
+            duration = f"{self.task.duration:g}"
+            raise ConfigError("task.duration", f"must be at least one control period ({period:g} s)", given=duration)
 
     @property
     def ticks(self) -> int:

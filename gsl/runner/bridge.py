@@ -27,8 +27,8 @@ def _call(**what: Any) -> Any:
 
 def read() -> dict[str, Any]:
     """Return what the surrogate measures."""
-    told: dict[str, Any] = _call(do="read")
-    return told
+    reading: dict[str, Any] = _call(do="read")
+    return reading
 
 
 def send(targets: Any) -> None:

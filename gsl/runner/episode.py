@@ -67,14 +67,14 @@ class Player:
         Raises:
             RobotError: The log lacks what the robot tells, or has what it cannot tell.
         """
-        told = tuple(self._read(self.clock.now()).more)
-        self._more = told
+        extras = tuple(self._read(self.clock.now()).more)
+        self._more = extras
         if columns is None:
             return
-        first, last = len(self._columns()) - len(told) - len(ENDS), len(columns) - len(ENDS)
+        first, last = len(self._columns()) - len(extras) - len(ENDS), len(columns) - len(ENDS)
         self._more = tuple(columns[first:last])
-        new = [name for name in told if name not in self._more]
-        gone = [name for name in self._more if name not in told and name.startswith("base.")]
+        new = [name for name in extras if name not in self._more]
+        gone = [name for name in self._more if name not in extras and name.startswith("base.")]
         if list(columns) != self._columns() or new or gone:
             problem = f"has no column {new[0]}, which" if new else "has other columns than"
             raise RobotError(f"{log}: {problem} the robot tells now; choose another --log")
@@ -174,7 +174,7 @@ class Player:
         return seen.observation[self._layout["position"]]
 
     def _read(self, now: float) -> Seen:
-        seen = self._senses.seen(self._call("read"), now)
+        seen = self._senses.interpret(self._call("read"), now)
         self._reads, self._down = True, seen.fell
         return seen
 
@@ -201,7 +201,7 @@ class Player:
         if problem := self.guard.refusal(target, now):
             return problem
         self.guard.take(target, now)  # first: if send() breaks off, the robot may have it
-        self._following.sent(target, now)
+        self._following.note(target, now)
         self.moving = True
         self._call("send", target.copy())
         return ""

@@ -34,7 +34,7 @@ class Following:
         self._targets = deque([(now, target.copy())])
         self._positions: deque[tuple[float, np.ndarray]] = deque()
 
-    def sent(self, target: np.ndarray, now: float) -> None:
+    def note(self, target: np.ndarray, now: float) -> None:
         """Remember a target [rad], shape (n_joints,), sent at a time [s]."""
         self._targets.append((now, target.copy()))
         while len(self._targets) > 1 and self._targets[1][0] < now - WHILE:  # the one before holds until then

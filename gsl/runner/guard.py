@@ -54,11 +54,11 @@ class Guard:
             (change, self.step, 1.0, "the target jumps by {:.4g} rad, more than the {:.4g} rad allowed"),
             (way, self.path, 1.0, "the target moves {:.4g} rad in " + seconds + ", more than the {:.4g} rad allowed"),
         )
-        found = (
+        reasons = (
             self._report(~(sign * (value - bound) <= _ROUNDING), text, value, bound)
             for value, bound, sign, text in rules
         )
-        return next(filter(None, found), "")
+        return next(filter(None, reasons), "")
 
     def take(self, target: np.ndarray, now: float) -> None:
         """Remember a target that was sent [rad], shape (n_joints,), at a time [s]."""

@@ -82,11 +82,11 @@ def drop(path: Path, episode: int) -> None:
 
 def ends(path: Path) -> dict[int, bool]:
     """Return for every episode of an answer, by number, whether it ended in a fall or was stopped for safety."""
-    found: dict[int, bool] = {}
+    endings: dict[int, bool] = {}
     if path.exists():
         for row in table(path)[1]:
-            found[int(row["episode"])] = is_yes(row["fell"]) or is_yes(row["stopped"])
-    return found
+            endings[int(row["episode"])] = is_yes(row["fell"]) or is_yes(row["stopped"])
+    return endings
 
 
 def table(path: Path) -> tuple[list[str], list[dict[str, str]]]:

@@ -81,8 +81,8 @@ def dry_run(request: Mapping[str, Any]) -> int:
     say("\n".join(robot.rows()))
     needed = request["control_period"]
     say(f"{ticks} steps, {1e3 * each:.2f} ms each of the {1e3 * needed:g} ms there are ({1 / needed:g} Hz)")
-    told = f"{stops} of {len(request['episodes'])} episodes were refused" if stops else "no target was refused"
-    say(f"{told}; nothing was written. A real robot feels its feet and sways: its targets will differ.")
+    result = f"{stops} of {len(request['episodes'])} episodes were refused" if stops else "no target was refused"
+    say(f"{result}; nothing was written. A real robot feels its feet and sways: its targets will differ.")
     return 1 if stops else 0
 
 
@@ -114,8 +114,8 @@ class Sitting:
     def run(self) -> int:
         """Run the episodes that are missing, or those that were named."""
         say(self._request["about"])
-        if told := mend(self._asked.log, self._request):
-            say(told)
+        if message := mend(self._asked.log, self._request):
+            say(message)
         log = self._asked.log
         self._watched(self._player.begin, log, journal.table(log)[0] if log.exists() else None)
         if not self._asked.episode:
@@ -130,7 +130,7 @@ class Sitting:
         return 0
 
     def _tell_missing(self) -> None:
-        missing, unmeasured = self._due(), ", ".join(one["name"] for one in self._list_unmeasured())
+        missing, unmeasured = self._due(), ", ".join(episode["name"] for episode in self._list_unmeasured())
         if missing:
             say(f"{len(missing)} episodes are missing")
         if unmeasured:
@@ -143,10 +143,10 @@ class Sitting:
         log, episodes = self._asked.log, self._request["episodes"]
         if not self._request["distance"] or not log.exists() or "base.position.x" in journal.table(log)[0]:
             return []
-        told = journal.read_returns(self._returns)
-        known = {name for name, row in told.items() if row.get("distance") or row.get("value") or _fell(row)}
+        returns = journal.read_returns(self._returns)
+        measured = {name for name, row in returns.items() if row.get("distance") or row.get("value") or _fell(row)}
         standing = [episodes[number] for number, down in sorted(journal.ends(log).items()) if not down]
-        return [one for one in standing if one["name"] not in known]
+        return [episode for episode in standing if episode["name"] not in measured]
 
     def _one(self, episode: Mapping[str, Any]) -> None:
         """Run an episode; what it came to is written before the robot moves on, as that may fail, too."""
@@ -171,7 +171,7 @@ class Sitting:
         left = self._back(episode, fault, down=down, hold=hold)
         if played is not None and played.broken:
             try:
-                self._keep(episode, self._broken(played))
+                self._keep(episode, self._ask_why_broken(played))
             except BaseException as error:
                 fault = error
         if fault is not None or left:
@@ -216,10 +216,10 @@ class Sitting:
             journal.forget(self._returns, episode["name"])
             journal.keep(self._asked.log, self._request["hash"], played.columns, played.rows)
         ended = f"; refused: {played.stopped}; held, then ramped out" if played.stopped else ""
-        told = f", {late}" if played.late > LATE else ""
-        say(f"{episode['name']}: {len(played.rows) - 1} steps{told}{', fell' * played.fell}{ended}")
+        delay = f", {late}" if played.late > LATE else ""
+        say(f"{episode['name']}: {len(played.rows) - 1} steps{delay}{', fell' * played.fell}{ended}")
 
-    def _broken(self, played: Played) -> Played:
+    def _ask_why_broken(self, played: Played) -> Played:
         """Ask why a person broke an episode off: a fall is a result and must not be lost, anything else is none."""
         with suppress(NobodyToAsk):
             if len(played.rows) > 1 and not self._asked.yes and self._yes("was it a fall? y keeps it, n runs it again"):
@@ -231,18 +231,18 @@ class Sitting:
         if self._asked.yes:
             return
         question = "distance walked forward [m], f if it fell, Enter to write it into returns.csv later: "
-        while not _is_distance(told := _typed(question)):
-            say(f"'{told}' is no number of metres")
-        if told:
-            fallen = told == "f"
+        while not _is_distance(answer := _read_line(question)):
+            say(f"'{answer}' is no number of metres")
+        if answer:
+            fallen = answer == "f"
             journal.add_return(
-                self._returns, self._request["hash"], episode["name"], "" if fallen else told, fell=fell or fallen
+                self._returns, self._request["hash"], episode["name"], "" if fallen else answer, fell=fell or fallen
             )
 
     def _sitting(self) -> Iterator[Mapping[str, Any]]:
         """Yield those that are named, or what is due, asked again and again: a fall may spare what would follow."""
         if self._asked.episode:
-            yield from (one for one in self._request["episodes"] if one["name"] in self._asked.episode)
+            yield from (episode for episode in self._request["episodes"] if episode["name"] in self._asked.episode)
             return
         while missing := self._due():
             yield missing[0]
@@ -254,16 +254,16 @@ class Sitting:
         return list(due(self._request, {*ends, *fallen}, {name for name, down in ends.items() if down} | fallen))
 
     def _ask(self, question: str) -> bool:
-        return self._asked.yes or _typed(f"{question}: ") != "q"
+        return self._asked.yes or _read_line(f"{question}: ") != "q"
 
     def _yes(self, question: str) -> bool:
-        return _typed(f"{question}: ") in ("y", "yes")
+        return _read_line(f"{question}: ") in ("y", "yes")
 
     def _seconds(self, episode: Mapping[str, Any]) -> float:
         return float(episode["steps"] * self._request["control_period"])
 
 
-def _typed(question: str) -> str:
+def _read_line(question: str) -> str:
     try:
         return input(question).strip().lower()
     except (EOFError, OSError, RuntimeError, ValueError) as error:  # stdin is closed, or no text comes from it
@@ -285,8 +285,8 @@ def _fell(row: Mapping[str, str]) -> bool:
     return journal.is_yes(row.get("fell"))
 
 
-def _is_distance(told: str) -> bool:
+def _is_distance(text: str) -> bool:
     try:
-        return told in ("", "f") or abs(float(told)) < MOST
+        return text in ("", "f") or abs(float(text)) < MOST
     except ValueError:
         return False

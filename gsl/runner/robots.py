@@ -21,11 +21,11 @@ def robot_of(path: Path) -> Any:
     """
     if not path.is_file():
         raise RobotError(f"{path} does not exist; --robot names the file with read() and send(), --dry-run needs none")
-    found = importlib.util.spec_from_file_location("robot", path)
-    assert found is not None and found.loader is not None
-    module = importlib.util.module_from_spec(found)
+    spec = importlib.util.spec_from_file_location("robot", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
     try:
-        found.loader.exec_module(module)
+        spec.loader.exec_module(module)
     except Exception as error:
         raise RobotError(f"{path} cannot be loaded: {type(error).__name__}: {error}") from error
     for name in ("read", "send"):

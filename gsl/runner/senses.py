@@ -34,27 +34,27 @@ class Senses:
         self._layout = layout
         self._before: tuple[float, np.ndarray] | None = None
 
-    def seen(self, told: Mapping[str, Any], now: float) -> Seen:
+    def interpret(self, reading: Mapping[str, Any], now: float) -> Seen:
         """Return what a dictionary of `read` says at a time [s].
 
         Raises:
             RobotError: Something is missing, of another size, not finite or unknown.
         """
-        if not isinstance(told, Mapping):
-            raise RobotError(f"read() gives {type(told).__name__}, not a dictionary")
+        if not isinstance(reading, Mapping):
+            raise RobotError(f"read() gives {type(reading).__name__}, not a dictionary")
         n, sizes = len(self._layout.joints), self._layout.sizes
-        known = {**sizes, **BODY, **dict.fromkeys(JOINTS, n), FELL: 1}
-        for name in told:
-            if name not in known:
-                raise RobotError(f"read() gives '{name}', which is none of {', '.join(sorted(known))}")
-        values = {name: _numbers(name, value, known[name]) for name, value in told.items() if name != FELL}
+        allowed = {**sizes, **BODY, **dict.fromkeys(JOINTS, n), FELL: 1}
+        for name in reading:
+            if name not in allowed:
+                raise RobotError(f"read() gives '{name}', which is none of {', '.join(sorted(allowed))}")
+        values = {name: _numbers(name, value, allowed[name]) for name, value in reading.items() if name != FELL}
         values = self._with_velocity(values, now)
         for name in sizes:
             if name not in values:
                 raise RobotError(f"read() gives no '{name}', which the policies need")
         observation = np.concatenate([values[name] for name in sizes])
         more = {name: value for name, value in values.items() if name not in sizes}
-        return Seen(observation, _columns(more, self._layout.joints), _yes(told.get(FELL, False)))
+        return Seen(observation, _columns(more, self._layout.joints), _yes(reading.get(FELL, False)))
 
     def _with_velocity(self, values: dict[str, np.ndarray], now: float) -> dict[str, np.ndarray]:
         """Add the difference of positions where a robot has no velocities."""

@@ -62,41 +62,43 @@ class Answer:
         files = {role: path for role, path in self.parents().items() if role != "request"}
         if not files:
             raise ArtifactError(self.request, "there is nothing to take in: say logs=, returns= or both")
-        told = {}
+        answers = {}
         if self.returns:
-            told = read_returns(files["returns"], request)
+            answers = read_returns(files["returns"], request)
             shutil.copyfile(files["returns"], folder / RETURNS)
         if self.logs:
             self._take_in(files["logs"], folder / FILE, request)
             logs = read_log(folder / FILE, request)
-            check_lengths(files["logs"], request, logs, {name for name, one in told.items() if one.fell})
+            check_lengths(files["logs"], request, logs, {name for name, answer in answers.items() if answer.fell})
             for line in check_answers(request, logs, files["logs"]):
                 console.status(f"warning: {line}")
-            told = {**told, **logs}
-        missing = [one["name"] for one in request["episodes"] if one["name"] not in told]
-        falls = sum(one.fell for one in told.values())
-        return {"episodes": len(told), "asked": len(request["episodes"]), "falls": falls, "missing": missing}
+            answers = {**answers, **logs}
+        missing = [episode["name"] for episode in request["episodes"] if episode["name"] not in answers]
+        falls = sum(answer.fell for answer in answers.values())
+        return {"episodes": len(answers), "asked": len(request["episodes"]), "falls": falls, "missing": missing}
 
     def _take_in(self, source: Path, out: Path, request: Mapping[str, Any]) -> None:
         """Write the logged episodes by the names that the request has for them."""
-        known, found = _csv(source, request) if source.suffix == ".csv" else _parquet(source, request)
+        marked, episodes = _csv(source, request) if source.suffix == ".csv" else _parquet(source, request)
         asked = {episode["name"]: episode for episode in request["episodes"]}
-        names = self.episodes or known or tuple(asked)
-        for name, episode in read_named(source, names, found, request).items():
+        names = self.episodes or marked or tuple(asked)
+        for name, episode in read_named(source, names, episodes, request).items():
             check_rate(source, name, episode, request)
         about = {"robot": request["robot"], "role": "real", "source": source.name, "request": request["hash"]}
-        told = [{"name": name, "policy": asked[name]["policy"]} for name in names]
+        labels = [{"name": name, "policy": asked[name]["policy"]} for name in names]
         joints, period = tuple(request["joints"]), request["control_period"]
-        trajectories.write(out, Batch(tuple(found), joints, period, {**about, "episodes": told}))
+        trajectories.write(out, Batch(tuple(episodes), joints, period, {**about, "episodes": labels}))
 
 
 def _csv(source: Path, request: Mapping[str, Any]) -> tuple[tuple[str, ...], list[Trajectory]]:
     """Return the names, if it is the runner's own, and the episodes of a file; a stop for safety is a fall."""
-    if told := read_mark(source):
-        check_marked(source, told, request)
+    if mark := read_mark(source):
+        check_marked(source, mark, request)
     by_name = list(csv_episodes(source, request))
-    names, found = tuple(name for name, _ in by_name) if told else (), [episode for _, episode in by_name]
-    return names, [replace(one, fell=_down(one), sensors=_without(one.sensors, STOPPED)) for one in found]
+    names, episodes = tuple(name for name, _ in by_name) if mark else (), [episode for _, episode in by_name]
+    return names, [
+        replace(episode, fell=_down(episode), sensors=_without(episode.sensors, STOPPED)) for episode in episodes
+    ]
 
 
 def _down(episode: Trajectory) -> np.ndarray:
@@ -112,9 +114,9 @@ def _parquet(source: Path, request: Mapping[str, Any]) -> tuple[tuple[str, ...],
     """Return the names, if it says what it answers, and the episodes of a file, joints in the request's order."""
     batch = trajectories.read(source, joints=tuple(request["joints"]))
     names: tuple[str, ...] = ()
-    if told := str(batch.metadata.get("request", "")):
-        check_marked(source, told, request)
-        names = tuple(str(one.get("name", "")) for one in batch.metadata.get("episodes", []))
+    if mark := str(batch.metadata.get("request", "")):
+        check_marked(source, mark, request)
+        names = tuple(str(label.get("name", "")) for label in batch.metadata.get("episodes", []))
     if missing := [joint for joint in request["joints"] if joint not in batch.joints]:
         raise TrajectoryError(source, f"the joint {missing[0]} was asked for, but is not in it")
     if abs(batch.control_period - request["control_period"]) > 1e-9:
@@ -123,11 +125,11 @@ def _parquet(source: Path, request: Mapping[str, Any]) -> tuple[tuple[str, ...],
     order = [batch.joints.index(joint) for joint in request["joints"]]
     return names, [
         replace(
-            one,
-            action=one.action[:, order],
-            position=one.position[:, order],
-            velocity=one.velocity[:, order],
-            grounded_action=None if one.grounded_action is None else one.grounded_action[:, order],
+            episode,
+            action=episode.action[:, order],
+            position=episode.position[:, order],
+            velocity=episode.velocity[:, order],
+            grounded_action=None if episode.grounded_action is None else episode.grounded_action[:, order],
         )
-        for one in batch.episodes
+        for episode in batch.episodes
     ]

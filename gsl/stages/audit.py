@@ -47,11 +47,11 @@ class Audit:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write audit.json."""
-        found = audit_log(read_logs(self.real), self.sim, self.real)
-        document = {**found.document(), "summary": found.summary, "sim": self.sim.robot, "real": self.real}
+        audit = audit_log(read_logs(self.real), self.sim, self.real)
+        document = {**audit.document(), "summary": audit.summary, "sim": self.sim.robot, "real": self.real}
         documents.write_json(folder / REPORT, document)
-        kinds = [one["kind"] for one in document["findings"]]
-        return {"verdict": found.verdict, "findings": kinds, "headline": found.summary}
+        kinds = [finding["kind"] for finding in document["findings"]]
+        return {"verdict": audit.verdict, "findings": kinds, "headline": audit.summary}
 
     def document(self, folder: Path) -> dict[str, Any]:
         """Return what --json shows of an artifact."""
@@ -70,12 +70,12 @@ def audit_log(batch: Batch, sim: BulletWorld, name: str) -> Found:
     return audit(batch, sim.plant, sim.step, checkpoint)
 
 
-def write_wiring(found: Found, folder: Path, *, real: str, sim: str, command: str) -> Mapping[str, Any]:
+def write_wiring(audit: Found, folder: Path, *, real: str, sim: str, command: str) -> Mapping[str, Any]:
     """Write the report of a diagnosis that ends with the wiring: no physics is named, and no world is corrected."""
-    audited = found.document()
+    audited = audit.document()
     report = {
         "verdict": "wiring",
-        "summary": found.summary,
+        "summary": audit.summary,
         "causes": [],
         "effects": {},
         "wiring": audited["findings"],

@@ -50,7 +50,7 @@ class Budget:
         return self.real_episodes, self.real_neighbours
 
     @property
-    def learned(self) -> str:
+    def in_words(self) -> str:
         """The same in words."""
         return f"{self.real_episodes} real episodes of a policy and {self.real_neighbours} around it to learn from"
 

@@ -37,10 +37,10 @@ from gsl.worlds.external import asking
 
 
 class Round(NamedTuple):
-    """What a round has made: the grounding with its models, what the search found in it, its measurement in real."""
+    """What a round has made: the grounding with its models, the policies a search left, their measurement in real."""
 
     ready: Grounding
-    found: Artifact
+    policies: Artifact
     measured: Artifact
 
 
@@ -87,19 +87,19 @@ class Chain(Links):
             refuse_robots(needed, "forward_model")
             refuse_robots(self.inverse_model, "inverse_model")
         elif self.inverse_model.multi_step > 1:
-            given = str(self.inverse_model.multi_step)
-            raise ConfigError("inverse_model.multi_step", "is of a forward model", given=given)
+            ticks = str(self.inverse_model.multi_step)
+            raise ConfigError("inverse_model.multi_step", "is of a forward model", given=ticks)
 
     def _check_joints(self, grounding: ActionTransformation) -> None:
         """Refuse models that know different joints, and to ground one that they do not know."""
         layout = self.sim.layout
         if layout.states:
             return
-        known = self.forward_model.joints_of_interest(layout.joints, "forward_model")
-        if known != self.inverse_model.joints_of_interest(layout.joints, "inverse_model"):
+        joints = self.forward_model.joints_of_interest(layout.joints, "forward_model")
+        if joints != self.inverse_model.joints_of_interest(layout.joints, "inverse_model"):
             raise ConfigError("inverse_model.variables", "has to name the joints that forward_model.variables names")
         if isinstance(grounding.x, tuple):
-            check_known(grounding.x, known, "grounding.x")
+            check_known(grounding.x, joints, "grounding.x")
 
     def round(
         self,
@@ -114,18 +114,18 @@ class Chain(Links):
     ) -> Round:
         """Ground, optimise and measure below `place`, from the previous policy; a search that is shared, elsewhere."""
         ready = self.ready(place, grounding, previous, seed, console)
-        found = self.search((search or place) / "optimize", ready, previous, seed, console)
-        return Round(ready, found, self.measure(place / "evaluate", found, seed, console, only=only))
+        policies = self.search((search or place) / "optimize", ready, previous, seed, console)
+        return Round(ready, policies, self.measure(place / "evaluate", policies, seed, console, only=only))
 
-    def pretrained(self, place: Path, seed: int, console: Console) -> str:
+    def pretrain(self, place: Path, seed: int, console: Console) -> str:
         """Improve the policy's start values in the plain simulator at `place`; return the file of the best."""
         return str(self.search(place, NoGrounding(), None, seed, console).folder / BEST)
 
-    def diagnosed(self, home: Path, grounding: Grounding, seed: int, console: Console) -> Grounding:
+    def diagnose(self, home: Path, grounding: Grounding, seed: int, console: Console) -> Grounding:
         """Return a grounding that has its diagnosis and its learned servo, made below `home` if it wants its own."""
         common: dict[str, Any] = {"workers": self.workers, "seed": seed, "console": console}
         if isinstance(grounding, DiagnosedEffects) and not grounding.effects:
-            made = self.diagnosis.carried_out(self.real, self.sim, grounding.method, home, **common)
+            made = self.diagnosis.carry_out(self.real, self.sim, grounding.method, home, **common)
             grounding = replace(grounding, diagnosis=str(made.folder))
         inner = innermost(grounding)
         if isinstance(inner, LearnedServo):
@@ -145,14 +145,14 @@ class Chain(Links):
             return train_own(self, home, grounding, previous, seed, console)
         return grounding
 
-    def values(self, out: Path, grounding: Grounding | None, found: Mapping[str, Any], console: Console) -> Artifact:
+    def values(self, out: Path, grounding: Grounding | None, settled: Mapping[str, Any], console: Console) -> Artifact:
         """Measure a fixed set of policies in the simulator with a grounding that is ready; without one, in real."""
         stage = Values(
             world=self.real if grounding is None else self.sim,
             task=self.task,
             policy=self.policy,
             grounding=grounding or NoGrounding(),
-            found={key: found[key] for key in ("alpha", "x", "width") if key in found},
+            found={key: settled[key] for key in ("alpha", "x", "width") if key in settled},
             workers=self.workers,
         )
         return build_link(stage, out, console)
@@ -176,13 +176,13 @@ class Chain(Links):
         )
         return build_link(stage, out, console)
 
-    def measure(self, out: Path, found: Artifact, seed: int, console: Console, only: str = "") -> Artifact:
+    def measure(self, out: Path, policies: Artifact, seed: int, console: Console, only: str = "") -> Artifact:
         """Measure what a search found in the real world, or one file of it only."""
         stage = Evaluate(
             world=asking(self.real, out),
             task=self.task,
             policy=self.policy,
-            policies=str(found.folder / only),
+            policies=str(policies.folder / only),
             episodes=self.budget.episodes,
             check=self.budget.check,
             confirmation=self.budget.confirmation,

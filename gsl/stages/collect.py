@@ -59,8 +59,8 @@ class Collect:
         if self.role == SIM and isinstance(self.world, ExternalRobot):
             raise ConfigError("world", "is a real robot, which cannot play the simulator's part")
         if self.world.layout.choices and self.action_noise > 1.0:
-            given = f"{self.action_noise:g}"
-            raise ConfigError("action_noise", "is the chance of a random choice here, 1 at most", given=given)
+            noise = f"{self.action_noise:g}"
+            raise ConfigError("action_noise", "is the chance of a random choice here, 1 at most", given=noise)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the artifact that the parameters come from, the file that is played, a robot's answer, if any."""
@@ -88,7 +88,7 @@ class Collect:
             ],
         }
         write(folder / FILE, Batch(_alike(episodes), layout.joints, layout.control_period, about))
-        steps, own = sum(map(len, episodes)), [one.value for one in episodes[: self.episodes]]
+        steps, own = sum(map(len, episodes)), [episode.value for episode in episodes[: self.episodes]]
         return {
             "episodes": len(pieces),
             "real_episodes": len(pieces) if self.role == "real" else 0,
@@ -108,8 +108,8 @@ class Collect:
                 return trajectories(scenario, jobs, workers=self.workers, progress=progress)
         orders = [Order(piece.label, job) for piece, job in zip(pieces, jobs, strict=True)]
         errand = Errand("", f"Trajectories to learn from: {len(jobs)} episodes.", until_fall=False, logs=True)
-        found = ask(scenario, orders, errand, workers=self.workers, console=console)
-        return [one.trajectory for one in found if one is not None and one.trajectory is not None]
+        verdicts = ask(scenario, orders, errand, workers=self.workers, console=console)
+        return [verdict.trajectory for verdict in verdicts if verdict is not None and verdict.trajectory is not None]
 
     def _pieces(self) -> tuple[Piece, ...]:
         """Return the episodes of the policy itself, then those of its neighbours."""
@@ -122,8 +122,9 @@ class Collect:
 
 def _alike(episodes: list[Trajectory]) -> tuple[Trajectory, ...]:
     """Let all episodes say what was carried out, if one does."""
-    if all(one.grounded_action is None for one in episodes):
+    if all(episode.grounded_action is None for episode in episodes):
         return tuple(episodes)
     return tuple(
-        one if one.grounded_action is not None else replace(one, grounded_action=one.action) for one in episodes
+        episode if episode.grounded_action is not None else replace(episode, grounded_action=episode.action)
+        for episode in episodes
     )

@@ -99,7 +99,7 @@ class CrossValidate:
         refuse_hook(self.sim.plant)
         if not self.usual:
             raise ConfigError("usual", "names at least one effect to compare with")
-        everywhere = {one.effect for one in library(lump(self.sim.plant.robot)) if one.on_joints}
+        everywhere = {candidate.effect for candidate in library(lump(self.sim.plant.robot)) if candidate.on_joints}
         for name in self.usual:
             effect_class(name)
             if name in self.without or name not in everywhere:
@@ -126,14 +126,14 @@ class CrossValidate:
             if (column := next(find_other_commands(log), None)) is not None:
                 raise ConfigError("gat", f"learns positions alone, and the log has {column}; gat=null leaves it out")
             for group in groups:
-                lengths = [usable(one) for one in self._rest(log, group).episodes]
+                lengths = [usable(episode) for episode in self._rest(log, group).episodes]
                 self.gat.check(lengths, f"the trajectories without {self.by} {', '.join(map(str, group))}")
         after = [*groups[1:], groups[0]] if self.checks == "values" else [[]] * len(groups)
         folds = [self._fold(log, *pair, console) for pair in zip(groups, after, strict=True)]
-        documents.write_json(folder / DATA, [one.told() for one in folds])
+        documents.write_json(folder / DATA, [fold.document() for fold in folds])
         (folder / TABLE).write_text(table(folds, self.by), encoding="utf-8")
-        means = {way: float(np.mean(np.concatenate([one.replayed[way] for one in folds]))) for way in folds[0].errors}
-        return {"folds": len(folds), "mean_error": means, "causes": {one.held_out: one.causes for one in folds}}
+        means = {way: float(np.mean(np.concatenate([fold.replayed[way] for fold in folds]))) for way in folds[0].errors}
+        return {"folds": len(folds), "mean_error": means, "causes": {fold.held_out: fold.causes for fold in folds}}
 
     def _groups(self, log: Batch) -> list[list[Any]]:
         """Return what is held out together: each value alone, or every so many'th of them in order."""
@@ -149,73 +149,73 @@ class CrossValidate:
 
     def _values(self, log: Batch) -> list[Any]:
         labels = log.metadata.get("episodes") or []
-        found: list[Any] = []
-        for one in labels:
-            if isinstance(value := one.get(self.by), SINGLE) and not any(alike(value, other) for other in found):
-                found.append(value)
-        if len(found) < 2:
-            known = ", ".join(sorted({key for one in labels for key in one if isinstance(one[key], SINGLE)}))
-            known = known or "there are none"
-            problem = f"needs a label with two values at least; the log's labels: {known}"
+        values: list[Any] = []
+        for label in labels:
+            if isinstance(value := label.get(self.by), SINGLE) and not any(alike(value, other) for other in values):
+                values.append(value)
+        if len(values) < 2:
+            names = ", ".join(sorted({key for label in labels for key in label if isinstance(label[key], SINGLE)}))
+            names = names or "there are none"
+            problem = f"needs a label with two values at least; the log's labels: {names}"
             raise ConfigError("by", problem, given=self.by)
-        return sorted(found, key=lambda value: (str(type(value)), value))
+        return sorted(values, key=lambda value: (str(type(value)), value))
 
     def _fold(self, log: Batch, values: list[Any], inner: list[Any], console: Console) -> Fold:
         """Diagnose the trajectories without some values, which know nothing of the others; these are looked at once."""
-        told = f"{self.by} {', '.join(map(str, values))}"
-        console.status(f"{told} is held out")
+        title = f"{self.by} {', '.join(map(str, values))}"
+        console.status(f"{title} is held out")
         options = Options(
             self.without, self.most, self.duels, self.nulls, threads(self.workers), share_clock(log, self.clocks),
             seed=self.seed, tolerance=self.tolerance, held_out={self.by: inner} if inner else {},
         )  # fmt: skip
         plant, robot = self.sim.plant, lump(self.sim.plant.robot)
-        found = diagnose(self._rest(log, values), plant, self.sim.step, options, PhaseReporter(console))
-        exp, chosen = prepare(log, robot, replace(options, held_out={self.by: values})), found.selection.chosen
-        before = found.simulator.simulate({}, no_shifts(len(exp.joints)), exp.pieces)
-        after = found.simulator.simulate(chosen.effects, chosen.fit.shifts, exp.pieces)
-        causes = [chosen.names[one.index] for one in found.verdict.causes]
-        console.status(f"{told}: {' '.join([found.verdict.word, *causes])}")
-        errors, servos = self._errors(found, _check(exp))
+        findings = diagnose(self._rest(log, values), plant, self.sim.step, options, PhaseReporter(console))
+        exp, chosen = prepare(log, robot, replace(options, held_out={self.by: values})), findings.selection.chosen
+        before = findings.simulator.simulate({}, no_shifts(len(exp.joints)), exp.pieces)
+        after = findings.simulator.simulate(chosen.effects, chosen.fit.shifts, exp.pieces)
+        causes = [chosen.names[cause.index] for cause in findings.verdict.causes]
+        console.status(f"{title}: {' '.join([findings.verdict.word, *causes])}")
+        errors, servos = self._errors(findings, _check(exp))
         return Fold(
             values=values,
-            verdict=found.verdict.word,
+            verdict=findings.verdict.word,
             causes=causes,
             parameters=chosen.effects,
             removed=compute_removed(exp, exp.residual(before), exp.residual(after))[0],
             ceiling=ceiling(exp, before, seed=self.seed),
-            names=[one.name for one in _check(exp)],
+            names=[record.name for record in _check(exp)],
             errors=errors,
             servos=servos,
         )
 
     def _rest(self, log: Batch, values: list[Any]) -> Batch:
         labels = log.metadata["episodes"]
-        kept = [k for k, one in enumerate(labels) if not any(alike(one.get(self.by), value) for value in values)]
+        kept = [k for k, label in enumerate(labels) if not any(alike(label.get(self.by), value) for value in values)]
         about = {**log.metadata, "episodes": [labels[k] for k in kept]}
         return replace(log, episodes=tuple(log.episodes[k] for k in kept), metadata=about)
 
-    def _errors(self, found: Findings, held: Sequence[Record]) -> tuple[dict[str, list[float]], dict[str, Any]]:
+    def _errors(self, findings: Findings, held: Sequence[Record]) -> tuple[dict[str, list[float]], dict[str, Any]]:
         """Return the mean absolute error of every held-out trajectory [rad] by what replays it, and what servos say."""
-        n = len(found.log.joints)
+        n = len(findings.log.joints)
         ways: dict[str, tuple[Mapping[str, Any], np.ndarray]] = {AS_IT_WAS: ({}, no_shifts(n))}
-        fits = {CALIBRATED: found.selection.none, _names(self.usual): _usual(found, self.usual)}
-        for way, fit in {**fits, DIAGNOSED: found.selection.chosen}.items():
+        fits = {CALIBRATED: findings.selection.none, _names(self.usual): _usual(findings, self.usual)}
+        for way, fit in {**fits, DIAGNOSED: findings.selection.chosen}.items():
             ways[way] = fit.effects, fit.fit.shifts
-        robot = found.log.robot
+        robot = findings.log.robot
         errors = {
-            way: mean_errors(found.simulator, effects, nuisances, held, robot).mean(axis=1).tolist()
+            way: mean_errors(findings.simulator, effects, nuisances, held, robot).mean(axis=1).tolist()
             for way, (effects, nuisances) in ways.items()
         }
         for name, way in ((GAT, AS_IT_WAS), (DIAGNOSED_GAT, DIAGNOSED)) if self.gat is not None else ():
             assert self.gat is not None
-            world = Simulated(self.sim, found.simulator, robot, *ways[way])
-            errors[name] = self.gat.errors(world, found.log.records, held, self.seed)
+            world = Simulated(self.sim, findings.simulator, robot, *ways[way])
+            errors[name] = self.gat.errors(world, findings.log.records, held, self.seed)
         servos: dict[str, Any] = {}
         for name, way in ((SERVO, AS_IT_WAS), (DIAGNOSED_SERVO, DIAGNOSED)) if self.servo else ():
             effects, nuisances = ways[way]
-            plant = change(found.simulator.plant, effects, nuisances)
+            plant = change(findings.simulator.plant, effects, nuisances)
             errors[name], servos[name] = servo_errors(
-                found.log, plant, found.simulator.step, held, seed=self.seed, threads=threads(self.workers)
+                findings.log, plant, findings.simulator.step, held, seed=self.seed, threads=threads(self.workers)
             )
         return errors, servos
 
@@ -225,12 +225,12 @@ def _check(exp: Log) -> list[Record]:
     return [exp.records[k] for k in np.unique(exp.pieces.record[exp.held_out])]
 
 
-def _usual(found: Findings, effects: Sequence[str]) -> Hypothesis:
+def _usual(findings: Findings, effects: Sequence[str]) -> Hypothesis:
     """Return these effects on all joints, fitted together as a diagnosis fits a hypothesis."""
-    problem = found.problem
-    everywhere = {one.effect: one for one in library(found.log.robot) if one.on_joints}
+    problem = findings.problem
+    everywhere = {candidate.effect: candidate for candidate in library(findings.log.robot) if candidate.on_joints}
     chosen = tuple(everywhere[name] for name in effects)
-    start = [one.neutral + SLIGHT * (one.documented[1] - one.neutral) for one in chosen]
+    start = [candidate.neutral + SLIGHT * (candidate.documented[1] - candidate.neutral) for candidate in chosen]
     return problem.fit(chosen, np.concatenate(start), no_shifts(problem.train.joints), every=1, rounds=8)
 
 

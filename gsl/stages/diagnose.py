@@ -156,7 +156,7 @@ class Diagnose:
             own=self._own(findings),
         )
         if self.limits:
-            report["limits"] = [asdict(one) for one in limits(findings, report["shrinkage"], tick)]
+            report["limits"] = [asdict(limit) for limit in limits(findings, report["shrinkage"], tick)]
         report["caveats"] += filter(None, [*remarks, self._stranger(batch), clock_caveat(batch, self.clocks)])
         documents.write_json(folder / REPORT, report)
         (folder / PAGE).write_text(report_html(report), encoding="utf-8")
@@ -169,7 +169,7 @@ class Diagnose:
             )
         return {
             "verdict": report["verdict"],
-            "causes": [one["effect"] for one in report["causes"]],
+            "causes": [cause["effect"] for cause in report["causes"]],
             "before": report["shrinkage"]["before"],
             "after": report["shrinkage"]["after"],
             "fraction": report["shrinkage"]["fraction"],
@@ -211,7 +211,7 @@ class Diagnose:
             + (" with " if self.sim.effects else "")
             + ", ".join(self.sim.effects),
             "records": len(log.records),
-            "seconds": sum(len(one) for one in log.records) * log.period,
+            "seconds": sum(len(record) for record in log.records) * log.period,
             "train": len(log.records) - len(held) if log.by_record else len(log.records),
             "held_out": len(held),
             "windows": len(log.pieces),

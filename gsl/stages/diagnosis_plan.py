@@ -43,7 +43,7 @@ class DiagnosisPlan:
     evaluations: Annotated[int, setting("replays that an identification may take", ge=16)] = 4800
     without: Without = ()
 
-    def carried_out(
+    def carry_out(
         self, real: World, sim: World, method: str, home: Path, *, workers: int, seed: int, console: Console
     ) -> Artifact:
         """Return what a method finds of a simulator in an excitation of the real robot, both built below `home`.

@@ -73,7 +73,7 @@ def searched(iterate: Iterate) -> int:
     optimizer = iterate.optimizer
     if isinstance(optimizer, Search):
         return optimizer.generations * optimizer.candidates * iterate.budget.rollouts
-    return optimizer.taken + optimizer.generations * iterate.budget.rollouts
+    return optimizer.steps_taken + optimizer.generations * iterate.budget.rollouts
 
 
 def measured(iterate: Iterate) -> int:

@@ -86,38 +86,38 @@ class Evaluate:
         """Write the table of all policies and the chosen one."""
         if getattr(self.world, "action_noise", 0.0):
             warn_uncharged(self.world, console, REAL, "the world's noise")
-        found = records(self.policy, self.policies) if self.policies else [self._start]
+        thetas = records(self.policy, self.policies) if self.policies else [self._start]
         measure = partial(self._measure, console=console)
-        tried = measure(found, _CHOICE, self.episodes)
-        checked = dict(self._check(found, tried, measure))
+        tried = measure(thetas, _CHOICE, self.episodes)
+        checked = dict(self._check(thetas, tried, measure))
         best = self._pick_passing(checked)
         reported = sorted({0, best})
-        fresh = dict(zip(reported, measure([found[i] for i in reported], _REPORT, self.confirmation), strict=True))
-        rows = [row(theta, done) for theta, done in zip(found, tried, strict=True)]
-        again = [[row(found[index], done) for index, done in phase.items()] for phase in (checked, fresh)]
+        fresh = dict(zip(reported, measure([thetas[i] for i in reported], _REPORT, self.confirmation), strict=True))
+        rows = [row(theta, done) for theta, done in zip(thetas, tried, strict=True)]
+        again = [[row(thetas[index], done) for index, done in phase.items()] for phase in (checked, fresh)]
         document = {"policies": rows, "check": again[0], "confirmation": again[1]}
         write_json(folder / EVALUATION, document)
-        write_policies(folder / FILE, policies(self.policy, self.task, [found[best]]))
+        write_policies(folder / FILE, policies(self.policy, self.task, [thetas[best]]))
         stable = [done for done in tried[1:] if self._stable(done)]
-        promised = promise(found, best, summary(fresh[best]), Unit.of(self.task))
+        promised = promise(thetas, best, summary(fresh[best]), Unit.of(self.task))
         if promised and promised["warning"]:
             console.status(f"warning: {promised['warning']}")
         metrics = {
-            "best": found[best].name,
-            "best_generation": found[best].generation or 0,
-            "returned_value_sim": found[best].value_sim,
+            "best": thetas[best].name,
+            "best_generation": thetas[best].generation or 0,
+            "returned_value_sim": thetas[best].value_sim,
             "promise": promised,
             "baseline": summary(fresh[0]),
             "returned": summary(fresh[best]),
             "last": summary(tried[-1]),
             "gain": gain(fresh[best], fresh[0]),
-            "failed_check": [found[index].name for index in checked if index not in (0, best)],
+            "failed_check": [thetas[index].name for index in checked if index not in (0, best)],
             "stable_policies": len(stable),
             "improving_policies": sum(mean(done) > mean(fresh[0]) for done in stable),
-            "policies": len(found) - 1,
+            "policies": len(thetas) - 1,
             "real_episodes": sum(map(len, [*tried, *checked.values(), *fresh.values()])),
         }
-        first, chosen = (vector(self.policy, found[index]).tolist() for index in (0, best))
+        first, chosen = (vector(self.policy, thetas[index]).tolist() for index in (0, best))
         change = Change(self.policy.names, first, chosen, self.policy.scale.tolist())
         write_evaluation_page(folder, metrics, document, change, Unit.of(self.task))
         return metrics
@@ -127,7 +127,10 @@ class Evaluate:
         return record(self.policy, "pi0", self.policy.initial)
 
     def _check(
-        self, found: Sequence[PolicyRecord], tried: Sequence[list[Episode]], measure: Callable[..., list[list[Episode]]]
+        self,
+        thetas: Sequence[PolicyRecord],
+        tried: Sequence[list[Episode]],
+        measure: Callable[..., list[list[Episode]]],
     ) -> Iterator[tuple[int, list[Episode]]]:
         """Yield the checks of stable policies that beat the baseline, up to the first that passes.
 
@@ -139,7 +142,7 @@ class Evaluate:
             order = [0, *order[:CHALLENGERS]]
         checked: dict[int, list[Episode]] = {}
         for index in order:
-            (checked[index],) = measure([found[index]], _CHECK, self.check)
+            (checked[index],) = measure([thetas[index]], _CHECK, self.check)
             yield index, checked[index]
             if self._pick_passing(checked):
                 return
@@ -173,8 +176,8 @@ class Evaluate:
             name = f"{purpose}_{thetas[0].name}" if purpose == _CHECK else purpose
             words = (_TO_THE_END if to_the_end else _UNTIL_FALL)[purpose].format(len(thetas), count)
             errand = Errand(name, words, not to_the_end, logs=False)
-            found = ask(scenario, orders, errand, workers=self.workers, console=console)
-            done = [None if one is None else one.episode for one in found]
+            verdicts = ask(scenario, orders, errand, workers=self.workers, console=console)
+            done = [None if verdict is None else verdict.episode for verdict in verdicts]
         else:
             with console.progress(len(jobs), f"{purpose} in the real world") as progress:
                 done = episodes(scenario, jobs, workers=self.workers, progress=progress)
@@ -194,9 +197,9 @@ def check_tolerated(tolerated: float, check: int) -> None:
 
 def _ahead(done: Sequence[Episode], other: Sequence[Episode]) -> bool:
     """Whether some episodes have a higher mean than others, and surely so or with surely fewer falls; two of each."""
-    values = (np.array([episode.value for episode in one]) for one in (done, other))
+    values = (np.array([episode.value for episode in episodes]) for episodes in (done, other))
     difference = difference_interval(*values, confidence=2.0 * SURE - 1.0)
-    fallen = [(falls(one), len(one) - falls(one)) for one in (done, other)]
+    fallen = [(falls(episodes), len(episodes) - falls(episodes)) for episodes in (done, other)]
     fewer = stats.fisher_exact(fallen, alternative="less").pvalue < 1.0 - SURE
     return bool(difference.lower > 0.0 or (difference.mean > 0.0 and fewer))
 
@@ -204,8 +207,8 @@ def _ahead(done: Sequence[Episode], other: Sequence[Episode]) -> bool:
 def _until_fall(done: Sequence[Episode | None], *, to_the_end: bool) -> list[Episode]:
     """Return the episodes that count: where a fall ends a policy's chances, those up to its first one."""
     kept: list[Episode] = []
-    for one in done:
-        if one is None or (kept and kept[-1].fell and not to_the_end):
+    for episode in done:
+        if episode is None or (kept and kept[-1].fell and not to_the_end):
             break
-        kept.append(one)
+        kept.append(episode)
     return kept

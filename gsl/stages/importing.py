@@ -53,50 +53,56 @@ class Import:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write one parquet file, and what was found as a document."""
         chosen = look_at(self._source(), self.mapping, self.memory * GB)
-        found = [
-            one for place in self._progress(chosen, console) for one in self._episodes(place, chosen.mapping, console)
+        imported = [
+            episode
+            for place in self._progress(chosen, console)
+            for episode in self._episodes(place, chosen.mapping, console)
         ]
-        told = self._describe(found, chosen)
-        if told["refused"] and not self.accept:
-            more = f" (and {len(told['refused']) - 1} more, see --check)" if len(told["refused"]) > 1 else ""
-            raise InputError(f"{self._source()}: {told['refused'][0]}{more}; accept=true takes it as it is")
-        for kind, lines in (("note", told["notes"]), ("warning", [*told["refused"], *told["warnings"]])):
+        document = self._describe(imported, chosen)
+        if document["refused"] and not self.accept:
+            more = f" (and {len(document['refused']) - 1} more, see --check)" if len(document["refused"]) > 1 else ""
+            raise InputError(f"{self._source()}: {document['refused'][0]}{more}; accept=true takes it as it is")
+        for kind, lines in (("note", document["notes"]), ("warning", [*document["refused"], *document["warnings"]])):
             for line in lines:
                 console.status(f"{kind}: {line}")
-        documents.write_json(folder / REPORT, told)
-        write(folder / FILE, self._batch(found, told, chosen.mapping))
-        return {key: told[key] for key in ("files", "control_period", "time", "velocity", "warnings")} | {
-            "episodes": len(found),
-            "joints": list(found[0].joints),
-            "steps": sum(len(one.trajectory) for one in found),
-            "seconds": sum(float(one.trajectory.time[-1]) for one in found),
+        documents.write_json(folder / REPORT, document)
+        write(folder / FILE, self._batch(imported, document, chosen.mapping))
+        return {key: document[key] for key in ("files", "control_period", "time", "velocity", "warnings")} | {
+            "episodes": len(imported),
+            "joints": list(imported[0].joints),
+            "steps": sum(len(episode.trajectory) for episode in imported),
+            "seconds": sum(float(episode.trajectory.time[-1]) for episode in imported),
         }
 
     def look(self, console: Console) -> dict[str, Any]:
         """Say what `run` would do, and return it with the exit code that it would have."""
         chosen = look_at(self._source(), self.mapping, self.memory * GB)
-        found, problems = list[Episode](), list[str]()
+        imported, problems = list[Episode](), list[str]()
         for place in self._progress(chosen, console):
             try:
-                found += self._episodes(place, chosen.mapping, console)
+                imported += self._episodes(place, chosen.mapping, console)
             except ConfigError:
                 raise
             except InputError as error:
                 problems.append(str(error))
-        told = self._describe(found, chosen) if found else {"refused": [], "warnings": [], "notes": chosen.notes}
-        for table in tables(told) if found else ():
+        empty = {"refused": [], "warnings": [], "notes": chosen.notes}
+        document = self._describe(imported, chosen) if imported else empty
+        for table in tables(document) if imported else ():
             console.table(*table)
-        refused = [*problems, *([] if self.accept else told["refused"])]
+        refused = [*problems, *([] if self.accept else document["refused"])]
         lines = [
-            *(f"note: {line}" for line in told["notes"]),
+            *(f"note: {line}" for line in document["notes"]),
             *(f"refused: {line}" for line in refused),
-            *(f"warning: {line}" for line in told["warnings"]),
+            *(f"warning: {line}" for line in document["warnings"]),
         ]
-        if found:
-            lines += [f"{told['time']}; velocities {told['velocity']}; control period {told['control_period']:g} s"]
+        if imported:
+            lines += [
+                f"{document['time']}; velocities {document['velocity']}; "
+                f"control period {document['control_period']:g} s"
+            ]
         lines += [f"would be refused ({len(refused)}); nothing is written" if refused else "nothing is written"]
         return {
-            **told,
+            **document,
             "refused": refused,
             "source": self._source(),
             "said": "\n".join(lines),
@@ -120,25 +126,25 @@ class Import:
             if path.is_file() and (size := path.stat().st_size) > LARGE:
                 console.status(f"reading {path}, {size / GB:.2g} GB; with {self.memory:g} GB of memory at most")
         checkpoint()
-        return [one for raw in raw_episodes(place, mapping, self.memory * GB) for one in episodes(raw, mapping)]
+        return [episode for raw in raw_episodes(place, mapping, self.memory * GB) for episode in episodes(raw, mapping)]
 
-    def _describe(self, found: list[Episode], chosen: Source) -> dict[str, Any]:
-        first = found[0]
-        for one in found:
-            if one.joints != first.joints or one.trajectory.sensors.keys() != first.trajectory.sensors.keys():
+    def _describe(self, imported: list[Episode], chosen: Source) -> dict[str, Any]:
+        first = imported[0]
+        for episode in imported:
+            if episode.joints != first.joints or episode.trajectory.sensors.keys() != first.trajectory.sensors.keys():
                 problem = f"has other joints or signals than {first.label['file']}; import it alone"
-                raise TrajectoryError(one.label["file"], problem)
+                raise TrajectoryError(episode.label["file"], problem)
         files = len({path for place in chosen.places for path in place.files.values()})
         period = self.mapping.period
         kept = f"resampled to {period:g} s (positions linearly, commands held)" if period else "rows kept as logged"
-        derived = sum(one.derived for one in found)
-        which = "" if derived in (0, len(found)) else f" in {derived} of {len(found)} episodes"
+        derived = sum(episode.derived for episode in imported)
+        which = "" if derived in (0, len(imported)) else f" in {derived} of {len(imported)} episodes"
         velocity = f"derived from positions{which}" if derived else "as logged"
-        told = report(found, files, period, chosen.mapping.turning)
-        warnings = [*told["warnings"], *list_unmatched(found, self.mapping)]
-        return {**told, "warnings": warnings, "notes": chosen.notes, "time": kept, "velocity": velocity}
+        document = report(imported, files, period, chosen.mapping.turning)
+        warnings = [*document["warnings"], *list_unmatched(imported, self.mapping)]
+        return {**document, "warnings": warnings, "notes": chosen.notes, "time": kept, "velocity": velocity}
 
-    def _batch(self, found: list[Episode], told: Mapping[str, Any], mapping: LogMapping) -> Batch:
+    def _batch(self, imported: list[Episode], document: Mapping[str, Any], mapping: LogMapping) -> Batch:
         own = {name: signal.unit for name, signal in mapping.signals.items() if name not in KNOWN}
         about = {
             "robot": mapping.robot,
@@ -146,7 +152,9 @@ class Import:
             "source": "gsl import",
             "units": own,
             "clocks": "synchronised" if self.mapping.synchronised else "unsynchronised",
-            **{key: told[key] for key in ("time", "velocity")},
-            "episodes": [dict(one.label) for one in found],
+            **{key: document[key] for key in ("time", "velocity")},
+            "episodes": [dict(episode.label) for episode in imported],
         }
-        return Batch(tuple(one.trajectory for one in found), found[0].joints, told["control_period"], about)
+        return Batch(
+            tuple(episode.trajectory for episode in imported), imported[0].joints, document["control_period"], about
+        )

@@ -104,12 +104,12 @@ class Iterate:
         self.chain.check(self.grounding)
         try_out({"sim": self.sim, "real": self.real})
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
-        parts, told = foresee(self)
-        if told:
-            console.status(told)
+        parts, message = foresee(self)
+        if message:
+            console.status(message)
         title = in_unit("grounded simulation learning", self.task.unit)
         with console.plan("stage", parts), console.live_table(title, rounds.columns) as table:
-            start = self.chain.pretrained(home / "pretrained", self.seed, console) if self.pretrained else None
+            start = self.chain.pretrain(home / "pretrained", self.seed, console) if self.pretrained else None
             grounding = self._diagnose(home, rounds, console)
             chain = self.chain
             for number in range(1, self.iterations + 1):
@@ -121,12 +121,12 @@ class Iterate:
                 except Refused as refusal:
                     if number == 1:
                         raise
-                    table.row(*rounds.refused(refusal.why, self._collected_real))
+                    table.row(*rounds.add_refusal(refusal.why, self._real_episodes))
                     console.status(f"warning: {refusal}")
                     break
                 chain = chain.after(place)
                 first = done.ready if number == 1 else first
-                for row in rounds.add(done.measured, self._collected_real):
+                for row in rounds.add(done.measured, self._real_episodes):
                     table.row(*row)
                 if not rounds.rising:
                     break
@@ -141,7 +141,7 @@ class Iterate:
         else:
             (folder / FILE).write_bytes(returned.read_bytes())
         yielding = with_real(home / FIRST / "optimize" / REPORT, self.real, self.seed)
-        remarks = [yielding.told] if yielding else []
+        remarks = [yielding.sentence] if yielding else []
         write_table(folder, rounds, remarks)
         write_curve(folder, rounds)
         best = vector(self.policy, records(self.policy, str(folder / FILE))[-1])
@@ -149,7 +149,7 @@ class Iterate:
         change = Change(self.policy.names, self.policy.initial.tolist(), best.tolist(), self.policy.scale.tolist())
         write_iteration_page(folder, rounds, seen, change, read_check(home / FIRST / "optimize" / REPORT), remarks)
         if yielding:
-            console.status(yielding.told)
+            console.status(yielding.sentence)
         return {**rounds.metrics(), SECTION: yielding.metrics() if yielding else None}
 
     @property
@@ -179,22 +179,22 @@ class Iterate:
         )
 
     @property
-    def _collected_real(self) -> int:
+    def _real_episodes(self) -> int:
         return sum(self.budget.real) if REAL in evidence_of(self.grounding) else 0
 
     def _diagnose(self, home: Path, rounds: Rounds, console: Console) -> Grounding:
         """Return the grounding with its diagnosis: an excitation knows no policy, so that one serves all iterations."""
-        grounding = self.chain.diagnosed(home / FIRST, self.grounding, self.seed, console)
+        grounding = self.chain.diagnose(home / FIRST, self.grounding, self.seed, console)
         if flight := flown(home / FIRST, self.grounding, grounding):
-            rounds.diagnosed(flight)
+            rounds.add_diagnosis(flight)
             for finding in flight.findings:
                 console.status(finding)
         return grounding
 
     def _run_ungrounded(self, home: Path, start: str | None, console: Console) -> Artifact:
         place = home / FIRST
-        found = self.chain.search(place / "optimize_none", NoGrounding(), start, self.seed, console)
-        return self.chain.measure(place / "evaluate_none", found, self.seed, console)
+        search = self.chain.search(place / "optimize_none", NoGrounding(), start, self.seed, console)
+        return self.chain.measure(place / "evaluate_none", search, self.seed, console)
 
     def _draw(self, folder: Path, home: Path, first: Grounding, returned: np.ndarray) -> Seen:
         """Draw what the first iteration's grounding makes of real motions that nothing was learned from, and a walk."""

@@ -96,15 +96,15 @@ class Optimize:
         yielding = report_compliance(
             bare.world, scenario.world, scenario.grounding, folder / REPORT, console, self.seed
         )
-        found = [record(self.policy, "pi0" if self.initial is None else "start", first)]
+        thetas = [record(self.policy, "pi0" if self.initial is None else "start", first)]
         if isinstance(self.optimizer, Search):
             winners = [*self._search(self.optimizer, scenario, first, GenerationLog(folder, console.status), console)]
         else:
             winners = [*self._learn(self.optimizer, scenario, first, console)]
         searched = len(winners)
         winners, screened = self._screen(bare, checked, winners, console)
-        found += [winner.policy for winner in winners]
-        write_policies(folder / FILE, policies(self.policy, self.task, found))
+        thetas += [winner.policy for winner in winners]
+        write_policies(folder / FILE, policies(self.policy, self.task, thetas))
         best, worth = max(reversed(winners), key=lambda winner: winner.worth)
         write_policies(folder / BEST, policies(self.policy, self.task, [best]))
         return {
@@ -114,7 +114,7 @@ class Optimize:
             **checked,
             **yielding,
             **screened,
-            **self._drift(scenario, found, console),
+            **self._drift(scenario, thetas, console),
         }
 
     def _search(
@@ -148,13 +148,13 @@ class Optimize:
                     falls_of_best=generation.falls[best],
                 )
                 highest = max(highest, generation.values[best])
-                progress.best(f"best {Unit.of(self.task).shown(highest)} in simulation")
+                progress.best(f"best {Unit.of(self.task).format(highest)} in simulation")
                 yield Winner(self._record(index, candidates[best], means[best]), generation.values[best])
 
     def _learn(self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Console) -> Iterator[Winner]:
         """Yield what a learner has come to after each generation."""
         seed, simulator = derive_seed(self.seed, self.kind), GroundedSimulator(scenario, first)
-        total = optimizer.taken + optimizer.generations * self.rollouts
+        total = optimizer.steps_taken + optimizer.generations * self.rollouts
         with console.progress(total, "learning in simulation") as progress:
             bold = self.initial is None
             steps = optimizer.learn(simulator, self.policy, first, seed, bold=bold, advance=progress.advance)
@@ -181,16 +181,16 @@ class Optimize:
         falls = {name: result._asdict() for name, result in results.items()}
         return [winner for winner in winners if winner.policy.name in kept], {"screened": falls}
 
-    def _drift(self, scenario: Scenario, found: Iterable[PolicyRecord], console: Console) -> Mapping[str, Any]:
+    def _drift(self, scenario: Scenario, thetas: Iterable[PolicyRecord], console: Console) -> Mapping[str, Any]:
         """Return and tell how far the policies have moved from what a learned grounding has seen."""
         inner = innermost(self.grounding)
         if not (isinstance(inner, ActionTransformation) and isinstance(scenario.grounding, LoadedTransformation)):
             return {}
-        known = read_region(model_file(inner.forward_model, "forward_model").parent)
-        shares = drifts(scenario, known, {one.name: vector(self.policy, one) for one in found}, self.seed)
+        region = read_region(model_file(inner.forward_model, "forward_model").parent)
+        shares = drifts(scenario, region, {theta.name: vector(self.policy, theta) for theta in thetas}, self.seed)
         first, *_, last = shares.items()
-        told = f"{last[0]} spends {100 * last[1]:.0f} % of its time where the grounding has seen nothing"
-        console.status(f"{told} ({first[0]}: {100 * first[1]:.0f} %)")
+        message = f"{last[0]} spends {100 * last[1]:.0f} % of its time where the grounding has seen nothing"
+        console.status(f"{message} ({first[0]}: {100 * first[1]:.0f} %)")
         return {"drift": shares}
 
     def _evaluate(

@@ -150,8 +150,8 @@ class Surrogate:
         self._acting = self._left > 0 and not self._fell
 
     def _read(self) -> dict[str, Any]:
-        told = {part: self._observation[place].tolist() for part, place in self._parts.items()}
-        return {**told, "fell": bool(self._fell)}
+        reading = {part: self._observation[place].tolist() for part, place in self._parts.items()}
+        return {**reading, "fell": bool(self._fell)}
 
 
 def _check_runner(folder: Path, request: Mapping[str, Any]) -> None:

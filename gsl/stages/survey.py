@@ -62,7 +62,7 @@ class Survey:
         rng = np.random.default_rng(self.seed)
         random = [neighbour(self.policy, self.policy.initial, self.spread, rng) for _ in range(self.random)]
         reference = _values(self._episodes(self.sim, random, "reference", console))
-        rows, found = [], {}
+        rows, metrics = [], {}
         for name, world in self.worlds.items():
             start = self._episodes(world, [self.policy.initial] * self.repeats, "start", console)
             twice = self._episodes(world, [theta for theta in optimal for _ in range(2)], "optimal", console)
@@ -70,14 +70,14 @@ class Survey:
             falls = sum(first.fell or second.fell for first, second in zip(twice[::2], twice[1::2], strict=True))
             rank = rank_correlation(reference, _values(once)), rank_correlation(_values(once), _values(again))
             rows.append(self._row(name, start, f"{falls} of {len(optimal)}", once, rank))
-            found[name] = {
+            metrics[name] = {
                 "pi0": float(_values(start).mean()),
                 "sim_optimal_falls": falls,
                 "rank": rank[0],
                 "ceiling": rank[1],
             }
         (folder / TABLE).write_text(table(COLUMNS, rows), encoding="utf-8")
-        return found
+        return metrics
 
     def _search(self, number: int, folder: Path, console: Console) -> list[np.ndarray]:
         place = folder / f"search_{number + 1}"
@@ -93,7 +93,7 @@ class Survey:
             seed=self.seed + number,
         )
         search.run(place, console)
-        return [vector(self.policy, one) for one in read_policies(place / FILE).records[2:]]
+        return [vector(self.policy, theta) for theta in read_policies(place / FILE).records[2:]]
 
     def _episodes(self, world: World, thetas: Sequence[np.ndarray], label: str, console: Console) -> list[Episode]:
         scenario = Scenario(world, self.task, self.policy, REAL, NoGrounding())

@@ -65,7 +65,7 @@ class TrainForward:
     def parents(self) -> Mapping[str, Path]:
         """Return the files of trajectories, or the artifacts, and the inverse model."""
         below = {} if self.residual_to is None else {"residual_to": resolve(self.residual_to, kind="train_inverse")}
-        named = {"data": self.data, **{f"earlier_{n}": one for n, one in enumerate(self.earlier, start=1)}}
+        named = {"data": self.data, **{f"earlier_{n}": path for n, path in enumerate(self.earlier, start=1)}}
         files = {name: data_file(reference) for name, reference in named.items()}
         if len({path.resolve() for path in files.values()}) < len(files):
             raise ConfigError("earlier", "names the same trajectories twice; what is held out would be learned from")
@@ -75,7 +75,7 @@ class TrainForward:
         """Write the model and the trajectories it has not seen."""
         path = data_file(self.data)
         newest = parts(path, other=SIM, share=self.heldout, seed=self.seed)
-        earlier = {one: earlier_batch(one, newest.training) for one in map(data_file, self.earlier)}
+        earlier = {file: earlier_batch(file, newest.training) for file in map(data_file, self.earlier)}
         data = aggregate(newest, list(earlier.values()))
         console.status(f"fitting a forward model to {len(data.training)} trajectories")
         if data.training.states:
@@ -85,19 +85,21 @@ class TrainForward:
             return forward_of_states(folder, data, self.model, self.seed)
         if self.model.covariance == "full":
             raise ConfigError("model.covariance", "full is for a gymnasium environment; robots' joints are drawn alone")
-        for file, batches in {path: newest, **{one: [batch] for one, batch in earlier.items()}}.items():
+        for file, batches in {path: newest, **{file: [batch] for file, batch in earlier.items()}}.items():
             self._check(file, batches)
-        known = data.only(self.model.joints_of_interest(data.training.joints, "model"))
-        base = None if self.residual_to is None else self._simulator(self.residual_to, known.training)
-        model, choice = fit_forward(self.model, known, self.seed, base)
+        chosen = data.only(self.model.joints_of_interest(data.training.joints, "model"))
+        base = None if self.residual_to is None else self._simulator(self.residual_to, chosen.training)
+        model, choice = fit_forward(self.model, chosen, self.seed, base)
         write_model(folder, model)
-        own = [one for part in known for one in of_policy(part, pi0=True)]
-        falls = float(np.mean([one.ended_in_a_fall for one in own])) if own else 0.0
+        own = [episode for part in chosen for episode in of_policy(part, pi0=True)]
+        falls = float(np.mean([episode.ended_in_a_fall for episode in own])) if own else 0.0
         write(folder / HELDOUT, replace(data.heldout, metadata={**data.heldout.metadata, FALLS: falls}))
         write(folder / VALIDATION, data.validation)
-        seen, unseen = (model_rows(choice.config, part.episodes).windows for part in (known.training, known.validation))
+        seen, unseen = (
+            model_rows(choice.config, part.episodes).windows for part in (chosen.training, chosen.validation)
+        )
         write_region(folder, region(seen, unseen))
-        groups = {"pi0": of_policy(known.heldout, pi0=True), "off_pi0": of_policy(known.heldout, pi0=False)}
+        groups = {"pi0": of_policy(chosen.heldout, pi0=True), "off_pi0": of_policy(chosen.heldout, pi0=False)}
         measured = {
             name: forward_errors(model, long)
             for name, part in groups.items()

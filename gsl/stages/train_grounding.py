@@ -49,7 +49,7 @@ class TrainGrounding:
         for role in (REAL, SIM):
             if (reference := getattr(self, role)) is not None:
                 named[role] = reference
-        named |= {f"earlier_{n}": one for n, one in enumerate(self.earlier, start=1)}
+        named |= {f"earlier_{n}": path for n, path in enumerate(self.earlier, start=1)}
         files = {role: data_file(reference) for role, reference in named.items()}
         return {role: path if path == Path(named[role]) else path.parent for role, path in files.items()}
 
@@ -59,12 +59,12 @@ class TrainGrounding:
         real, count = None, 0
         if self.real is not None:
             newest = parts(data_file(self.real), other=SIM, share=self.heldout, seed=self.seed)
-            data = aggregate(newest, [earlier_batch(data_file(one), newest.training) for one in self.earlier])
+            data = aggregate(newest, [earlier_batch(data_file(path), newest.training) for path in self.earlier])
             episodes = (*data.training.episodes, *data.validation.episodes)
-            labels = [one for part in (data.training, data.validation) for one in part.metadata["episodes"]]
+            labels = [label for part in (data.training, data.validation) for label in part.metadata["episodes"]]
             real = replace(data.training, episodes=episodes, metadata={**data.training.metadata, "episodes": labels})
-            own = [one for part in data for one in of_policy(part, pi0=True)]
-            falls = float(np.mean([one.ended_in_a_fall for one in own])) if own else 0.0
+            own = [episode for part in data for episode in of_policy(part, pi0=True)]
+            falls = float(np.mean([episode.ended_in_a_fall for episode in own])) if own else 0.0
             write(folder / HELDOUT, replace(data.heldout, metadata={**data.heldout.metadata, FALLS: falls}))
             count = len(real)
         sim = None if self.sim is None else read(data_file(self.sim))

@@ -88,15 +88,15 @@ class TrainServo:
             threads=threads(self.workers), members=self.members, walks=walked,
         )  # fmt: skip
         model = replace(learned.model, noise=self._measure_unexplained(exp, learned.model))
-        further = [replace(one.model, noise=model.noise) for one in learned.further]
+        further = [replace(servo.model, noise=model.noise) for servo in learned.further]
         write_model(folder, ServoMembers((model, *further)))
         self._write_world(folder, learned)
         servo_curves(folder / CURVES, self.sim.plant, model, fitting_step(self.sim.step, exp.period), exp.period)
-        told = document(learned) | {"step": fitting_step(self.sim.step, exp.period)}
-        for line in remarks(told):
+        metrics = document(learned) | {"step": fitting_step(self.sim.step, exp.period)}
+        for line in remarks(metrics):
             console.status(f"warning: {line}")
         noise = dict(zip(model.joints, model.noise.tolist(), strict=True))
-        return {**told, "torque_noise": noise, "problems": problems(told)}
+        return {**metrics, "torque_noise": noise, "problems": problems(metrics)}
 
     def _walks(self, exp: Log) -> Walks | None:
         """Return the log on the ground, if there is one.

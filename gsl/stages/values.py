@@ -55,12 +55,14 @@ class Values:
         jobs = [Job(theta, derive_seed(self.seed, self.kind, index)) for index, theta in enumerate(thetas)]
         with console.progress(len(jobs), "measuring a fixed set of policies") as progress:
             done = episodes(scenario, jobs, workers=self.workers, progress=progress)
-        write_json(folder / FILE, [one.value for one in done])
-        return {"policies": self.count, "falls": sum(one.fell for one in done)}
+        write_json(folder / FILE, [episode.value for episode in done])
+        return {"policies": self.count, "falls": sum(episode.fell for episode in done)}
 
 
 def rank(simulated: Artifact, real: Artifact) -> float | None:
     """Return Spearman's correlation of two artifacts of the same policies, None if one of them ranks nothing."""
-    values = [np.array(json.loads((one.folder / FILE).read_text(encoding="utf-8"))) for one in (simulated, real)]
-    found = rank_correlation(*values)
-    return None if np.isnan(found) else found
+    values = [
+        np.array(json.loads((artifact.folder / FILE).read_text(encoding="utf-8"))) for artifact in (simulated, real)
+    ]
+    correlation = rank_correlation(*values)
+    return None if np.isnan(correlation) else correlation

@@ -50,12 +50,15 @@ class WiringAudit:
             findings += _try_out(self.world, policy)
         console.table("what the network sees", *_observation(policy.wiring, layout))
         console.table("what its outputs do", *_action(policy.wiring, layout))
-        rows = [(one.verdict, one.what, f"{one.setting}: {one.line}".removeprefix(": ")) for one in findings]
+        rows = [
+            (finding.verdict, finding.what, f"{finding.setting}: {finding.line}".removeprefix(": "))
+            for finding in findings
+        ]
         console.table("audit of the wiring", ("", "of", "what was seen"), rows)
         wrong = sum(finding.refused for finding in findings)
         doubts = sum(bool(finding.setting) for finding in findings) - wrong
         said = f"the policy would be refused ({wrong})" if wrong else f"the wiring fits; {doubts} lines to look at"
-        return {"findings": [one._asdict() for one in findings], "said": said, "exit_code": 2 * bool(wrong)}
+        return {"findings": [finding._asdict() for finding in findings], "said": said, "exit_code": 2 * bool(wrong)}
 
 
 def _observation(wiring: Wiring, layout: Layout) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

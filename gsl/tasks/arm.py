@@ -40,7 +40,7 @@ class Arm:
     def outcome(self, layout: Layout, trajectory: Trajectory) -> Mapping[str, float]:
         """Return the distance to the goal, at the end and on average, and whether an arm went above it."""
         shoulders = trajectory.position[:, [layout.joints.index(name) for name in JOINTS]]
-        far = [math.degrees(self.distance(one)) for one in shoulders]
+        far = [math.degrees(self.distance(angles)) for angles in shoulders]
         above = bool((HANGING - shoulders[-1] > self.goal).any())
         return {"distance [deg]": far[-1], "mean distance [deg]": float(np.mean(far)), "above [share]": float(above)}
 

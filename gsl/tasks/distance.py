@@ -34,7 +34,7 @@ class Distance:
         x = trajectory.sensors["base.position.x"]
         return self._report(float(x[-1] - x[0]))
 
-    def measured(self, distance: float, *, fell: bool) -> Judged:
+    def judge_distance(self, distance: float, *, fell: bool) -> Judged:
         """Return what a distance [m] is worth in the real world."""
         return Judged(0.0 if fell else distance, self._report(distance))
 

@@ -37,7 +37,7 @@ class Walk:
         x = trajectory.sensors["base.position.x"]
         return self._report(float(x[-1] - x[0]))
 
-    def measured(self, distance: float, *, fell: bool) -> Judged:
+    def judge_distance(self, distance: float, *, fell: bool) -> Judged:
         """Return what a real walk over a distance [m] is worth."""
         return Judged(0.0 if fell else distance / self.duration, self._report(distance))
 

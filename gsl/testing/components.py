@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.described import describe, rebuilt
+from gsl.core.described import describe, restore
 from gsl.core.setting import settings_of
 from gsl.core.trust import modules_in
 from gsl.errors import ConfigError
@@ -35,9 +35,9 @@ def check_component(component: Any) -> None:
     except FrozenInstanceError:
         frozen = True
     require(component, frozen, "can be changed; put @component above the class")
-    for known in settings_of(type(component)).values():
-        promise = f"{known.name} does not say what it means; write Annotated[..., setting(meaning, unit=...)]"
-        require(component, bool(known.meaning), promise)
+    for field in settings_of(type(component)).values():
+        promise = f"{field.name} does not say what it means; write Annotated[..., setting(meaning, unit=...)]"
+        require(component, bool(field.meaning), promise)
     try:
         again = pickle.loads(pickle.dumps(component))  # noqa: S301  our own bytes
     except (pickle.PicklingError, AttributeError, TypeError) as error:
@@ -45,7 +45,7 @@ def check_component(component: Any) -> None:
     require(component, alike(describe(again), describe(component)), "is another one after pickling")
     try:
         plain = describe(component)
-        back = rebuilt(plain, trust=modules_in(plain))
+        back = restore(plain, trust=modules_in(plain))
     except ConfigError as error:
         raise AssertionError(f"{type(component).__name__}: cannot be built again from a file: {error}") from error
     require(component, alike(describe(back), describe(component)), "is another one when read from a file")

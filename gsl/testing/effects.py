@@ -73,8 +73,8 @@ def _check_ends(effect: Any, plant: Plant) -> None:
 
 def _check_neutral(effect: Any, plant: Plant, neutral: Mapping[str, Any] | None) -> None:
     if neutral is None:
-        known = settings_of(type(effect)).values()
-        neutral = {each.name: each.neutral for each in known if each.neutral is not None}
+        settings = settings_of(type(effect)).values()
+        neutral = {each.name: each.neutral for each in settings if each.neutral is not None}
     if not neutral:
         return
     still = replace(effect, **neutral).apply(plant)

@@ -64,10 +64,10 @@ def _transform(grounding: Grounding, world: World, observations: np.ndarray) -> 
     here, sent = world.layout["position"], []
     for k, observation in enumerate(observations):
         seen, action = observation.copy(), observation[here] + SWING * np.sin(0.3 * k + np.arange(n))
-        given = action.copy()
-        changed = np.asarray(run.transform(seen, given), dtype=float)
+        copy = action.copy()
+        changed = np.asarray(run.transform(seen, copy), dtype=float)
         require(grounding, changed.shape == (n,), f"sends an action of shape {changed.shape}, not ({n},)")
-        same = np.array_equal(seen, observation) and np.array_equal(given, action)
+        same = np.array_equal(seen, observation) and np.array_equal(copy, action)
         require(grounding, same, "changes the observation or the action that it is given")
         sent.append(changed.copy())
     return np.array(sent)

@@ -47,7 +47,7 @@ def _run(search: Search, parameters: int, seed: int, value: Callable[[np.ndarray
     require(search, not start.any(), "changes the parameters that it is given")
     for _ in range(search.generations):
         try:
-            candidates = [one.copy() for one in check_candidates(run.ask(), parameters)]
+            candidates = [candidate.copy() for candidate in check_candidates(run.ask(), parameters)]
         except ConfigError as error:
             raise AssertionError(f"{type(search).__name__}: {error.problem}") from error
         asked.append(candidates)

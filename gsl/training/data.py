@@ -46,7 +46,7 @@ def labels(batch: Batch) -> list[str]:
 
 def of_policy(batch: Batch, *, pi0: bool) -> tuple[Trajectory, ...]:
     """Return the episodes of pi0, or all others."""
-    return tuple(one for one, label in zip(batch.episodes, labels(batch), strict=True) if (label == PI0) == pi0)
+    return tuple(episode for episode, label in zip(batch.episodes, labels(batch), strict=True) if (label == PI0) == pi0)
 
 
 def parts(path: Path, *, other: str, share: float, seed: int) -> Parts:
@@ -78,14 +78,14 @@ def earlier_batch(path: Path, newest: Batch) -> Batch:
         TrajectoryError: The file breaks the contract, is simulated, or of another robot or rate than the newest ones.
     """
     batch = _of_role(path, other=SIM)
-    for what, one, wanted in (
+    for what, value, wanted in (
         ("of another robot", batch.metadata["robot"], newest.metadata["robot"]),
         ("of other joints", batch.joints, newest.joints),
         ("of another number of states", batch.states, newest.states),
         ("of another control period", batch.control_period, newest.control_period),
     ):
-        if one != wanted:
-            raise TrajectoryError(path, f"is {what} than the newest trajectories: {one}, not {wanted}")
+        if value != wanted:
+            raise TrajectoryError(path, f"is {what} than the newest trajectories: {value}, not {wanted}")
     return batch
 
 
@@ -155,7 +155,7 @@ def check_lengths(path: Path, episodes: Sequence[Trajectory], needed: int) -> Se
     Raises:
         TrajectoryError: None is.
     """
-    long = [one for one in episodes if usable(one) >= needed]
+    long = [episode for episode in episodes if usable(episode) >= needed]
     if not long:
         raise TrajectoryError(path, f"no episode of one part lasts {needed} ticks before a fall; collect longer ones")
     return long
@@ -164,5 +164,5 @@ def check_lengths(path: Path, episodes: Sequence[Trajectory], needed: int) -> Se
 def summary(choice: Choice, data: Parts) -> dict[str, Any]:
     """Return as metrics which variant was chosen, the scores, and how many trajectories it has learned from."""
     learned = len(data.training) + len(data.validation) * choice.config.learns_from_all
-    told = {"family": choice.config.family, "history": choice.config.history, "scores": dict(choice.scores)}
-    return {**told, "trajectories": learned}
+    variant = {"family": choice.config.family, "history": choice.config.history, "scores": dict(choice.scores)}
+    return {**variant, "trajectories": learned}

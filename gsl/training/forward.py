@@ -40,7 +40,9 @@ def fit_forward(
         base: What is corrected, none for a robot learned from nothing.
     """
     judges = long_enough(config, of_policy(data.validation, pi0=False)) or long_enough(config, data.validation.episodes)
-    return best(config, lambda one, whole: _fit(one, data, seed, base, whole), lambda model: _score(model, judges))
+    return best(
+        config, lambda variant, whole: _fit(variant, data, seed, base, whole), lambda model: _score(model, judges)
+    )
 
 
 def _fit(config: ModelConfig, data: Parts, seed: int, base: ForwardModel | None, whole: bool) -> Forward:
@@ -66,7 +68,7 @@ def _score(model: Forward, episodes: Sequence[Trajectory]) -> float:
 def long_enough(config: ModelConfig, episodes: Sequence[Trajectory]) -> tuple[Trajectory, ...]:
     """Return the episodes that are long enough to measure a model by."""
     needed = shortest(config.of_body, config.horizon)
-    return tuple(one for one in episodes if usable(one) >= needed)
+    return tuple(episode for episode in episodes if usable(episode) >= needed)
 
 
 def _member(
@@ -79,12 +81,14 @@ def _member(
 ) -> ForwardModel:
     """Return a model of some of the training trajectories, and of those of the validation if it is the `whole`."""
     head = config.head
-    known, unseen = (_samples(config, part, base) for part in (episodes, data.validation.episodes))
+    seen, unseen = (_samples(config, part, base) for part in (episodes, data.validation.episodes))
     pieces = _pieces(config, episodes, data.validation.episodes) if config.multi_step > 1 else None
-    network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole, pieces=pieces)
+    network = fit_network(seen, unseen, config, seed=seed, head=head, whole=whole, pieces=pieces)
     memory = np.zeros(unseen[1].shape[1])
     if head.draws and config.calibrated:
-        network, memory = calibrate(network, head, [_samples(config, [one], base) for one in data.validation.episodes])
+        network, memory = calibrate(
+            network, head, [_samples(config, [episode], base) for episode in data.validation.episodes]
+        )
     joints = data.training.joints
     return ForwardModel(
         network, config.of_body, joints, config.encoding, config.horizon, head, memory, base, config.multi_step
@@ -93,14 +97,14 @@ def _member(
 
 def _samples(config: ModelConfig, episodes: Sequence[Trajectory], base: ForwardModel | None) -> Samples:
     rows = model_rows(config, episodes)
-    known = 0.0 if base is None else base.effects(rows.windows[:, : base.network.inputs])
-    return rows.windows, encode(rows.change - known, config.encoding)
+    baseline = 0.0 if base is None else base.effects(rows.windows[:, : base.network.inputs])
+    return rows.windows, encode(rows.change - baseline, config.encoding)
 
 
 def _pieces(config: ModelConfig, *parts: Sequence[Trajectory]) -> tuple[Segments, Segments] | None:
     """Return what the multi-step loss is of in both parts; None where all of a member's draw are over too soon."""
     needed = config.of_body.span + config.multi_step + 1
-    training, validation = ([one for one in part if usable(one) >= needed] for part in parts)
+    training, validation = ([episode for episode in part if usable(episode) >= needed] for part in parts)
     if not training or not validation:
         return None
     cut = partial(segments, history=config.of_body, carried_out=True, ticks=config.multi_step, every=1)

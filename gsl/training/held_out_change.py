@@ -24,7 +24,7 @@ def relative_changes(
         groups: Their names.
     """
     rng, every = np.random.default_rng(0), np.unique(sample)
-    costs = [loss(one).sum(axis=1) for one in (old, new)]
+    costs = [loss(residuals).sum(axis=1) for residuals in (old, new)]
     sums = np.array([[cost[sample == k].sum(axis=0) for k in every] for cost in costs])
     before, after = sums[:, rng.integers(0, len(every), (SAMPLES, len(every)))].sum(axis=2)
     return {

@@ -34,26 +34,26 @@ def fit_inverse(
     """Return the inverse model that a configuration allows and that best recovers the actions of validation."""
     pieces = segments(data.validation.episodes, config.of_joints, carried_out=True)
 
-    def fit(one: ModelConfig, whole: bool) -> InverseModel:
+    def fit(variant: ModelConfig, whole: bool) -> InverseModel:
         if method == "regression":
-            return _regression(one, data, seed, whole)
-        return _solver(one, data, seed, damping, whole)
+            return _regression(variant, data, seed, whole)
+        return _solver(variant, data, seed, damping, whole)
 
     return best(config, fit, lambda model: degrees(recover_error(model, pieces)))
 
 
 def _regression(config: ModelConfig, data: Parts, seed: int, whole: bool) -> InverseModel:
     n = len(data.training.joints)
-    known, unseen = (_invert(_rows(config, part), n, config) for part in (data.training, data.validation))
-    network = fit_network(known, unseen, config, seed=seed, whole=whole)
+    seen, unseen = (_invert(_rows(config, part), n, config) for part in (data.training, data.validation))
+    network = fit_network(seen, unseen, config, seed=seed, whole=whole)
     return Regression(network, config.of_joints, data.training.joints, config.encoding, config.horizon)
 
 
 def _solver(config: ModelConfig, data: Parts, seed: int, damping: float, whole: bool) -> InverseModel:
     joints = data.training.joints
     rows = [_rows(config, part) for part in (data.training, data.validation)]
-    known, unseen = ((part.windows, encode(part.change, config.encoding)) for part in rows)
-    network = fit_network(known, unseen, config, seed=seed, whole=whole)
+    seen, unseen = ((part.windows, encode(part.change, config.encoding)) for part in rows)
+    network = fit_network(seen, unseen, config, seed=seed, whole=whole)
     simulator = ForwardModel(network, config.of_joints, joints, config.encoding, config.horizon)
     plain = fit_linear(rows[0].windows, rows[0].change, ridge=config.ridge)
     sensitivity = plain.layers[0][0][:, : len(joints)].astype(float)

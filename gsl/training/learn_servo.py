@@ -109,7 +109,7 @@ def learn_servo(
         numbers = [with_groups(*pair, unfit) for pair in zip(fitted, begun, strict=True)]
         if walks:
             on_both = bench.numbers_with(walks, parts.train, numbers[0])
-            numbers[0] = bench.kept_on_foot(walks, parts.held, numbers[0], on_both)
+            numbers[0] = bench.keep_on_foot(walks, parts.held, numbers[0], on_both)
         networks, ways = zip(*map(network, splits, numbers), strict=True)
         bare = refuse_groups(numbers, networks, 1.0 - CHANCE, WORTH)
         model = with_groups(networks[0], numbers[0], bare)
@@ -117,7 +117,7 @@ def learn_servo(
         worse = tuple(name for name, share in change.items() if np.quantile(share, CHANCE) > 0.0)
         for name in worse:
             model = without_group(model, name)
-        gaps = [bench.by_group(parts.test, one) for one in (start, model)]
+        gaps = [bench.by_group(parts.test, servo) for servo in (start, model)]
         some = cut_windows(exp, parts.train, SHORT)
 
         def member(begun: ServoModel, index: np.ndarray) -> ServoModel:
@@ -126,10 +126,10 @@ def learn_servo(
 
         others = further(
             members - 1, lambda rng: bench.numbers_of_some(parts.train, numbers[0], rng), worse, member,
-            lambda one: bench.level(parts.test, one), plant=plant, samples=some.samples, seed=seed,
+            lambda servo: bench.level(parts.test, servo), plant=plant, samples=some.samples, seed=seed,
         )  # fmt: skip
         sizes, way = (len(some), len(parts.judge), len(parts.test)), tuple(ways[0])
-        on_foot = tuple(walks.level(one) for one in (start, model)) if walks else None
+        on_foot = tuple(walks.level(servo) for servo in (start, model)) if walks else None
         return LearnedServo(model, gaps[0], gaps[1], worse, way, sizes, tuple(others), on_foot, exp.by_record)
 
 

@@ -54,22 +54,22 @@ class ServoBench:
 
     def numbers(self, index: np.ndarray) -> ServoModel:
         """Return the start with numbers fitted to the motions of some windows."""
-        return fit_numbers(self.replays.plant, self.start, self.fitted_residual(index), longest=self.longest)
+        return fit_numbers(self.replays.plant, self.start, self.make_residual(index), longest=self.longest)
 
     def numbers_of_some(self, index: np.ndarray, begun: ServoModel, rng: np.random.Generator) -> ServoModel:
         """Return a model with numbers fitted further, to motions of some windows that are drawn with replacement."""
         motion = self.exp.pieces.record[index]
         drawn = rng.choice(np.unique(motion), len(np.unique(motion)))
-        residual = self.fitted_residual(index[np.isin(motion, drawn)])
+        residual = self.make_residual(index[np.isin(motion, drawn)])
         return fit_numbers(self.replays.plant, begun, residual, longest=self.longest, rounds=1)
 
     def numbers_with(self, walks: Walks, index: np.ndarray, begun: ServoModel) -> ServoModel:
         """Return a model with numbers fitted further, to motions in the air and on the ground together."""
-        air = self.fitted_residual(index)
+        air = self.make_residual(index)
 
         def residual(model: ServoModel) -> np.ndarray:
             both = air(model), walks.residuals(walks.train, model)
-            return np.vstack([one.reshape(-1, len(self.floor)) for one in both])
+            return np.vstack([part.reshape(-1, len(self.floor)) for part in both])
 
         return fit_numbers(self.replays.plant, begun, residual, longest=self.longest, rounds=1)
 
@@ -86,14 +86,15 @@ class ServoBench:
         """
         replays, period = self.replays, self.exp.period
         alike = [
-            Alike(known, freeze(known, some.take(part), self.floor, period)) for known, part in replays.known(some)
+            Alike(plant, freeze(plant, some.take(part), self.floor, period))
+            for plant, part in replays.group_by_plant(some)
         ]
         return fit_network(
             replays.plant, begun, alike, replays.step, period, replays.pool,
             judge=lambda model: self.level(judge, model), longest=self.longest, iterations=iterations,
         )  # fmt: skip
 
-    def fitted_residual(self, index: np.ndarray) -> Callable[[ServoModel], np.ndarray]:
+    def make_residual(self, index: np.ndarray) -> Callable[[ServoModel], np.ndarray]:
         """Return what numbers are fitted by: residuals of long windows [floors], by model."""
         some, floor = cut_windows(self.exp, index, LONG), self.floor
         plain = Comparison.plain(floor)
@@ -120,9 +121,9 @@ class ServoBench:
 
     def change(self, *duels: Duel) -> dict[str, np.ndarray]:
         """Return the relative change of the robust cost in bootstraps over motions, by group, shape (SAMPLES,) each."""
-        sample = self.exp.pieces.take(np.concatenate([one.windows for one in duels])).samples
-        before = np.concatenate([self.residuals(one.windows, one.old) for one in duels])
-        after = np.concatenate([self.residuals(one.windows, one.new) for one in duels])
+        sample = self.exp.pieces.take(np.concatenate([duel.windows for duel in duels])).samples
+        before = np.concatenate([self.residuals(duel.windows, duel.old) for duel in duels])
+        after = np.concatenate([self.residuals(duel.windows, duel.new) for duel in duels])
         return relative_changes(before, after, sample, self.group, self.start.groups)
 
     def refuse(self, duels: Sequence[Duel], likely: float, worth: float) -> set[str]:
@@ -136,7 +137,7 @@ class ServoBench:
         changes = self.change(*duels) if duels else {}
         return {name for name, share in changes.items() if np.quantile(share, likely) >= -worth}
 
-    def kept_on_foot(self, walks: Walks, index: np.ndarray, old: ServoModel, new: ServoModel) -> ServoModel:
+    def keep_on_foot(self, walks: Walks, index: np.ndarray, old: ServoModel, new: ServoModel) -> ServoModel:
         """Return the new servo, and the old one in groups that walks or motions in the air speak against.
 
         Args:
@@ -146,7 +147,7 @@ class ServoBench:
             new: The new one.
         """
         test, air = walks.exp.held_out, self.change(Duel(index, old, new))
-        before, after = (walks.residuals(test, one) for one in (old, new))
+        before, after = (walks.residuals(test, model) for model in (old, new))
         sample = walks.exp.pieces.take(test).samples
         ground = relative_changes(before, after, sample, self.group, old.groups)
         for name in ground:

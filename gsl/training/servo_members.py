@@ -66,4 +66,4 @@ def bootstrap(samples: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         rng: Of the draw.
     """
     every = np.unique(samples)
-    return np.concatenate([np.flatnonzero(samples == one) for one in rng.choice(every, len(every))])
+    return np.concatenate([np.flatnonzero(samples == sample) for sample in rng.choice(every, len(every))])

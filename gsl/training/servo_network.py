@@ -110,19 +110,19 @@ def fit_network(
         every: Iterations from one judgement to the next.
         patience: Judgements without a better one after which it ends.
     """
-    free, scored = _Free(plant, model, longest), sum(one.data.real[:, one.data.warm_up :].size for one in windows)
+    free, scored = _Free(plant, model, longest), sum(alike.data.real[:, alike.data.warm_up :].size for alike in windows)
     best, way, costs = [(judge(model), model)], list[Progress](), [0.0]
-    lanes = [(k, np.arange(len(one.data.clock))) for k, one in enumerate(windows)]
+    lanes = [(k, np.arange(len(alike.data.clock))) for k, alike in enumerate(windows)]
     blocks = [(k, index[at : at + LANES]) for k, index in lanes for at in range(0, len(index), LANES)]
 
-    carried = [pack(one.plant.servo, one.plant.robot.supply_voltage).rows[OUTPUT_ARMATURE] for one in windows]
+    carried = [pack(alike.plant.servo, alike.plant.robot.supply_voltage).rows[OUTPUT_ARMATURE] for alike in windows]
 
     def value(theta: np.ndarray) -> tuple[float, np.ndarray]:
         now = free.model_at(theta)
-        changed = [now.on(one.plant) for one in windows]
-        servos = [pack(one.servo, one.robot.supply_voltage, one.law) for one in changed]
+        changed = [now.on(alike.plant) for alike in windows]
+        servos = [pack(plant.servo, plant.robot.supply_voltage, plant.law) for plant in changed]
         more = [own.rows[OUTPUT_ARMATURE] - before for own, before in zip(servos, carried, strict=True)]
-        here = [heavier(one.data, inertia) for one, inertia in zip(windows, more, strict=True)]
+        here = [heavier(alike.data, inertia) for alike, inertia in zip(windows, more, strict=True)]
 
         def of(block: tuple[int, np.ndarray]) -> tuple[float, np.ndarray]:
             kind, index = block
@@ -133,8 +133,8 @@ def fit_network(
 
         done = list(pool.map(of, blocks))
         cost, slope = free.ridge(theta)
-        costs[0] = sum(one for one, _ in done) / scored
-        return costs[0] + cost, np.sum([one for _, one in done], axis=0) / scored + slope
+        costs[0] = sum(part for part, _ in done) / scored
+        return costs[0] + cost, np.sum([gradient for _, gradient in done], axis=0) / scored + slope
 
     def watch(theta: np.ndarray) -> None:
         way.append(Progress(costs[0], np.nan))
@@ -146,7 +146,10 @@ def fit_network(
         way[-1] = Progress(costs[0], level)
         if level < best[0][0]:
             best[0] = level, now
-        elif np.argmin([np.inf if np.isnan(one.level) else one.level for one in way]) < len(way) - every * patience:
+        elif (
+            np.argmin([np.inf if np.isnan(progress.level) else progress.level for progress in way])
+            < len(way) - every * patience
+        ):
             raise StopIteration
 
     options = {"maxiter": iterations, "maxcor": 30, "maxfun": 2 * iterations}

@@ -46,17 +46,17 @@ class Replays:
         """Return the same with a fixed servo."""
         return replace(self, model=model)
 
-    def known(self, pieces: Pieces) -> list[tuple[Plant, np.ndarray]]:
+    def group_by_plant(self, pieces: Pieces) -> list[tuple[Plant, np.ndarray]]:
         """Return windows by what is known of their records: the plant, and indices, shape (k,)."""
-        return [(apply_all(self.plant, build(known)), index) for known, index in pieces.alike]
+        return [(apply_all(self.plant, build(effects)), index) for effects, index in pieces.alike]
 
     def replay(self, model: ServoModel | None, pieces: Pieces) -> np.ndarray:
         """Return the replayed positions [rad], shape (W, T, n_joints); NaN where a replay diverges."""
         result = np.empty((len(pieces), pieces.windows.length, self.joints))
-        for plant, index in self.known(pieces):
+        for plant, index in self.group_by_plant(pieces):
             held = Held.of(plant if model is None else model.on(plant), self.step, self.period)
             windows = [
-                Windows(*(part[index[one]] for part in pieces.windows)) for one in shares(len(index), self.threads)
+                Windows(*(part[index[share]] for part in pieces.windows)) for share in shares(len(index), self.threads)
             ]
             result[index] = np.concatenate(list(self.pool.map(held.replay, windows)))[..., : self.joints]
         return result

@@ -43,12 +43,12 @@ def problems_of_members(metrics: Mapping[str, Any]) -> list[str]:
 def remarks(metrics: Mapping[str, Any]) -> list[str]:
     """Return what a user should know of a learned servo: how near it is, and which groups keep their old servo."""
     after = metrics["floors_after"]
-    found = (
+    remarks = (
         [] if after <= NEAR else [f"held out, the learned servo is {after:.1f} noise floors from the log, not within 1"]
     )
     if not metrics["whole_motions"]:
-        found.append("the log is one motion, of which parts are held out: the figures are optimistic")
+        remarks.append("the log is one motion, of which parts are held out: the figures are optimistic")
     for name, group in metrics["groups"].items():
         if not group["learned"]:
-            found.append(f"{name} keep their servo: nothing that was learned brought held-out motions nearer")
-    return found
+            remarks.append(f"{name} keep their servo: nothing that was learned brought held-out motions nearer")
+    return remarks

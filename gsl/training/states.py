@@ -74,9 +74,9 @@ def inverse_of_states(folder: Path, data: Parts, config: ModelConfig, seed: int)
     choices, make = data.training.metadata.get("choices", 0), _nearest if _choices(data) else _inverse
     model, choice = best(config, partial(make, data=data, seed=seed), partial(_recovery, data=data.validation))
     write_model(folder, model)
-    told = {"space": StateForward.space, "method": model.method}
+    about = {"space": StateForward.space, "method": model.method}
     name = "recovered_choices" if choices else "action_r2"
-    return {**summary(choice, data), **told, "heldout": {name: 1.0 - _recovery(model, data.heldout)}}
+    return {**summary(choice, data), **about, "heldout": {name: 1.0 - _recovery(model, data.heldout)}}
 
 
 def few(batch: Batch) -> bool:
@@ -95,12 +95,12 @@ def refuse_robots(config: ModelConfig, where: str) -> None:
 def _counts(folder: Path, data: Parts, kind: str) -> Mapping[str, Any]:
     """Count all transitions but those held out: there is nothing whose fit has to be stopped."""
     sizes = data.training.metadata["cells"], data.training.metadata["choices"]
-    known = data.training, data.validation
-    seen = sum(count_transitions(part.episodes, *sizes) for part in known)
+    parts = data.training, data.validation
+    seen = sum(count_transitions(part.episodes, *sizes) for part in parts)
     assert isinstance(seen, np.ndarray)
     write_model(folder, Counts(seen, kind))
     visited = float((seen.sum(axis=2) > 0).mean())
-    return {"space": Counts.space, "trajectories": sum(map(len, known)), "steps": int(seen.sum()), "visited": visited}
+    return {"space": Counts.space, "trajectories": sum(map(len, parts)), "steps": int(seen.sum()), "visited": visited}
 
 
 def _choices(data: Parts) -> int:
@@ -108,24 +108,26 @@ def _choices(data: Parts) -> int:
 
 
 def _steps(batch: Batch, variables: tuple[int, ...]) -> Steps:
-    states = [one.state for one in batch.episodes if one.state is not None]
-    sent = [one.action if one.grounded_action is None else one.grounded_action for one in batch.episodes]
+    states = [episode.state for episode in batch.episodes if episode.state is not None]
+    sent = [
+        episode.action if episode.grounded_action is None else episode.grounded_action for episode in batch.episodes
+    ]
     if not batch.metadata.get("choices"):
-        sent = [np.clip(one, -1.0, 1.0) for one in sent]  # as the environment carries them out
+        sent = [np.clip(actions, -1.0, 1.0) for actions in sent]  # as the environment carries them out
     changes = [np.diff(state, axis=0)[:, variables] for state in states]
     return Steps(np.concatenate([state[:-1] for state in states]), np.concatenate(sent), np.concatenate(changes))
 
 
 def _forward(config: ModelConfig, whole: bool, *, data: Parts, seed: int, head: Head | None = None) -> StateForward:
     choices, variables = _choices(data), config.of_interest(data.training.states, "model")
-    known, unseen = (_steps(part, variables) for part in (data.training, data.validation))
+    seen, unseen = (_steps(part, variables) for part in (data.training, data.validation))
     head = config.head if head is None else head
     training, validation = (
-        (np.hstack([part.states, encode(part.actions, choices)]), part.changes) for part in (known, unseen)
+        (np.hstack([part.states, encode(part.actions, choices)]), part.changes) for part in (seen, unseen)
     )
     network = _fit(training, validation, config, seed, whole, head)
-    scale = np.maximum(known.changes.std(axis=0), 1e-12)
-    actions = choices or known.actions.shape[1]
+    scale = np.maximum(seen.changes.std(axis=0), 1e-12)
+    actions = choices or seen.actions.shape[1]
     full = head.likelihood == "gaussian" and config.covariance == "full"
     together = mixing(network, head, validation) if full else None
     return StateForward(network, head, data.training.states, actions, choices, variables, scale, together)
@@ -133,19 +135,19 @@ def _forward(config: ModelConfig, whole: bool, *, data: Parts, seed: int, head: 
 
 def _inverse(config: ModelConfig, whole: bool, *, data: Parts, seed: int) -> StateInverse:
     variables = config.of_interest(data.training.states, "model")
-    known, unseen = (_invert(_steps(part, variables)) for part in (data.training, data.validation))
-    network = _fit(known, unseen, config, seed, whole)
-    return StateInverse(network, data.training.states, known[1].shape[1], variables)
+    seen, unseen = (_invert(_steps(part, variables)) for part in (data.training, data.validation))
+    network = _fit(seen, unseen, config, seed, whole)
+    return StateInverse(network, data.training.states, seen[1].shape[1], variables)
 
 
 def _fit(
     training: Samples, validation: Samples, config: ModelConfig, seed: int, whole: bool, head: Head = POINT
 ) -> Network:
     """Return a network that was fitted in units of each column's own spread; what never changes stays as it is."""
-    given, wanted = (_own_units(values) for values in training)
-    known, unseen = ((given.apply(x), wanted.apply(y)) for x, y in (training, validation))
-    network = fit_network(known, unseen, config, seed=seed, head=head, whole=whole)
-    return unscale([(weight, bias) for weight, bias in network.layers], given, head.scaling(wanted))
+    input_scaling, output_scaling = (_own_units(values) for values in training)
+    seen, unseen = ((input_scaling.apply(x), output_scaling.apply(y)) for x, y in (training, validation))
+    network = fit_network(seen, unseen, config, seed=seed, head=head, whole=whole)
+    return unscale([(weight, bias) for weight, bias in network.layers], input_scaling, head.scaling(output_scaling))
 
 
 def _own_units(values: np.ndarray) -> Scaling:
@@ -170,7 +172,7 @@ def _score(model: StateForward, data: Parts) -> float:
 
 def _nll(model: StateForward, rows: Steps) -> float:
     """The negative log likelihood of a variable's change, in units of its usual size [nats]."""
-    raw = model.network.predict_many(np.hstack([rows.states, model.encoded(rows.actions)]))
+    raw = model.network.predict_many(np.hstack([rows.states, model.encode(rows.actions)]))
     each = model.head.surprise(raw, rows.changes) / rows.changes.shape[1]
     return float(each.mean() - np.log(model.scale).mean())
 
@@ -178,7 +180,7 @@ def _nll(model: StateForward, rows: Steps) -> float:
 def _recovery(model: StateInverse | NearestChoice, data: Batch) -> float:
     """The share of actions that is not recovered: of choices the wrong ones, else of the variance."""
     rows = _steps(data, model.variables)
-    found = model.actions_for(rows.states, rows.changes)
+    actions = model.actions_for(rows.states, rows.changes)
     if isinstance(model, NearestChoice):
-        return float(np.mean(found != rows.actions))
-    return 1.0 - compute_r2(found - rows.actions, rows.actions)
+        return float(np.mean(actions != rows.actions))
+    return 1.0 - compute_r2(actions - rows.actions, rows.actions)

@@ -101,9 +101,9 @@ def measure_widths(
         groups = {name: np.isin(log.joints, members) for name, members in names.items()}
     quiet = {name: mask & calm for name, mask in groups.items()}
     steps = pieces.windows.length * round(log.period / simulator.step)
-    found = torque_widths(replay, pieces, floor, quiet, plant, steps, np.random.default_rng(seed))
+    widths = torque_widths(replay, pieces, floor, quiet, plant, steps, np.random.default_rng(seed))
     finer = float(np.sqrt(simulator.step / step))  # of white noise that is drawn less often
-    return {name: TorqueWidth(finer * each.step, each.constant) for name, each in found.items()}
+    return {name: TorqueWidth(finer * each.step, each.constant) for name, each in widths.items()}
 
 
 def replays(simulator: InTheAir, pieces: Pieces, shifts: np.ndarray) -> Replay:

@@ -55,7 +55,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         raise InputError(f"the held-out trajectories have a control period of {periods}")
     grounding = scenario.grounding
     transformation = grounding if isinstance(grounding, LoadedTransformation) else None
-    expected = transformation.expected if transformation else without_margins(grounding)
+    expected = transformation.deterministic if transformation else without_margins(grounding)
     lacking = tuple(dict.fromkeys(part for episode in heldout.episodes for part in missing(episode, layout)))
     env = scenario.world.make()
     try:
@@ -71,7 +71,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         env.close()
     ran = pi0_in(scenario, parameters, derive_seed(seed, EPISODES))
     return GroundingReport(
-        {group: found for group, found in deviations.items() if found},
+        {group: deviation for group, deviation in deviations.items() if deviation},
         layout.joints,
         len(ran),
         sum(fell for _, fell in ran),
@@ -79,7 +79,7 @@ def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int)
         count_allowed_falls(heldout),
         transformation.alpha if transformation else None,
         reach,
-        sum(one.ended_in_a_fall for one in of_policy(heldout, pi0=False)),
+        sum(episode.ended_in_a_fall for episode in of_policy(heldout, pi0=False)),
         lacking,
     )
 

@@ -98,19 +98,19 @@ def measure(world: Any, grounding: Grounding, seed: int) -> Compliance:
     if not isinstance(world, BulletWorld):
         raise ConfigError("world", "only a robot in Bullet can be loaded from outside")
     held, robot = replace(world, floating=False, start_noise=0.0), world.plant.robot
-    quiet = getattr(grounding, "expected", grounding)
+    quiet = getattr(grounding, "deterministic", grounding)
     effort = np.array([robot.joint(name).effort for name in robot.motors])
-    found, apart = np.zeros((4, len(robot.motors))), isinstance(grounding, NoGrounding) and separate(world.plant)
+    quantities, apart = np.zeros((4, len(robot.motors))), isinstance(grounding, NoGrounding) and separate(world.plant)
     env = BulletEnv(held, plant=replace(noiseless(held.plant), pushes=()))
     for number, loaded in enumerate(rounds(robot) if apart else np.eye(len(robot.motors), dtype=bool)):
         swing = Swing(AMPLITUDE * effort * loaded, held.step)
         hold(env, quiet, swing, swing.duration, derive_seed(seed, "swing", number))
-        found[:3, loaded] = swing.answer()[:, loaded]
-        rising = Ramp(RATE * effort * loaded * inwards(robot), DRAG * effort * loaded, found[0])
+        quantities[:3, loaded] = swing.answer()[:, loaded]
+        rising = Ramp(RATE * effort * loaded * inwards(robot), DRAG * effort * loaded, quantities[0])
         hold(env, quiet, rising, MOST / RATE, derive_seed(seed, "yield", number))
-        found[3, loaded] = np.where(rising.yielded, rising.torque, MOST * effort)[loaded]
+        quantities[3, loaded] = np.where(rising.yielded, rising.torque, MOST * effort)[loaded]
     env.close()
-    return Compliance(robot.motors, joint_groups(robot), *found)
+    return Compliance(robot.motors, joint_groups(robot), *quantities)
 
 
 class Swing:
@@ -210,7 +210,7 @@ def hold(env: BulletEnv, grounding: Grounding, load: Swing | Ramp, duration: flo
 def stance(robot: Robot) -> np.ndarray:
     """Return the robot's stance as an action [rad], shape (n_joints,)."""
     limits = [robot.joint(name) for name in robot.controlled]
-    return np.array([min(max(robot.stance.get(one.name, 0.0), one.lower), one.upper) for one in limits])
+    return np.array([min(max(robot.stance.get(joint.name, 0.0), joint.lower), joint.upper) for joint in limits])
 
 
 def inwards(robot: Robot) -> np.ndarray:
@@ -243,8 +243,10 @@ def rounds(robot: Robot) -> list[np.ndarray]:
 
 def joint_groups(robot: Robot) -> Mapping[str, tuple[str, ...]]:
     """Return the motors by group of the robot; what is in none is a group, all motors if there are no groups."""
-    groups = {name: tuple(one for one in robot.motors if one in members) for name, members in robot.groups.items()}
-    inside = {one for members in groups.values() for one in members}
-    rest = tuple(one for one in robot.motors if one not in inside)
+    groups = {
+        name: tuple(motor for motor in robot.motors if motor in members) for name, members in robot.groups.items()
+    }
+    inside = {motor for members in groups.values() for motor in members}
+    rest = tuple(motor for motor in robot.motors if motor not in inside)
     every = {**groups, ("others" if groups else "all"): rest}
     return {name: members for name, members in every.items() if members}

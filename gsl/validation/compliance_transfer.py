@@ -48,15 +48,15 @@ def compute_transfers(sim: Compliance, grounded: Compliance, real: Compliance) -
     """Return what a grounding hands over, by group of joints."""
     noise = SURELY * np.hypot(sim.noise, real.noise)
     stiff, strong = np.fmax(noise, RESOLUTION * np.abs(sim.impedance)), RESOLUTION * sim.torque
-    found = {}
+    shares = {}
     for group in sim.groups:
-        one = sim.where(group)
-        found[group] = Share(
-            compute_transfer(sim.stiffness[one], grounded.stiffness[one], real.stiffness[one], stiff[one]),
-            compute_closure(sim.impedance[one], grounded.impedance[one], real.impedance[one], stiff[one]),
-            compute_transfer(sim.torque[one], grounded.torque[one], real.torque[one], strong[one]),
+        motors = sim.where(group)
+        shares[group] = Share(
+            compute_transfer(sim.stiffness[motors], grounded.stiffness[motors], real.stiffness[motors], stiff[motors]),
+            compute_closure(sim.impedance[motors], grounded.impedance[motors], real.impedance[motors], stiff[motors]),
+            compute_transfer(sim.torque[motors], grounded.torque[motors], real.torque[motors], strong[motors]),
         )
-    return found
+    return shares
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class ComplianceReport:
         ]
 
     @property
-    def told(self) -> str:
+    def sentence(self) -> str:
         """What a person should know of it, in a sentence or two."""
         if self.real is None:
             same = "Where the grounded joints are as stiff as the simulator's, only their motion was grounded."
@@ -106,7 +106,10 @@ class ComplianceReport:
         robots = {SIM: self.sim, GROUNDED: self.grounded, **({REAL: self.real} if self.real else {})}
         return {
             group: {
-                quantity: {name: float(getattr(one, quantity)[one.where(group)].mean()) for name, one in robots.items()}
+                quantity: {
+                    name: float(getattr(compliance, quantity)[compliance.where(group)].mean())
+                    for name, compliance in robots.items()
+                }
                 for quantity in QUANTITIES
             }
             for group in self.sim.groups
@@ -122,7 +125,10 @@ class ComplianceReport:
     def document(self) -> dict[str, Any]:
         """Return everything as a JSON document."""
         robots = {SIM: self.sim, GROUNDED: self.grounded, **({REAL: self.real} if self.real else {})}
-        return {"groups": self.metrics(), "by_motor": {name: one.document() for name, one in robots.items()}}
+        return {
+            "groups": self.metrics(),
+            "by_motor": {name: compliance.document() for name, compliance in robots.items()},
+        }
 
     def _format_shares(self, group: str, quantity: str) -> tuple[str, ...]:
         if self.real is None:
@@ -161,11 +167,11 @@ def report_compliance(
         return {}  # the engine's own motors bear any load below their limit
     console.status("loading single joints in the air, without and with the grounding")
     start = derive_seed(seed, SECTION)
-    found = ComplianceReport(measure(plain, NoGrounding(), start), measure(world, grounding, start))
+    transfer = ComplianceReport(measure(plain, NoGrounding(), start), measure(world, grounding, start))
     before = json.loads(report.read_text(encoding="utf-8")) if report.exists() else {}
-    write_json(report, {**before, SECTION: found.document()})
-    console.table(TITLE, found.titles, found.rows(), found.told)
-    return {SECTION: found.metrics()}
+    write_json(report, {**before, SECTION: transfer.document()})
+    console.table(TITLE, transfer.titles, transfer.rows(), transfer.sentence)
+    return {SECTION: transfer.metrics()}
 
 
 def with_real(report: Path, real: World, seed: int) -> ComplianceReport | None:

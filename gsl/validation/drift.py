@@ -21,11 +21,11 @@ from gsl.storage.checkpoints import write_checkpoint
 FILE, KIND = "region.safetensors", "region"
 
 
-def write_region(folder: Path, known: Region) -> None:
+def write_region(folder: Path, region: Region) -> None:
     """Write where the forward model's data lie beside it."""
     write_checkpoint(
         folder / FILE,
-        {"mean": known.mean, "whitening": known.whitening, "bound": np.array([known.bound])},
+        {"mean": region.mean, "whitening": region.whitening, "bound": np.array([region.bound])},
         {"kind": KIND},
     )
 
@@ -43,28 +43,28 @@ def read_region(folder: Path) -> Region:
         raise ArtifactError(folder / FILE, f"lacks a part ({error}); train the model again") from error
 
 
-def drifts(scenario: Scenario, known: Region, found: Mapping[str, np.ndarray], seed: int) -> dict[str, float]:
+def drifts(scenario: Scenario, region: Region, policies: Mapping[str, np.ndarray], seed: int) -> dict[str, float]:
     """Return the share of ticks that each policy spends outside the data, in an episode without draws and noise.
 
     Args:
         scenario: With a `LoadedTransformation`.
-        known: Where its data lie, as windows of its forward model.
-        found: Parameters by policy, each of shape (n_parameters,).
+        region: Where its data lie, as windows of its forward model.
+        policies: Parameters by policy, each of shape (n_parameters,).
         seed: Of the episodes.
     """
     grounding = scenario.grounding
     assert isinstance(grounding, LoadedTransformation), "only learned groundings have data"
-    scenario = replace(scenario, grounding=grounding.expected)
+    scenario = replace(scenario, grounding=grounding.deterministic)
     env, shares, columns = scenario.make(), {}, scenario.world.layout.numbers(grounding.forward.joints)
-    for index, (name, parameters) in enumerate(found.items()):
+    for index, (name, parameters) in enumerate(policies.items()):
         walked = rollout(scenario, env, parameters, derive_seed(seed, index)).only(columns)
-        shares[name] = outside(grounding, known, [walked])
+        shares[name] = outside(grounding, region, [walked])
     env.close()
     return shares
 
 
-def outside(grounding: LoadedTransformation, known: Region, episodes: Sequence[Trajectory]) -> float:
+def outside(grounding: LoadedTransformation, region: Region, episodes: Sequence[Trajectory]) -> float:
     """Return the share of the ticks of episodes, of the known joints, that lie outside; 1 if none fills a window."""
     history = grounding.forward.history
-    long = [one for one in episodes if usable(one) > history.span]
-    return known.outside(transitions(long, history, 1, carried_out=False).windows) if long else 1.0
+    long = [episode for episode in episodes if usable(episode) > history.span]
+    return region.outside(transitions(long, history, 1, carried_out=False).windows) if long else 1.0

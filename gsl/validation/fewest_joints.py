@@ -33,7 +33,7 @@ def fewest(env: Any, grounding: LoadedTransformation, starts: Sequence[Place], s
     if not starts:
         raise InputError("no validation trajectory is long enough to choose joints on; say grounding.x=all")
     joints = grounding.forward.joints
-    grounding, bare = grounding.expected, _squares(env, NoGrounding(), starts, seed)
+    grounding, bare = grounding.deterministic, _squares(env, NoGrounding(), starts, seed)
     gained = (bare - _squares(env, grounding, starts, seed)).mean(axis=0)[env.layout.numbers(joints)]
     order = [joints[k] for k in np.argsort(-gained)]
     sets = [tuple(order[:k]) for k in range(len(order) + 1)]

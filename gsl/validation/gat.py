@@ -69,7 +69,7 @@ def show_report(report: GroundingReport, gate: Gate) -> None:
     if report.remark:
         gate.console.status(f"{report.remark}, whatever its joints are: look at what the search returns")
     if report.reach:
-        gate.console.status(report.reach.told)
+        gate.console.status(report.reach.sentence)
 
 
 def _check_values(ready: Scenario, heldout: Batch, gate: Gate) -> Passed:
@@ -82,7 +82,7 @@ def _check_values(ready: Scenario, heldout: Batch, gate: Gate) -> Passed:
     noise = exploration(heldout.metadata.get("action_noise", 0.0), ready.world.layout)
     report = value_report(ready, gate.parameters, real, noise, gate.seed_of("check"))
     gate.report(report.metrics())
-    gate.console.table("π0 in the grounded simulator", VALUE_TITLES, report.rows(), report.told)
+    gate.console.table("π0 in the grounded simulator", VALUE_TITLES, report.rows(), report.sentence)
     gate.judge(report.problems, "Collect more data")
     return Passed(ready, {"grounding_acceptable": not report.problems})
 

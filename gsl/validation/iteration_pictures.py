@@ -83,7 +83,7 @@ def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory, retu
     caption = (
         "A real walk that nothing was learned from; both simulators start in one of its states and play its actions."
     )
-    return Seen(traces, [one for one in walks if one], caption)
+    return Seen(traces, [walk for walk in walks if walk], caption)
 
 
 def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parameters: np.ndarray, seed: int) -> Seen:
@@ -112,7 +112,7 @@ def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parame
     if not missing(walk, grounded.layout):
         _draw_walk(robot, Shot("returned policy", "in the grounded simulator", walk, GROUNDED), folder)
     caption = "A real motion in the air that nothing was learned from; both simulators play its commands."
-    return Seen(traces, [one for one in walks if one], caption)
+    return Seen(traces, [walk for walk in walks if walk], caption)
 
 
 def _walk(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:

@@ -70,31 +70,33 @@ class LearnedReplay:
             raise ConfigError("gat.model", "a correction has a history of one length, and plain angles")
 
     @property
-    def needed(self) -> int:
+    def least_ticks(self) -> int:
         """Control periods a trajectory has to have to be learned from."""
         farthest = looking_ahead(self.model, FARTHEST)  # nobody knows yet what is diagnosed
         return shortest(farthest.of_joints, farthest.horizon)
 
-    def check(self, lengths: Sequence[int], told: str) -> None:
+    def check(self, lengths: Sequence[int], source: str) -> None:
         """Refuse to learn from too little.
 
         Args:
             lengths: Of the trajectories [control periods].
-            told: Which they are, in words.
+            source: Which they are, in words.
 
         Raises:
             ConfigError: Too few are long enough.
         """
-        if sum(length >= self.needed for length in lengths) < LEAST:
-            problem = f"{told} are fewer than {LEAST} trajectories of {self.needed} control periods to learn from"
+        if sum(length >= self.least_ticks for length in lengths) < LEAST:
+            problem = (
+                f"{source} are fewer than {LEAST} trajectories of {self.least_ticks} control periods to learn from"
+            )
             raise ConfigError("gat", f"{problem}; gat=null leaves it out")
 
-    def errors(self, world: Simulated, known: Sequence[Record], held: Sequence[Record], seed: int) -> list[float]:
+    def errors(self, world: Simulated, records: Sequence[Record], held: Sequence[Record], seed: int) -> list[float]:
         """Return the mean absolute error of every held-out trajectory [rad], NaN where a replay diverges.
 
         Args:
             world: What replays.
-            known: Trajectories to learn from.
+            records: Trajectories to learn from.
             held: What is replayed.
             seed: Of the noise and the fits.
 
@@ -102,39 +104,46 @@ class LearnedReplay:
             ConfigError: There are too few trajectories to learn from.
         """
         learner = replace(self, model=looking_ahead(self.model, world.extra_ticks))
-        known = [one for one in (record.cut_to_driven() for record in known) if len(one) >= self.needed]
-        self.check([len(one) for one in known], "the rest")
-        every = [*known, *held]
-        kinds = group_alike([one.conditions for one in every])
+        records = [
+            record for record in (record.cut_to_driven() for record in records) if len(record) >= self.least_ticks
+        ]
+        self.check([len(record) for record in records], "the rest")
+        every = [*records, *held]
+        kinds = group_alike([record.conditions for record in every])
         kind = {k: number for number, index in enumerate(kinds) for k in index}
-        solvers = [learner._solver(world, known, every[index[0]].conditions, seed) for index in kinds]
-        forwards = learner._forwards(world, known, [kind[k] for k in range(len(known))], solvers, seed)
+        solvers = [learner._solver(world, records, every[index[0]].conditions, seed) for index in kinds]
+        forwards = learner._forwards(world, records, [kind[k] for k in range(len(records))], solvers, seed)
         return [
-            world.replayed(one, LoadedTransformation(forwards[kind[k]], solvers[kind[k]]), seed)
-            for k, one in enumerate(held, start=len(known))
+            world.measure_replay(record, LoadedTransformation(forwards[kind[k]], solvers[kind[k]]), seed)
+            for k, record in enumerate(held, start=len(records))
         ]
 
-    def _solver(self, world: Simulated, known: Sequence[Record], conditions: Mapping[str, Any], seed: int) -> Solver:
+    def _solver(self, world: Simulated, records: Sequence[Record], conditions: Mapping[str, Any], seed: int) -> Solver:
         """Return what solves the simulator under some conditions for actions."""
-        played = world.batch(world.played(known, conditions, self.noise, seed))
+        played = world.batch(world.play(records, conditions, self.noise, seed))
         if len(played) < LEAST:
             raise GslError("GAT cannot learn a simulator whose replays diverge; gat=null leaves it out")
-        found, _ = fit_inverse(self.model, split_batch(played, SHARE, seed), seed, "solve", self.damping)
-        assert isinstance(found, Solver)
-        return found
+        solver, _ = fit_inverse(self.model, split_batch(played, SHARE, seed), seed, "solve", self.damping)
+        assert isinstance(solver, Solver)
+        return solver
 
     def _forwards(
-        self, world: Simulated, known: Sequence[Record], kind: Sequence[int], solvers: Sequence[Solver], seed: int
+        self, world: Simulated, records: Sequence[Record], kind: Sequence[int], solvers: Sequence[Solver], seed: int
     ) -> list[Forward]:
         """Return a forward model for every solver, given which one each trajectory belongs to."""
-        logged = world.batch(map(world.recorded, known))
+        logged = world.batch(map(world.convert, records))
         if not self.residual:
             return [fit_forward(self.model, split_batch(logged, SHARE, seed), seed)[0]] * len(solvers)
-        bases = [one.simulator for one in solvers]
-        rows = [transitions([one], bases[0].history, bases[0].horizon, carried_out=True) for one in logged.episodes]
-        windows = np.concatenate([one.windows for one in rows])
+        bases = [solver.simulator for solver in solvers]
+        rows = [
+            transitions([episode], bases[0].history, bases[0].horizon, carried_out=True) for episode in logged.episodes
+        ]
+        windows = np.concatenate([samples.windows for samples in rows])
         left = np.concatenate(
-            [one.change - bases[number].effects(one.windows) for one, number in zip(rows, kind, strict=True)]
+            [
+                samples.change - bases[number].effects(samples.windows)
+                for samples, number in zip(rows, kind, strict=True)
+            ]
         )
         network = fit_linear(windows, left, ridge=max(self.model.ridge, SHRINKING))
         return [ForwardModel(network, base.history, base.joints, horizon=base.horizon, base=base) for base in bases]
@@ -163,42 +172,45 @@ class Simulated:
         """Ticks more than one that a model has to look ahead."""
         return extra_ticks_of(change(self.simulator.plant, self.effects).servo, self.simulator.period)
 
-    def played(
-        self, known: Sequence[Record], conditions: Mapping[str, Any], noise: float, seed: int
+    def play(
+        self, records: Sequence[Record], conditions: Mapping[str, Any], noise: float, seed: int
     ) -> Iterator[Trajectory]:
         """Yield what the simulator does from the states and with the commands of logs, in cuts, with noise on top."""
         joints, longest = self.nuisances.shape[1], round(PLAYED / self.simulator.period)
         rng = np.random.default_rng(derive_seed(seed, "played"))
-        for one in known:
-            about, length = replace(one, about={**one.about, "conditions": conditions}), min(longest, len(one))
+        for record in records:
+            about, length = replace(record, about={**record.about, "conditions": conditions}), min(longest, len(record))
             cut = cut_pieces([about], self.robot, self.simulator.period, warm_up=0, scored=length)
             assert isinstance(cut.windows, Windows)
             commands = cut.windows.commands.copy()
             commands[:, :length] += noise * rng.standard_normal((len(cut), length, joints))[..., self.robot.drive]
             noisy = replace(cut, windows=cut.windows._replace(commands=commands))
-            told = self.simulator.simulate(self.effects, self.nuisances, noisy)
-            for start, path, asked in zip(cut.windows.motion[:, :1, :joints], told, commands, strict=True):
+            replays = self.simulator.simulate(self.effects, self.nuisances, noisy)
+            for start, path, asked in zip(cut.windows.motion[:, :1, :joints], replays, commands, strict=True):
                 if np.isfinite(path).all():
                     yield self._trajectory(asked[:length, :joints][::-1], np.vstack([start, path]))
 
-    def replayed(self, one: Record, grounding: LoadedTransformation, seed: int) -> float:
+    def measure_replay(self, record: Record, grounding: LoadedTransformation, seed: int) -> float:
         """Return the mean absolute error of a replay behind a grounding [rad]; NaN if it diverges."""
-        one = one.cut_to_driven()
-        if not len(one) or np.isnan(mean_errors(self.simulator, self.effects, self.nuisances, [one], self.robot)).any():
+        record = record.cut_to_driven()
+        if (
+            not len(record)
+            or np.isnan(mean_errors(self.simulator, self.effects, self.nuisances, [record], self.robot)).any()
+        ):
             return float("nan")  # Bullet bounds speeds, so that it does not say
-        start = resting(self.robot, one.position[0][self.robot.drive], one.targets[0], floating=False)
-        motion = np.array([one.position[0], one.velocity[0]])[:, self.robot.drive]
+        start = resting(self.robot, record.position[0][self.robot.drive], record.targets[0], floating=False)
+        motion = np.array([record.position[0], record.velocity[0]])[:, self.robot.drive]
         start = start._replace(reading=start.reading._replace(motion=motion))
-        env, told = self._env(one.conditions), []
+        env, positions = self._env(record.conditions), []
         run = grounding.start(env.layout, np.random.default_rng(seed))
         try:
             seen, _ = env.reset(seed=seed, options={"start": start})
-            for action in one.targets[:, : len(env.layout.joints)]:
+            for action in record.targets[:, : len(env.layout.joints)]:
                 seen, *_ = env.step(run.transform(seen, action))
-                told.append(seen[env.layout["position"]])
+                positions.append(seen[env.layout["position"]])
         finally:
             env.close()
-        return float(np.abs(np.array(told) - one.position[1:]).mean())
+        return float(np.abs(np.array(positions) - record.position[1:]).mean())
 
     def _env(self, conditions: Mapping[str, Any]) -> BulletEnv:
         """Return the engine with this simulator, in which a grounding can act, without noise as in all replays."""
@@ -207,9 +219,9 @@ class Simulated:
         plant = change(self.simulator.plant, self.effects, self.nuisances)
         return BulletEnv(world, noiseless(change(plant, conditions)))
 
-    def recorded(self, one: Record) -> Trajectory:
+    def convert(self, record: Record) -> Trajectory:
         """Return a log's trajectory as a model learns it."""
-        return self._trajectory(one.targets[:, : one.position.shape[1]], one.position)
+        return self._trajectory(record.targets[:, : record.position.shape[1]], record.position)
 
     def batch(self, episodes: Iterable[Trajectory]) -> Batch:
         """Return trajectories of this robot."""

@@ -44,18 +44,18 @@ def policy_gap(
         console: Shown the progress.
     """
     with console.progress(2 * effort.episodes * len(measured.policies), "policies in both simulators") as progress:
-        sim, diagnosed = (_play(measured, measured.setup(one), effort, progress) for one in (before, after))
+        sim, diagnosed = (_play(measured, measured.setup(world), effort, progress) for world in (before, after))
     seed = derive_seed(effort.seed, "policy_gap")
     rows = [
         {
-            "name": one.name,
-            "sim": _simulate(one_sim),
-            "diagnosed": _simulate(one_diagnosed),
-            "real": _side(one.values, one.falls, stopped=one.stopped),
+            "name": policy.name,
+            "sim": _simulate(simulated),
+            "diagnosed": _simulate(corrected),
+            "real": _side(policy.values, policy.falls, stopped=policy.stopped),
         }
-        for one, one_sim, one_diagnosed in zip(measured.policies, sim, diagnosed, strict=True)
+        for policy, simulated, corrected in zip(measured.policies, sim, diagnosed, strict=True)
     ]
-    found = {
+    gap = {
         "unit": measured.task.unit,
         "shown": measured.task.shown,
         "policies": len(rows),
@@ -65,17 +65,17 @@ def policy_gap(
         "rows": rows,
         **_agreement(rows, seed),
     }
-    whole = [row for row, one in zip(rows, measured.policies, strict=True) if not one.stopped]
+    whole = [row for row, policy in zip(rows, measured.policies, strict=True) if not policy.stopped]
     rest = {"policies": len(whole), **_agreement(whole, seed)} if 0 < len(whole) < len(rows) else None
-    return {**found, "never_stopped": rest, "caveats": _caveats(found, len(rows) - len(whole), rest)}
+    return {**gap, "never_stopped": rest, "caveats": _caveats(gap, len(rows) - len(whole), rest)}
 
 
 def _play(measured: RealReturns, world: BulletWorld, effort: Effort, progress: Progress) -> list[list[Episode]]:
     """Return the episodes of each policy."""
     scenario = Scenario(world, measured.task, measured.policy, REAL, NoGrounding())
     jobs = [
-        Job(one.parameters, derive_seed(effort.seed, "policy_gap", one.name, number))
-        for one in measured.policies
+        Job(policy.parameters, derive_seed(effort.seed, "policy_gap", policy.name, number))
+        for policy in measured.policies
         for number in range(effort.episodes)
     ]
     done = episodes(scenario, jobs, workers=effort.workers, progress=progress)
@@ -83,69 +83,69 @@ def _play(measured: RealReturns, world: BulletWorld, effort: Effort, progress: P
 
 
 def _simulate(done: Sequence[Episode]) -> dict[str, Any]:
-    return _side(np.array([one.value for one in done]), sum(one.fell for one in done), stopped=False)
+    return _side(np.array([episode.value for episode in done]), sum(episode.fell for episode in done), stopped=False)
 
 
 def _side(values: np.ndarray, falls: int, *, stopped: bool) -> dict[str, Any]:
     """Return the mean with its interval; a policy that was stopped at its fall has none."""
-    told = _bound(mean_interval(values))
+    mean = _bound(mean_interval(values))
     bounds = {"low": None, "high": None} if stopped else {}
-    return {**told, **bounds, "falls": falls, "episodes": len(values)}
+    return {**mean, **bounds, "falls": falls, "episodes": len(values)}
 
 
 def _agreement(rows: Sequence[Mapping[str, Any]], seed: int) -> dict[str, Any]:
     """Return mean absolute gap and rank correlation of either simulator, with intervals by bootstrap over policies."""
     real, before, after = (np.array([row[key]["value"] for row in rows]) for key in ("real", "sim", "diagnosed"))
-    told = {"before": before, "after": after}
+    simulators = {"before": before, "after": after}
     return {
-        "gap": {when: _gap(simulated, real, seed) for when, simulated in told.items()},
-        "correlation": {when: _correlation(simulated, real, seed) for when, simulated in told.items()},
+        "gap": {when: _gap(simulated, real, seed) for when, simulated in simulators.items()},
+        "correlation": {when: _correlation(simulated, real, seed) for when, simulated in simulators.items()},
     }
 
 
 def _gap(simulated: np.ndarray, real: np.ndarray, seed: int) -> dict[str, float | None]:
     apart = np.abs(simulated - real)
-    found = bootstrap_interval(lambda chosen: float(apart[chosen].mean()), len(apart), np.random.default_rng(seed))
-    return _bound(found)
+    interval = bootstrap_interval(lambda chosen: float(apart[chosen].mean()), len(apart), np.random.default_rng(seed))
+    return _bound(interval)
 
 
 def _correlation(simulated: np.ndarray, real: np.ndarray, seed: int) -> dict[str, float | None] | None:
     if len(real) < RANKED or np.isnan(rank_correlation(simulated, real)):
         return None
 
-    def drawn(chosen: np.ndarray) -> float:
+    def resample(chosen: np.ndarray) -> float:
         return rank_correlation(simulated[chosen], real[chosen])
 
-    return _bound(bootstrap_interval(drawn, len(real), np.random.default_rng(seed)))
+    return _bound(bootstrap_interval(resample, len(real), np.random.default_rng(seed)))
 
 
 def _bound(interval: Interval) -> dict[str, float | None]:
     names = ("value", "low", "high")
-    return {name: one if np.isfinite(one) else None for name, one in zip(names, interval, strict=True)}
+    return {name: value if np.isfinite(value) else None for name, value in zip(names, interval, strict=True)}
 
 
-def _caveats(found: Mapping[str, Any], stopped: int, rest: Mapping[str, Any] | None) -> list[str]:
+def _caveats(gap: Mapping[str, Any], stopped: int, rest: Mapping[str, Any] | None) -> list[str]:
     said = []
-    if found["policies"] < found["measured"]:
-        said.append(f"{found['measured']} policies were measured; these {found['policies']} are spread over the list.")
-    if found["policies"] < RANKED:
+    if gap["policies"] < gap["measured"]:
+        said.append(f"{gap['measured']} policies were measured; these {gap['policies']} are spread over the list.")
+    if gap["policies"] < RANKED:
         said.append(f"{RANKED} policies are the least for a rank correlation.")
-    elif None in found["correlation"].values():
+    elif None in gap["correlation"].values():
         said.append("Where all policies return the same there is no rank correlation.")
-    if found["simulator"] == "calibrated":
+    if gap["simulator"] == "calibrated":
         said.append("The verdict names no cause: the second simulator is the first one calibrated joint by joint.")
     if stopped:
-        told = "1 policy was" if stopped == 1 else f"{stopped} policies were"
-        without = f" {_without(found, rest)}" if rest else ""
+        stops = "1 policy was" if stopped == 1 else f"{stopped} policies were"
+        without = f" {_without(gap, rest)}" if rest else ""
         said.append(
-            f"{told} stopped at the first fall in real: the real return is rough there, with no interval.{without}"
+            f"{stops} stopped at the first fall in real: the real return is rough there, with no interval.{without}"
         )
     return said
 
 
-def _without(found: Mapping[str, Any], rest: Mapping[str, Any]) -> str:
+def _without(gap: Mapping[str, Any], rest: Mapping[str, Any]) -> str:
     """Return the figures of the policies that did all their real episodes."""
-    gaps = [f"{found['shown'] * one['value']:.3g}" for one in rest["gap"].values()]
-    orders = [one and f"{one['value']:.2f}" for one in rest["correlation"].values()]
+    gaps = [f"{gap['shown'] * interval['value']:.3g}" for interval in rest["gap"].values()]
+    orders = [interval and f"{interval['value']:.2f}" for interval in rest["correlation"].values()]
     ranks = f", rank correlations {' and '.join(orders)}" if all(orders) else ""
-    return f"Without: {' and '.join(gaps)} {found['unit']} from real{ranks}."
+    return f"Without: {' and '.join(gaps)} {gap['unit']} from real{ranks}."

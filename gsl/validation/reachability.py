@@ -43,7 +43,7 @@ class Reachability(NamedTuple):
         return float(self.unreached.mean())
 
     @property
-    def told(self) -> str:
+    def sentence(self) -> str:
         """In a sentence."""
         worst = int(np.argmax(self.unreached))
         share = f"in {100 * self.share:.0f} % of the steps and joints no action of the simulator does what is predicted"
@@ -67,23 +67,23 @@ def reachability(env: Any, grounding: LoadedTransformation, starts: Sequence[Pla
         seed: Of all randomness.
     """
     x, joints = env.layout["position"], grounding.forward.joints
-    known = env.layout.numbers(joints)
+    numbers = env.layout.numbers(joints)
     changes = np.array([place.seen[place.tick + 1][x] - place.seen[place.tick][x] for place in starts])
     wanted = changes.copy()  # of joints that the models do not know nothing else is expected
-    wanted[:, known] = [_expect(grounding, place, known, env.layout) for place in starts]
-    tolerance = FLOOR + TOLERANCE * np.sqrt(np.mean(changes[:, known] ** 2, axis=0))
-    missed = [measure_misses(env, place, target, seed)[known] for place, target in zip(starts, wanted, strict=True)]
+    wanted[:, numbers] = [_expect(grounding, place, numbers, env.layout) for place in starts]
+    tolerance = FLOOR + TOLERANCE * np.sqrt(np.mean(changes[:, numbers] ** 2, axis=0))
+    missed = [measure_misses(env, place, target, seed)[numbers] for place, target in zip(starts, wanted, strict=True)]
     return Reachability(joints, np.mean(np.abs(missed) > tolerance, axis=0), len(starts))
 
 
-def _expect(grounding: LoadedTransformation, place: Place, known: list[int], layout: Layout) -> np.ndarray:
+def _expect(grounding: LoadedTransformation, place: Place, numbers: list[int], layout: Layout) -> np.ndarray:
     """Return what the forward model expects of the agent's action at a start [rad], shape (len(known),)."""
     history, seen = grounding.forward.history, place.seen[: place.tick + 1]
     senses = Senses(layout, history.sensors)
-    sensed = np.array([senses.sensed(one) for one in seen])
+    sensed = np.array([senses.read(observation) for observation in seen])
     ticks = np.array([place.tick])
-    position = seen[:, layout["position"]][:, known]
-    return grounding.forward.effects(windows(history, position, place.actions[:, known], sensed, ticks))[0]
+    position = seen[:, layout["position"]][:, numbers]
+    return grounding.forward.effects(windows(history, position, place.actions[:, numbers], sensed, ticks))[0]
 
 
 def measure_misses(env: Any, place: Place, wanted: np.ndarray, seed: int) -> np.ndarray:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.core.budget import read_json
-from gsl.core.described import rebuilt
+from gsl.core.described import restore
 from gsl.core.interfaces import Policy, Task
 from gsl.core.setting import settings_of
 from gsl.errors import ArtifactError
@@ -73,8 +73,8 @@ class RealReturns:
         Settings that the real world does not have, if it is not of our kind, stay those of the simulator.
         """
         ours = self.world.get("_target_") == f"{BulletWorld.__module__}.{BulletWorld.__qualname__}"
-        known = {name: one.default for name, one in settings_of(BulletWorld).items()} if ours else {}
-        settings = known | dict(self.world)
+        defaults = {name: option.default for name, option in settings_of(BulletWorld).items()} if ours else {}
+        settings = defaults | dict(self.world)
         return replace(sim, **{name: settings[name] for name in _SETUP if name in settings})
 
 
@@ -109,16 +109,16 @@ def _read(named: Path, sim: BulletWorld, trust: Collection[str]) -> RealReturns:
     places = _iterations(named) if manifest.read(named).kind == _ITERATE else [named]
     configs = [_check(place, sim) for place in places]
     config = configs[-1]
-    policy = rebuilt(config["policy"], trust=trust, where="policies.policy")
-    task = rebuilt(config["task"], trust=trust, where="policies.task")
-    found: list[MeasuredPolicy] = []
+    policy = restore(config["policy"], trust=trust, where="policies.policy")
+    task = restore(config["task"], trust=trust, where="policies.task")
+    policies: list[MeasuredPolicy] = []
     for place, settings in zip(places, configs, strict=True):
         rows = _measure(place, policy, settings["episodes"], f"{place.parent.name}/" if len(places) > 1 else "")
-        found += rows[1:] if found else rows  # a later evaluation begins with what the one before has returned
-    for one in found:
-        policy.posture(one.parameters, sim.layout)
-    chosen = np.unique(np.linspace(0, len(found) - 1, min(MOST, len(found))).round().astype(int))
-    return RealReturns(task, policy, config["world"], tuple(found[k] for k in chosen), len(found))
+        policies += rows[1:] if policies else rows  # a later evaluation begins with what the one before has returned
+    for measured in policies:
+        policy.posture(measured.parameters, sim.layout)
+    chosen = np.unique(np.linspace(0, len(policies) - 1, min(MOST, len(policies))).round().astype(int))
+    return RealReturns(task, policy, config["world"], tuple(policies[k] for k in chosen), len(policies))
 
 
 def _resolve(reference: str) -> Path:
@@ -141,7 +141,7 @@ def _iterations(named: Path) -> list[Path]:
 
 def _source(evaluation: Path) -> Path:
     """Return the policies that an evaluation has measured, if they still are what they were."""
-    parents = {one.role: one for one in manifest.read(evaluation).parents}
+    parents = {parent.role: parent for parent in manifest.read(evaluation).parents}
     if ROLE not in parents:
         raise ArtifactError(evaluation, "measured one policy alone, so that there is nothing to rank")
     made_from = parents[ROLE]
@@ -164,8 +164,10 @@ def _check(evaluation: Path, sim: BulletWorld) -> dict[str, Any]:
         raise ArtifactError(evaluation, f"its policies act every {period:g} s, but sim= every {sim.period:g} s")
     found_for = read_policies(_file(_source(evaluation))).task
     if isinstance(found_for, Mapping) and found_for.get("_target_") != task["_target_"]:
-        told = [str(one.get("_target_")).rpartition(".")[2] for one in (found_for, task)]
-        raise ArtifactError(evaluation, f"its policies are of another task: found for {told[0]}, measured at {told[1]}")
+        tasks = [str(settings.get("_target_")).rpartition(".")[2] for settings in (found_for, task)]
+        raise ArtifactError(
+            evaluation, f"its policies are of another task: found for {tasks[0]}, measured at {tasks[1]}"
+        )
     return config
 
 
@@ -177,7 +179,7 @@ def _measure(evaluation: Path, policy: Policy, episodes: int, prefix: str) -> li
     """Return all policies of one evaluation; fresh episodes count instead of the `episodes` by which one was chosen."""
     table = read_json(evaluation / EVALUATION)
     fresh = {row["name"]: row for row in table["confirmation"]}
-    thetas = {one.name: vector(policy, one) for one in records(policy, str(_source(evaluation)))}
+    thetas = {record.name: vector(policy, record) for record in records(policy, str(_source(evaluation)))}
     return [
         MeasuredPolicy(
             f"{prefix}{row['name']}",

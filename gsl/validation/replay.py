@@ -67,13 +67,13 @@ def places(episodes: Sequence[Trajectory], layout: Layout, limit: int, past: int
     Raises:
         KeyError: with the name of a column that was not recorded.
     """
-    found = []
+    places = []
     for episode in episodes:
         seen = observations(episode, layout)
         sent = actions(episode, carried_out=True)
-        found += [Place(seen, sent, tick) for tick in range(past, usable(episode) - TICKS + 1, STRIDE)]
-    chosen = np.unique(np.linspace(0, len(found) - 1, min(limit, len(found))).round().astype(int)) if found else ()
-    return [found[index] for index in chosen]
+        places += [Place(seen, sent, tick) for tick in range(past, usable(episode) - TICKS + 1, STRIDE)]
+    chosen = np.unique(np.linspace(0, len(places) - 1, min(limit, len(places))).round().astype(int)) if places else ()
+    return [places[index] for index in chosen]
 
 
 def replay_starts(env: BulletEnv, grounding: Grounding, starts: Sequence[Place], seed: int) -> dict[int, Deviations]:

@@ -49,23 +49,23 @@ class GroundingReport:
     @property
     def problems(self) -> tuple[str, ...]:
         """Why nothing should be optimised in this grounding, in words."""
-        found = self._farther() if self.deviations else []
+        problems = self._farther() if self.deviations else []
         if self.falls > self.allowed:
-            found.append(f"π0 falls in {self.falls} of {self.episodes} episodes of the grounded simulator")
-        return tuple(found)
+            problems.append(f"π0 falls in {self.falls} of {self.episodes} episodes of the grounded simulator")
+        return tuple(problems)
 
     def _farther(self) -> list[str]:
         group = OFF if OFF in self.deviations else PI0
         errors = {name: degrees(self.deviations[group][name][TICKS].joints) for name in (GROUNDED, BARE)}
         cut = f"held out, but fallen or stopped too early: {self.cut}; " if self.cut else ""
         nothing = f"off π0 nothing was held out to measure it on ({cut}collect neighbours)"
-        found = [] if group == OFF else [nothing]
+        problems = [] if group == OFF else [nothing]
         if errors[GROUNDED] > errors[BARE]:
             against = f"{errors[GROUNDED]:.2f}°, without grounding {errors[BARE]:.2f}°"
-            found.append(
+            problems.append(
                 f"after {TICKS} ticks the joints {_name_group(group)} are farther from the real ones: {against}"
             )
-        return found
+        return problems
 
     @property
     def remark(self) -> str:
@@ -88,7 +88,7 @@ class GroundingReport:
         """Return everything as a JSON document."""
         errors = {
             group: {
-                name: {_span(ticks): self._errors(one) for ticks, one in by_ticks.items()}
+                name: {_span(ticks): self._errors(deviations) for ticks, deviations in by_ticks.items()}
                 for name, by_ticks in sims.items()
             }
             for group, sims in self.deviations.items()
@@ -122,13 +122,13 @@ class GroundingReport:
             for name, by_ticks in simulators.items()
         ]
 
-    def _errors(self, one: Deviations) -> dict[str, Any]:
+    def _errors(self, deviations: Deviations) -> dict[str, Any]:
         return {
-            "replays": len(one),
-            "joints_deg": degrees(one.joints),
-            "pitch_deg": degrees(one.pitch),
-            "forward_mm": one.forward_mm,
-            "by_joint_deg": degrees_by_joint(one.joints, self.joints),
+            "replays": len(deviations),
+            "joints_deg": degrees(deviations.joints),
+            "pitch_deg": degrees(deviations.pitch),
+            "forward_mm": deviations.forward_mm,
+            "by_joint_deg": degrees_by_joint(deviations.joints, self.joints),
         }
 
 
@@ -138,8 +138,8 @@ TITLES = (
 )
 
 
-def _cells(one: Deviations) -> tuple[str, str, str]:
-    return f"{degrees(one.joints):.2f}", f"{degrees(one.pitch):.2f}", f"{one.forward_mm:.1f}"
+def _cells(deviations: Deviations) -> tuple[str, str, str]:
+    return f"{degrees(deviations.joints):.2f}", f"{degrees(deviations.pitch):.2f}", f"{deviations.forward_mm:.1f}"
 
 
 def _name_group(group: str) -> str:

@@ -28,16 +28,16 @@ def check_servo(
         ensemble: Whether all its members are used.
     """
     metrics, ran = load(reference, MAKER).metrics, pi0_in(scenario, parameters, seed)
-    found = problems(metrics) + (problems_of_members(metrics) if ensemble else [])
+    complaints = problems(metrics) + (problems_of_members(metrics) if ensemble else [])
     if falls := sum(fell for _, fell in ran):
-        found.append(f"π0 falls in {falls} of {len(ran)} episodes of the simulator with the learned servo")
+        complaints.append(f"π0 falls in {falls} of {len(ran)} episodes of the simulator with the learned servo")
     return {
         "floors_before": metrics["floors_before"],
         "floors_after": metrics["floors_after"],
         "groups": metrics["groups"],
         "pi0": {"episodes": len(ran), "falls": falls, "value": float(np.mean([value for value, _ in ran]))},
-        "acceptable": not found,
-        "problems": found,
+        "acceptable": not complaints,
+        "problems": complaints,
         "remarks": remarks(metrics),
     }
 

@@ -33,11 +33,13 @@ class ValueReport:
         """Why nothing should be optimised in this grounding, in words: π0 is surely farther from real than without."""
         if not self._surely_nearer("ungrounded", "grounded"):
             return ()
-        told = {name: Unit().bare(self.values[name].mean()) for name in self.values}
-        return (f"π0 is worth {told['grounded']}, {told['ungrounded']} without grounding, {told['real']} in real",)
+        values = {name: Unit().bare(self.values[name].mean()) for name in self.values}
+        return (
+            f"π0 is worth {values['grounded']}, {values['ungrounded']} without grounding, {values['real']} in real",
+        )
 
     @property
-    def told(self) -> str:
+    def sentence(self) -> str:
         """What π0 tells of the grounding, in words."""
         count = len(self.values["real"])
         if count < 2:
@@ -45,12 +47,14 @@ class ValueReport:
         if self.problems:
             return "with the grounding π0 is surely farther from what it is worth in real"
         if self._surely_nearer("grounded", "ungrounded"):
-            return f"with the grounding π0 is surely nearer to what it is worth in real{self._left}"
-        found = f"π0's {count} held-out real episodes do not tell whether this grounding is nearer to real{self._left}"
-        return f"{found}: the search goes on with it"
+            return f"with the grounding π0 is surely nearer to what it is worth in real{self._remainder}"
+        sentence = (
+            f"π0's {count} held-out real episodes do not tell whether this grounding is nearer to real{self._remainder}"
+        )
+        return f"{sentence}: the search goes on with it"
 
     @property
-    def _left(self) -> str:
+    def _remainder(self) -> str:
         """What the grounding leaves of the gap, as far as that is sure; a search makes use of it."""
         left = self._apart("grounded")
         if left.lower > 0.0 or left.upper < 0.0:
@@ -66,9 +70,9 @@ class ValueReport:
         alike = any(np.ptp(values) == 0.0 for values in (simulated, real))
         return difference_interval(simulated, real, pooled=alike)
 
-    def _surely_nearer(self, one: str, other: str) -> bool:
+    def _surely_nearer(self, first: str, second: str) -> bool:
         """Whether π0 is nearer in one simulator to what it is worth in real than in another, by both intervals."""
-        near, far = self._apart(one), self._apart(other)
+        near, far = self._apart(first), self._apart(second)
         return len(self.values["real"]) > 1 and max(abs(near.lower), abs(near.upper)) < max(0.0, far.lower, -far.upper)
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -77,11 +81,11 @@ class ValueReport:
 
     def metrics(self) -> dict[str, Any]:
         """Return everything as a JSON document."""
-        told = {
+        metrics = {
             name: {"values": values.tolist(), "steps": self.steps[name].tolist()}
             for name, values in self.values.items()
         }
-        return {"pi0": told, "acceptable": not self.problems, "problems": self.problems}
+        return {"pi0": metrics, "acceptable": not self.problems, "problems": self.problems}
 
     def _row(self, name: str) -> tuple[str, ...]:
         values = self.values[name]
@@ -131,8 +135,8 @@ def value_report(
         for name, grounding in (("grounded", scenario.grounding), ("ungrounded", NoGrounding()))
     }
     episodes = {"real": list(real), **{name: _episodes(way, parameters, seed) for name, way in ways.items()}}
-    values = {name: np.array([one.value for one in done]) for name, done in episodes.items()}
-    steps = {name: np.array([float(len(one)) for one in done]) for name, done in episodes.items()}
+    values = {name: np.array([episode.value for episode in done]) for name, done in episodes.items()}
+    steps = {name: np.array([float(len(episode)) for episode in done]) for name, done in episodes.items()}
     return ValueReport(values, steps)
 
 

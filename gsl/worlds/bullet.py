@@ -122,7 +122,7 @@ class BulletEnv(gymnasium.Env):
         self._plant = plant or world.plant
         self._robot = lump(self._plant.robot)
         self._drive, self._n = self._robot.drive, len(self._robot.controlled)
-        low, high = np.array([self._robot.commanded(name) for name in self._robot.controlled]).T
+        low, high = np.array([self._robot.bound_commands(name) for name in self._robot.controlled]).T
         self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self.layout.size,), dtype=np.float64)
         self._neutral = np.clip(np.zeros(self._n), low, high)
@@ -204,8 +204,8 @@ class BulletEnv(gymnasium.Env):
         n = self._n
         observation = np.empty(self.layout.size)
         assert self.engine is not None
-        told = self.engine.encoders(reading)
-        observation[:n], observation[n : 2 * n] = told[0, :n] + self._plant.sensors.bias[:n], told[1, :n]
+        encoders = self.engine.encoders(reading)
+        observation[:n], observation[n : 2 * n] = encoders[0, :n] + self._plant.sensors.bias[:n], encoders[1, :n]
         noise = self._plant.sensors.encoder_noise[:n]
         if noise.any():
             observation[:n] += noise * self.np_random.standard_normal(n)

@@ -68,12 +68,12 @@ def client_handle(library: str, client: int) -> int:
 
 @cache
 def _client_table(library: str) -> int:
-    found = _symbols(Path(library), (_TABLE, _ANCHOR))
-    if len(found) < 2:
+    addresses = _symbols(Path(library), (_TABLE, _ANCHOR))
+    if len(addresses) < 2:
         return NO_HANDLE
     llvm.load_library_permanently(library)
     here = ctypes.cast(getattr(ctypes.CDLL(library), _ANCHOR), ctypes.c_void_p).value
-    return NO_HANDLE if here is None else here - found[_ANCHOR] + found[_TABLE]
+    return NO_HANDLE if here is None else here - addresses[_ANCHOR] + addresses[_TABLE]
 
 
 def _symbols(library: Path, names: Sequence[str]) -> dict[str, int]:
@@ -92,10 +92,10 @@ def _symbols(library: Path, names: Sequence[str]) -> dict[str, int]:
 
 
 def _addresses(symbols: np.ndarray, texts: bytes, names: Sequence[str]) -> dict[str, int]:
-    found = {}
+    addresses = {}
     for name in names:
         at = texts.find(f"\0{name}\0".encode()) + 1
         rows = symbols[symbols["name"] == at]
         if at > 0 and len(rows):
-            found[name] = int(rows["value"][0])
-    return found
+            addresses[name] = int(rows["value"][0])
+    return addresses

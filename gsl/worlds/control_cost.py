@@ -49,11 +49,11 @@ class Charged:
         high: The other ends.
     """
 
-    def __init__(self, given: ControlCost | None, low: np.ndarray, high: np.ndarray) -> None:
-        self._cost, self._weight = given, np.nan
+    def __init__(self, cost: ControlCost | None, low: np.ndarray, high: np.ndarray) -> None:
+        self._cost, self._weight = cost, np.nan
         self._middle, self._half = (high + low) / 2.0, (high - low) / 2.0
 
-    def corrected(self, reward: float, agent: np.ndarray, charged: np.ndarray, info: Mapping[str, Any]) -> float:
+    def correct(self, reward: float, agent: np.ndarray, charged: np.ndarray, info: Mapping[str, Any]) -> float:
         """Return the reward with the agent's action charged.
 
         Args:

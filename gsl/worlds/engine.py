@@ -184,9 +184,9 @@ class Engine:
 
     def encoders(self, reading: Reading) -> np.ndarray:
         """Return what the encoders tell of the motors' positions [rad] and velocities [rad/s], shape (2, n_motors)."""
-        told = np.empty_like(reading.motion)
-        encoder_motion(self._drive.servo, self._memory.servo, reading.motion, self.physics.step, told)
-        return told
+        readings = np.empty_like(reading.motion)
+        encoder_motion(self._drive.servo, self._memory.servo, reading.motion, self.physics.step, readings)
+        return readings
 
     def _outside(self, motion: np.ndarray, time: float) -> np.ndarray:
         """Push the robot's links and return the joint torques of a user's own effect [N·m], shape (n_motors,)."""

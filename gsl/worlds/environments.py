@@ -39,10 +39,10 @@ def make_environment(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
         hint = "" if ":" in name else "; one that a module of yours registers is module:id"
         raise ConfigError("env_id", f"there is no such environment: {line(error)}{hint}", given=name) from error
     except Exception as error:
-        told = f"cannot be made: {type(error).__name__}: {line(error)}"
+        problem = f"cannot be made: {type(error).__name__}: {line(error)}"
         if not kwargs:
-            raise ConfigError("env_id", told, given=name) from error
-        raise ConfigError("kwargs", f"{name} {told}", given=str(dict(kwargs))) from error
+            raise ConfigError("env_id", problem, given=name) from error
+        raise ConfigError("kwargs", f"{name} {problem}", given=str(dict(kwargs))) from error
     if not isinstance(env, gymnasium.Env):
         raise ConfigError("env_id", "is no gymnasium.Env", given=name)
     if env.spec and env.spec.id not in name:
@@ -73,12 +73,12 @@ def _maker(name: str) -> Callable[..., Any]:
 def own_module(name: str) -> Path | None:
     """Return the file of the module in `module:Class`; None of what is installed, or is gsl's own."""
     module, separator, _ = name.partition(":")
-    found = None
+    spec = None
     with suppress(Exception):  # what is wrong with a package around it, `made` tells
-        found = importlib.util.find_spec(module) if separator else None
-    if found is None or not found.has_location or found.origin is None:
+        spec = importlib.util.find_spec(module) if separator else None
+    if spec is None or not spec.has_location or spec.origin is None:
         return None
-    path = Path(found.origin)
+    path = Path(spec.origin)
     return None if any(path.is_relative_to(place) for place in _INSTALLED) else path
 
 

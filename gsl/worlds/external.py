@@ -62,9 +62,9 @@ class ExternalRobot:
     @property
     def layout(self) -> Layout:
         """What an observation holds."""
-        joints, known = self.body.controlled, {**_SIZES, "foot_force": len(self.body.feet)}
-        told: dict[str, int] = {name: known[name] for name in self.sensors if known[name]}
-        return Layout(joints, {"position": len(joints), "velocity": len(joints), **told}, self.period)
+        joints, widths = self.body.controlled, {**_SIZES, "foot_force": len(self.body.feet)}
+        sensors: dict[str, int] = {name: widths[name] for name in self.sensors if widths[name]}
+        return Layout(joints, {"position": len(joints), "velocity": len(joints), **sensors}, self.period)
 
     @property
     def limits(self) -> dict[str, Any]:
@@ -78,8 +78,8 @@ class ExternalRobot:
         effort = narrowest(self.body, [joint.effort for joint in motors])
         step = np.maximum(fastest * self.period, self.speed * bounds.jump)
         each = {"lower": bounds.lower, "upper": bounds.upper, "step": step, "path": fastest * WINDOW}
-        told: dict[str, Any] = {name: values.tolist() for name, values in {**each, "speed": fastest}.items()}
-        return {**told, "torque": effort.tolist(), "window": WINDOW}
+        table: dict[str, Any] = {name: values.tolist() for name, values in {**each, "speed": fastest}.items()}
+        return {**table, "torque": effort.tolist(), "window": WINDOW}
 
     def make(self) -> gymnasium.Env:
         """Refuse: there is nothing here that could be simulated.

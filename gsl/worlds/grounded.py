@@ -41,5 +41,5 @@ class GroundedEnv(gymnasium.Wrapper):
         sent = self._run.transform(self._seen, action)
         self._seen, reward, ended, cut, info = self.env.step(sent)
         if self._charged and sent is not action:
-            reward = self._charged.corrected(float(reward), action, sent, info)
+            reward = self._charged.correct(float(reward), action, sent, info)
         return self._seen, float(reward), ended, cut, {**info, "grounded_action": sent}

@@ -53,7 +53,7 @@ class GymnasiumWorld:
             raise ConfigError("action_noise", problem, given=f"{self.action_noise:g}")
 
     @property
-    def told(self) -> str:
+    def label(self) -> str:
         """The environment and what sets it apart from another of the same id, in a few words."""
         arguments = ", ".join(f"{name}={value}" for name, value in self.kwargs.items())
         return f"{self.env_id} ({arguments})" if arguments else self.env_id
@@ -87,7 +87,7 @@ class GymnasiumWorld:
         if start is None:
             start = np.eye(env.layout.cells)[int(env.reset(seed=0)[0][0])]
         env.close()
-        return Table.of(inside.P, np.asarray(start, dtype=float)).disturbed(self.action_noise)
+        return Table.of(inside.P, np.asarray(start, dtype=float)).disturb(self.action_noise)
 
     def make(self) -> StateEnv:
         """Build the environment."""
@@ -104,7 +104,7 @@ class GymnasiumWorld:
             env.reset(seed=0)
             env.step(np.zeros(len(env.layout.joints)))
         except GslError as error:
-            raise ConfigError("env_id", str(error).removeprefix(f"{self.told}: "), given=self.told) from error
+            raise ConfigError("env_id", str(error).removeprefix(f"{self.label}: "), given=self.label) from error
         finally:
             env.close()
 
@@ -151,10 +151,10 @@ class StateEnv(gymnasium.Env):
         if seed is not None:
             self._rng = np.random.default_rng([seed, _STREAM])
         with self._name_failure():
-            told = self._env.reset(seed=seed)
-        if not (isinstance(told, tuple) and len(told) == 2 and isinstance(told[1], Mapping)):
-            raise GslError(f"{self.world.told}: its reset() returns no (observation, info)")
-        return self._state(told[0]), dict(told[1])
+            answer = self._env.reset(seed=seed)
+        if not (isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[1], Mapping)):
+            raise GslError(f"{self.world.label}: its reset() returns no (observation, info)")
+        return self._state(answer[0]), dict(answer[1])
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Act: an action beyond its range counts as its end.
@@ -165,30 +165,30 @@ class StateEnv(gymnasium.Env):
         sent: Any = np.asarray(action, dtype=float)
         meant = sent
         if not np.isfinite(sent).all():
-            raise GslError(f"{self.world.told}: the action {sent.tolist()} is not finite: a policy must give numbers")
+            raise GslError(f"{self.world.label}: the action {sent.tolist()} is not finite: a policy must give numbers")
         noise = self.world.action_noise
         if self.layout.choices:
             other = noise > 0.0 and self._rng.random() < noise
             number = int(self._rng.integers(self.layout.choices)) if other else round(float(sent[0]))
-            given, sent = number + self._first, np.array([float(number)])
+            own_action, sent = number + self._first, np.array([float(number)])
         else:
             shaken = sent + noise * self._rng.standard_normal(len(sent)) if noise else sent
             sent = np.clip(shaken, -1.0, 1.0)
-            given = np.clip(self._middle + self._half * sent, self._low, self._high).astype(
+            own_action = np.clip(self._middle + self._half * sent, self._low, self._high).astype(
                 self._env.action_space.dtype
             )
         with self._name_failure():
-            told = self._env.step(given)
-        if not (isinstance(told, tuple) and len(told) == 5 and isinstance(told[4], Mapping)):
+            answer = self._env.step(own_action)
+        if not (isinstance(answer, tuple) and len(answer) == 5 and isinstance(answer[4], Mapping)):
             five = "(observation, reward, terminated, truncated, info)"
-            raise GslError(f"{self.world.told}: its step() returns no {five}")
-        observation, value, ended, cut, info = told
+            raise GslError(f"{self.world.label}: its step() returns no {five}")
+        observation, value, ended, cut, info = answer
         if not np.isfinite(reward := _number(value)):
             problem = f"the reward is {line(value)}, no finite number; its dynamics or its reward are broken"
-            raise GslError(f"{self.world.told}: {problem}")
+            raise GslError(f"{self.world.label}: {problem}")
         info = {**info, "carried_out": sent}
         if noise and self.charged:
-            reward = self.charged.corrected(reward, meant, sent, info)
+            reward = self.charged.correct(reward, meant, sent, info)
         return self._state(observation), reward, bool(ended), bool(cut), info
 
     def close(self) -> None:
@@ -203,17 +203,17 @@ class StateEnv(gymnasium.Env):
         except (KeyboardInterrupt, GslError):
             raise
         except Exception as error:
-            raise GslError(f"{self.world.told}: fails by itself: {type(error).__name__}: {line(error)}") from error
+            raise GslError(f"{self.world.label}: fails by itself: {type(error).__name__}: {line(error)}") from error
 
     def _state(self, observation: Any) -> np.ndarray:
         state = np.array(observation, dtype=float).ravel() - self._lowest
         if len(state) != self.layout.states:
             problem = f"observes {len(state)} numbers, but its space has {self.layout.states}"
-            raise GslError(f"{self.world.told}: {problem}")
+            raise GslError(f"{self.world.label}: {problem}")
         if not np.isfinite(state).all():
             place = int(np.argmin(np.isfinite(state)))
             problem = f"state.{place} is {state[place]}; its dynamics are broken, or its time step is too long"
-            raise GslError(f"{self.world.told}: {problem}")
+            raise GslError(f"{self.world.label}: {problem}")
         return state
 
 

@@ -58,10 +58,10 @@ def test_texts_stay_texts(name: str, elsewhere: Path) -> None:
 def test_rollouts_are_trajectories_that_can_be_written(elsewhere: Path) -> None:
     world, task = gsl.make_world("nao_ideal"), gsl.make_task("walk", duration=0.6)
     batch = gsl.roll_out(world, task, episodes=2, seed=4)
-    assert [one.position.shape for one in batch.episodes] == [(31, 15)] * 2
+    assert [episode.position.shape for episode in batch.episodes] == [(31, 15)] * 2
     again = gsl.roll_out(world, task, episodes=2, seed=4, workers=2)
-    for one, other in zip(batch.episodes, again.episodes, strict=True):
-        np.testing.assert_array_equal(one.position, other.position)
+    for episode, other in zip(batch.episodes, again.episodes, strict=True):
+        np.testing.assert_array_equal(episode.position, other.position)
     gsl.write_trajectories("log.parquet", batch)
     back = gsl.read_trajectories("log.parquet")
     np.testing.assert_array_equal(back.episodes[1].position, batch.episodes[1].position)
@@ -88,11 +88,11 @@ def test_a_diagnosis_is_an_object_with_its_page(elsewhere: Path) -> None:
     late = {"world.effects.command_latency.delay": 0.02, "world.period": 0.02}
     log = gsl.run("collect", world="xl330_pendulum", task="excite", name="air", workers=1, **late)
     world = gsl.make_world("xl330_pendulum", period=0.02)
-    found = gsl.diagnose(log.folder, world, most=1, duels=0, nulls=1, limits=False, workers=1)
-    assert "command_latency" in found.causes
-    assert str(found).startswith(f"{found.verdict}: ")
-    assert "srcdoc" in found._repr_html_()
-    assert "command_latency" in found.world.effects  # type: ignore[attr-defined]
+    findings = gsl.diagnose(log.folder, world, most=1, duels=0, nulls=1, limits=False, workers=1)
+    assert "command_latency" in findings.causes
+    assert str(findings).startswith(f"{findings.verdict}: ")
+    assert "srcdoc" in findings._repr_html_()
+    assert "command_latency" in findings.world.effects  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(

@@ -23,18 +23,18 @@ from gsl.storage.hashing import file_hash
 from gsl.storage.records import Records
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.servo_state import COMMANDS
-from gsl_benchmarks.blind.dials import drawn, visible
+from gsl_benchmarks.blind.dials import draw, visible
 from gsl_benchmarks.blind.extras import EXTRAS
 from gsl_benchmarks.blind.figures import Figure, figures, reliability
 from gsl_benchmarks.blind.foreign import play_foreign
-from gsl_benchmarks.blind.jitter import jittered
+from gsl_benchmarks.blind.jitter import jitter
 from gsl_benchmarks.blind.label import ABSENT, FOREIGN, JOINT, NULL, SAME, SINGLE, TWO, WITHHELD, Label
 from gsl_benchmarks.blind.make import PLAYERS, Workshop, measure_gap, rng_of
-from gsl_benchmarks.blind.mark import Mark, marked
+from gsl_benchmarks.blind.mark import Mark, mark_answer
 from gsl_benchmarks.blind.mix import Mix, Slot, slots
-from gsl_benchmarks.blind.programmes import Programme, drawn_programmes
+from gsl_benchmarks.blind.programmes import Programme, draw_programmes
 from gsl_benchmarks.blind.same import SETTLE, STEP, play_same
-from gsl_benchmarks.blind.strength import BANDS, Yardstick, turned_up
+from gsl_benchmarks.blind.strength import BANDS, Yardstick, turn_up
 from gsl_benchmarks.blind_answer import BlindAnswer
 
 pytestmark = pytest.mark.slow
@@ -49,7 +49,7 @@ QUICK = ("nulls=0", "duels=0", "most=1", "workers=1", "name=toy")
 
 def programme(robot: str = "blind_arm.arm", seconds: float = 1.6) -> Programme:
     like = Excitation(robot=robot, motions=("steps_large", "triangle_fast"), duration=seconds, repeats=1)
-    return drawn_programmes(like, 1, PERIOD, np.random.default_rng(0))[0]
+    return draw_programmes(like, 1, PERIOD, np.random.default_rng(0))[0]
 
 
 def keep_a_secret(labels: Path) -> None:
@@ -85,7 +85,7 @@ def test_a_toy_goes_from_end_to_end(toy: Path) -> None:
     results = json.loads((toy / "runs/toy/blind_reveal/results.json").read_text())
     assert results.keys() == {"gsl", "everything", "one_step", "rules", "training_error"}
     assert results["gsl"]["cases"] == 2
-    assert all(one["longest_seconds"] > 0.0 for one in results.values())
+    assert all(case["longest_seconds"] > 0.0 for case in results.values())
     assert "| top-1, medium and strong |" in (toy / "runs/toy/blind_reveal/results.md").read_text()
 
 
@@ -93,8 +93,8 @@ def test_a_case_tells_nothing_of_its_label(toy: Path) -> None:
     labels = json.loads((toy / "runs/toy/blind_make_labels/labels.json").read_text())["cases"]
     for name, entry in labels.items():
         case = toy / "runs/toy/blind_make/cases" / name
-        told = json.loads((case / "case.json").read_text())
-        assert told.keys() == {"sim", "without"}
+        document = json.loads((case / "case.json").read_text())
+        assert document.keys() == {"sim", "without"}
         assert (case / "reference.parquet").exists() == (entry["label"]["generator"] == FOREIGN)
         metadata = (case / "log.parquet").read_bytes()
         assert not [effect for effect in (*visible(), *EXTRAS) if effect.encode() in metadata]
@@ -167,20 +167,20 @@ def test_a_stopped_run_goes_on_with_what_is_missing(toy: Path, tmp_path: Path) -
     record = {"answers/case_0001.json": file_hash(tmp_path / "answers/case_0001.json")}
     Records(tmp_path / BlindAnswer.progress, str).append(record)
     stage = BlindAnswer(data=str(data), nulls=0, duels=0, most=1, workers=1)
-    told = stage.run(tmp_path, Console(json=True))
-    assert told["cases"] == 2 and not (tmp_path / BlindAnswer.progress).exists()
+    result = stage.run(tmp_path, Console(json=True))
+    assert result["cases"] == 2 and not (tmp_path / BlindAnswer.progress).exists()
     assert (tmp_path / "answers/case_0001.json").read_text() == left
     first, again = ((place / "case_0002.json").read_bytes() for place in (whole, tmp_path / "answers"))
     assert first == again
 
 
 def test_a_mix_is_kept_in_proportion() -> None:
-    found = slots(Mix(), 240, 4, np.random.default_rng(0))
-    count = {kind: sum(slot.kind == kind for slot in found) for kind in (NULL, SINGLE, JOINT, TWO, WITHHELD, ABSENT)}
+    cases = slots(Mix(), 240, 4, np.random.default_rng(0))
+    count = {kind: sum(slot.kind == kind for slot in cases) for kind in (NULL, SINGLE, JOINT, TWO, WITHHELD, ABSENT)}
     assert count == {NULL: 40, SINGLE: 112, JOINT: 24, TWO: 24, WITHHELD: 20, ABSENT: 20}
-    assert sum(slot.generator == FOREIGN for slot in found) == 60
+    assert sum(slot.generator == FOREIGN for slot in cases) == 60
     for kind in count:
-        assert any(slot.generator == FOREIGN for slot in found if slot.kind == kind)
+        assert any(slot.generator == FOREIGN for slot in cases if slot.kind == kind)
     assert len(slots(Mix(), 16, 4, np.random.default_rng(0))) == 16
 
 
@@ -217,7 +217,7 @@ def test_the_same_generator_is_the_chain_model(robot: Plant, played: Programme) 
 
 
 def test_generators_agree_where_nothing_is_at_work(robot: Plant, played: Programme) -> None:
-    other = jittered(robot, np.random.default_rng(1))
+    other = jitter(robot, np.random.default_rng(1))
     gap = told(play_foreign, other, played, {}) - told(play_same, other, played, {})
     assert 1e-5 < np.sqrt(np.mean(gap**2)) < 1e-3
     assert np.abs(gap).max() < 6e-3
@@ -253,7 +253,7 @@ def test_an_effect_means_the_same_to_both_generators(robot: Plant, played: Progr
     shift = [
         told(player, robot, played, effects) - told(player, robot, played, {}) for player in (play_same, play_foreign)
     ]
-    size = [np.sqrt(np.mean(one**2)) for one in shift]
+    size = [np.sqrt(np.mean(difference**2)) for difference in shift]
     assert np.sqrt(np.mean((shift[0] - shift[1]) ** 2)) < 0.35 * max(size)
 
 
@@ -284,7 +284,7 @@ def test_a_warming_motor_weakens_from_motion_to_motion(robot: Plant) -> None:
     path = np.repeat(np.zeros((1, 16)), 150, axis=0)
     extra = {"effect": "warming", "joints": "all", "share": 0.9}
     heavy = replace(robot, gravity=np.array([0.0, 40.0, -60.0]))
-    sags = [np.abs(one[-1]).max() for one in play_same(heavy, {}, extra, [path] * 3, [path[0]] * 3, PERIOD)]
+    sags = [np.abs(position[-1]).max() for position in play_same(heavy, {}, extra, [path] * 3, [path[0]] * 3, PERIOD)]
     assert sags[0] < sags[1] < sags[2]
 
 
@@ -311,16 +311,16 @@ def test_what_the_library_lacks_moves_both_generators_alike(
 def test_an_effect_is_turned_up_into_its_band(generator: str, strength: str) -> None:
     plant, rng = nominal(arm()), np.random.default_rng(3)
     yardstick = Yardstick.of(plant, 0.002, PERIOD, PLAYERS[generator], programme())
-    dial = drawn("command_latency", plant.robot, rng)
+    dial = draw("command_latency", plant.robot, rng)
     gap = measure_gap(dial, yardstick, 0.001)
-    found = turned_up(gap, strength, rng)
-    assert found is not None
+    turn = turn_up(gap, strength, rng)
+    assert turn is not None
     low, high = BANDS[strength]
-    assert low <= found[1] <= high and gap(found[0]) == pytest.approx(found[1])
+    assert low <= turn[1] <= high and gap(turn[0]) == pytest.approx(turn[1])
 
 
 def test_what_cannot_reach_a_band_is_refused() -> None:
-    assert turned_up(lambda share: 1.0 + share, "medium", np.random.default_rng(0)) is None
+    assert turn_up(lambda share: 1.0 + share, "medium", np.random.default_rng(0)) is None
 
 
 @pytest.mark.parametrize("kind", [NULL, JOINT, TWO, WITHHELD, ABSENT])
@@ -343,8 +343,8 @@ def test_a_case_is_what_its_slot_wants(kind: str) -> None:
 
 def label(kind: str = SINGLE, strength: str = "medium", generator: str = SAME, **more: Any) -> Label:
     effects = {"armature": {"inertia": 0.02, "joints": "all"}}
-    told = {"effects": effects, "neutral": {"armature": {"inertia": 0.0}}, **more}
-    return Label("case_0001", kind, generator, strength, 4.0, **told)
+    settings = {"effects": effects, "neutral": {"armature": {"inertia": 0.0}}, **more}
+    return Label("case_0001", kind, generator, strength, 4.0, **settings)
 
 
 def cause(effect: str = "armature", value: float = 0.02, probability: float = 0.9, **more: Any) -> dict[str, Any]:
@@ -357,21 +357,21 @@ def answer(*causes: dict[str, Any], **more: Any) -> dict[str, Any]:
 
 
 def test_the_first_cause_and_the_second() -> None:
-    assert (marked(label(), answer(cause())).first, marked(label(), answer(cause())).second) == (True, True)
-    later = marked(label(), answer(cause("deadband"), cause()))
+    assert (mark_answer(label(), answer(cause())).first, mark_answer(label(), answer(cause())).second) == (True, True)
+    later = mark_answer(label(), answer(cause("deadband"), cause()))
     assert (later.first, later.second, later.extra) == (False, True, 1)
     ranked = answer(cause("deadband"), ranking=[{"effects": ["deadband"]}, {"effects": []}, {"effects": ["armature"]}])
-    assert (marked(label(), ranked).first, marked(label(), ranked).second) == (False, True)
+    assert (mark_answer(label(), ranked).first, mark_answer(label(), ranked).second) == (False, True)
     third = answer(cause("deadband"), ranking=[{"effects": ["deadband"]}, {"effects": ["kd", "armature"]}])
-    assert not marked(label(), third).second
+    assert not mark_answer(label(), third).second
 
 
 def test_inseparable_is_the_second_best_and_twins_are_one() -> None:
     group = answer(cause(), verdict="inseparable", inseparable=[["armature", "viscous_friction"]])
-    assert (marked(label(), group).first, marked(label(), group).second) == (False, True)
+    assert (mark_answer(label(), group).first, mark_answer(label(), group).second) == (False, True)
     offset = label(effects={"sensor_bias": {"bias": 0.02, "joints": "all"}}, neutral={"sensor_bias": {"bias": 0.0}})
     twin = cause("zero_offset") | {"parameters": {"offset": {"value": 0.021, "low": 0.019, "high": 0.023}}}
-    mark = marked(offset, answer(twin, verdict="inseparable", inseparable=[["sensor_bias", "zero_offset"]]))
+    mark = mark_answer(offset, answer(twin, verdict="inseparable", inseparable=[["sensor_bias", "zero_offset"]]))
     assert (mark.first, mark.twin, mark.covered, mark.extra) == (False, True, (True,), 0)
     assert mark.errors == {"zero_offset": pytest.approx(0.05)}
 
@@ -379,10 +379,10 @@ def test_inseparable_is_the_second_best_and_twins_are_one() -> None:
 def test_errors_are_of_the_way_from_doing_nothing() -> None:
     gain = label(effects={"servo_gain": {"kp": 0.7, "joints": "all"}}, neutral={"servo_gain": {"kp": 1.0}})
     parameters = {"kp": {"value": 0.76, "low": 0.71, "high": 0.8}, "kd": {"value": 1.0, "low": 0.9, "high": 1.1}}
-    mark = marked(gain, answer({"effect": "servo_gain", "parameters": parameters, "probability": 0.9}))
+    mark = mark_answer(gain, answer({"effect": "servo_gain", "parameters": parameters, "probability": 0.9}))
     assert mark.errors == {"servo_gain": pytest.approx(0.2)} and mark.covered == (False,)
     mass = label(effects={"link_mass": {"link": "a", "mass": 0.2}}, neutral={"link_mass": {"mass": 0.0}})
-    assert marked(mass, answer(cause("link_mass", fixed={"link": "b"}))).errors == {}
+    assert mark_answer(mass, answer(cause("link_mass", fixed={"link": "b"}))).errors == {}
 
 
 def hand_made() -> list[Mark]:
@@ -393,18 +393,18 @@ def hand_made() -> list[Mark]:
     place = [{"joint": "elbow", "regime": "all", "share": 0.9}, {"joint": "shoulder", "regime": "all", "share": 0.1}]
     shrunk = {"shrinkage": {"fraction": 0.9, "ceiling_fraction": 0.75}}
     return [
-        marked(label(), answer(cause(value=0.021), **shrunk)),
-        marked(label(strength="strong"), answer(cause("deadband", probability=0.7), seconds=30.0)),
-        marked(label(strength="weak"), unknown),
-        marked(label(strength="weak"), fine),
-        marked(fault, answer(cause() | {"joints": ["elbow"]}, where=place)),
-        marked(fault, answer(cause() | {"joints": ["shoulder", "elbow"]}, where=place)),
-        marked(two, answer(cause(), cause("deadband"))),
-        marked(two, answer(cause(), cause("quantisation"))),
-        marked(label(NULL, effects={}), fine),
-        marked(label(NULL, effects={}), answer(cause(probability=0.3))),
-        marked(label(WITHHELD), unknown),
-        marked(label(ABSENT, effects={}, extra={"effect": "cogging"}), answer(cause(probability=0.5))),
+        mark_answer(label(), answer(cause(value=0.021), **shrunk)),
+        mark_answer(label(strength="strong"), answer(cause("deadband", probability=0.7), seconds=30.0)),
+        mark_answer(label(strength="weak"), unknown),
+        mark_answer(label(strength="weak"), fine),
+        mark_answer(fault, answer(cause() | {"joints": ["elbow"]}, where=place)),
+        mark_answer(fault, answer(cause() | {"joints": ["shoulder", "elbow"]}, where=place)),
+        mark_answer(two, answer(cause(), cause("deadband"))),
+        mark_answer(two, answer(cause(), cause("quantisation"))),
+        mark_answer(label(NULL, effects={}), fine),
+        mark_answer(label(NULL, effects={}), answer(cause(probability=0.3))),
+        mark_answer(label(WITHHELD), unknown),
+        mark_answer(label(ABSENT, effects={}, extra={"effect": "cogging"}), answer(cause(probability=0.5))),
     ]
 
 
@@ -433,24 +433,26 @@ EXPECTED = {
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_every_figure_counts_what_it_says(name: str) -> None:
-    found: Figure = next(one for one in figures(hand_made()) if (one.name, one.generator) == (name, SAME))
-    assert (pytest.approx(found.value), found.count) == EXPECTED[name]
+    counted: Figure = next(figure for figure in figures(hand_made()) if (figure.name, figure.generator) == (name, SAME))
+    assert (pytest.approx(counted.value), counted.count) == EXPECTED[name]
 
 
 def test_a_threshold_is_met_or_missed() -> None:
-    found = {one.name: one for one in figures(hand_made()) if one.generator == SAME}
-    assert found["two effects: at least one"].met and not found["false alarm without a cause"].met
-    assert found["top-1, weak"].met is None
-    assert all(one.value is None for one in figures(hand_made()) if one.generator == FOREIGN and one.name != "")
+    by_name = {figure.name: figure for figure in figures(hand_made()) if figure.generator == SAME}
+    assert by_name["two effects: at least one"].met and not by_name["false alarm without a cause"].met
+    assert by_name["top-1, weak"].met is None
+    assert all(
+        figure.value is None for figure in figures(hand_made()) if figure.generator == FOREIGN and figure.name != ""
+    )
 
 
 def test_reliability_compares_what_was_said_with_what_was_right() -> None:
-    said = [marked(label(), answer(cause(probability=p))) for p in np.linspace(0.8, 1.0, 10)]
-    said += [marked(label(), answer(cause("deadband", probability=p))) for p in np.linspace(0.1, 0.3, 10)]
+    said = [mark_answer(label(), answer(cause(probability=p))) for p in np.linspace(0.8, 1.0, 10)]
+    said += [mark_answer(label(), answer(cause("deadband", probability=p))) for p in np.linspace(0.1, 0.3, 10)]
     bins = reliability(said)
     assert [size for *_, size in bins] == [4] * 5
     assert [round(right, 2) for _, right, _ in bins] == [0.0, 0.0, 0.5, 1.0, 1.0]
-    ece = next(one for one in figures(said) if one.name.startswith("calibration"))
+    ece = next(figure for figure in figures(said) if figure.name.startswith("calibration"))
     assert ece.value == pytest.approx(sum(abs(p - r) * n for p, r, n in bins) / 20)
 
 

@@ -16,10 +16,10 @@ from gsl.effects.effect import names
 from gsl.robots.nao import nao
 from gsl.storage.trajectories import read
 from gsl.worlds.bullet import BulletWorld
-from gsl_benchmarks.blind.dials import drawn_on_foot, shown_by_walks
+from gsl_benchmarks.blind.dials import draw_on_foot, list_walk_effects
 from gsl_benchmarks.blind.figures import confusion, figures
 from gsl_benchmarks.blind.label import SAME, SINGLE, WALK
-from gsl_benchmarks.blind.mark import marked, right
+from gsl_benchmarks.blind.mark import mark_answer, right
 from gsl_benchmarks.blind.mix import Mix, walk_slots
 from gsl_benchmarks.blind.on_foot import Track, Yardstick
 from gsl_benchmarks.blind.seals import files_below
@@ -57,35 +57,35 @@ def test_a_walk_goes_from_end_to_end(toy: Path, tmp_path: Path) -> None:
     done("blind", "answer", "data=data", "out=answers", *quick, folder=tmp_path)
     done("blind", "reveal", "data=data", "answers=answers", f"labels={labels.parent}", "out=seen", folder=tmp_path)
     assert not (tmp_path / "answers/baselines").exists()  # they work in the air
-    told = (tmp_path / "seen/results.md").read_text()
-    assert f"| walk: {truth} |" in told
-    figure = next(line for line in told.splitlines() if line.startswith("| walk, strong: top-1 |"))
+    text = (tmp_path / "seen/results.md").read_text()
+    assert f"| walk: {truth} |" in text
+    figure = next(line for line in text.splitlines() if line.startswith("| walk, strong: top-1 |"))
     assert "[1]" in figure and "≥ 0.75" in figure
 
 
 def test_a_walk_is_one_strong_effect_on_the_ground(toy: Path) -> None:
     made = toy / "runs/toy/blind_make"
-    told = json.loads((toy / "runs/toy/blind_make_labels/labels.json").read_text())["cases"]["case_0001"]["label"]
+    document = json.loads((toy / "runs/toy/blind_make_labels/labels.json").read_text())["cases"]["case_0001"]["label"]
     log = read(made / "cases/case_0001/log.parquet")
-    assert (told["kind"], told["strength"], len(told["effects"])) == (WALK, "strong", 1)
+    assert (document["kind"], document["strength"], len(document["effects"])) == (WALK, "strong", 1)
     assert on_ground(log) and SMALL.on_foot(log) >= SMALL.still
-    assert next(iter(told["effects"])).encode() not in (made / "cases/case_0001/log.parquet").read_bytes()
+    assert next(iter(document["effects"])).encode() not in (made / "cases/case_0001/log.parquet").read_bytes()
 
 
 def test_walks_come_after_the_cases_in_the_air() -> None:
     mix = Mix(walk=20)
-    found = walk_slots(mix, np.random.default_rng(0))
-    assert len(found) == 20 and {slot.kind for slot in found} == {WALK}
+    slots = walk_slots(mix, np.random.default_rng(0))
+    assert len(slots) == 20 and {slot.kind for slot in slots} == {WALK}
     assert mix.kinds == Mix().kinds
-    assert len({slot.turn % len(shown_by_walks()) for slot in found}) == min(20, len(shown_by_walks()))
+    assert len({slot.turn % len(list_walk_effects()) for slot in slots}) == min(20, len(list_walk_effects()))
 
 
 def test_the_same_draws_make_the_same_walk() -> None:
     sim = BulletWorld(robot="nao", effects={}, start_noise=0.02)
     slot = walk_slots(Mix(walk=1), np.random.default_rng(0))[0]
-    one, again = (Track(sim, SMALL).case("case_0001", slot, np.random.default_rng(4)) for _ in range(2))
-    assert one.label == again.label
-    for walk, other in zip(one.log.episodes, again.log.episodes, strict=True):
+    first, again = (Track(sim, SMALL).case("case_0001", slot, np.random.default_rng(4)) for _ in range(2))
+    assert first.label == again.label
+    for walk, other in zip(first.log.episodes, again.log.episodes, strict=True):
         assert np.array_equal(walk.position, other.position)
         assert all(np.array_equal(walk.sensors[name], other.sensors[name]) for name in walk.sensors)
 
@@ -94,42 +94,46 @@ def test_gaps_on_the_ground_grow_with_the_effect() -> None:
     sim, rng = BulletWorld(robot="nao", effects={}, start_noise=0.02), np.random.default_rng(1)
     yardstick = Yardstick.of(sim, SMALL, 0.0015, rng)
     for effect in ("ground_compliance", "command_latency"):
-        gaps = [yardstick.gap(drawn_on_foot(effect, sim.plant, rng))(share) for share in (1e-3, 0.3, 1.0)]
+        gaps = [yardstick.gap(draw_on_foot(effect, sim.plant, rng))(share) for share in (1e-3, 0.3, 1.0)]
         assert 1.0 <= gaps[0] < 1.2 < gaps[1] < gaps[2]
 
 
 def test_the_ground_as_it_is_does_nothing() -> None:
     plant, rng = nominal(nao()), np.random.default_rng(0)
-    friction = drawn_on_foot("ground_friction", plant, rng)
+    friction = draw_on_foot("ground_friction", plant, rng)
     assert friction.entry(0.0) == {"friction": plant.contact.foot_friction}
-    soft = drawn_on_foot("ground_compliance", plant, rng)
+    soft = draw_on_foot("ground_compliance", plant, rng)
     assert soft.entry(1.0)["stiffness"] == 2e3 and soft.entry(0.1)["stiffness"] == pytest.approx(2e4)
-    assert drawn_on_foot("link_mass", plant, rng).fixed["link"] == nao().base
-    assert drawn_on_foot("deadband", plant, rng).fixed["joints"] == "all"
-    assert not {"encoder_noise", "action_noise", "uneven_ground", "external_push"} & set(shown_by_walks())
+    assert draw_on_foot("link_mass", plant, rng).fixed["link"] == nao().base
+    assert draw_on_foot("deadband", plant, rng).fixed["joints"] == "all"
+    assert not {"encoder_noise", "action_noise", "uneven_ground", "external_push"} & set(list_walk_effects())
 
 
 def test_robots_of_a_make_differ() -> None:
     plant = nominal(nao())
-    one, again, other = (Individual(seed).apply(plant) for seed in (1, 1, 2))
-    assert np.array_equal(one.servo.kp, again.servo.kp) and one.contact == again.contact
-    assert not np.array_equal(one.servo.kp, other.servo.kp) and one.contact != other.contact
+    first, again, other = (Individual(seed).apply(plant) for seed in (1, 1, 2))
+    assert np.array_equal(first.servo.kp, again.servo.kp) and first.contact == again.contact
+    assert not np.array_equal(first.servo.kp, other.servo.kp) and first.contact != other.contact
 
 
 def test_walks_count_apart() -> None:
     walk = replace(label(), kind=WALK, strength="strong")
-    marks = [marked(walk, answer(cause())), marked(walk, answer(verdict="unknown")), marked(label(), answer(cause()))]
-    found = {one.name: one for one in figures(marks) if one.generator == SAME}
-    top = found["walk, strong: top-1"]
+    marks = [
+        mark_answer(walk, answer(cause())),
+        mark_answer(walk, answer(verdict="unknown")),
+        mark_answer(label(), answer(cause())),
+    ]
+    by_name = {figure.name: figure for figure in figures(marks) if figure.generator == SAME}
+    top = by_name["walk, strong: top-1"]
     assert (top.value, top.count, top.threshold, top.met) == (0.5, 2, 0.75, False)
-    assert found["walk, strong: abstains wrongly"].value == 0.5
-    assert found["abstains wrongly"].count == found["wall time [s]"].count == 1
+    assert by_name["walk, strong: abstains wrongly"].value == 0.5
+    assert by_name["abstains wrongly"].count == by_name["wall time [s]"].count == 1
     assert confusion(marks) == {"armature": {"armature": 1}, "walk: armature": {"armature": 1, "unknown": 1}}
     assert [right(mark) for mark in marks] == [True, False, True]
 
 
 def test_twins_in_the_air_are_apart_on_the_ground() -> None:
     truth = {"effects": {"sensor_bias": {"bias": 0.02}}, "neutral": {"sensor_bias": {"bias": 0.0}}}
-    told = answer(cause("zero_offset") | {"parameters": {"offset": {"value": 0.02, "low": 0.0, "high": 0.1}}})
-    assert marked(replace(label(**truth), kind=SINGLE), told).first
-    assert not marked(replace(label(**truth), kind=WALK), told).first
+    reply = answer(cause("zero_offset") | {"parameters": {"offset": {"value": 0.02, "low": 0.0, "high": 0.1}}})
+    assert mark_answer(replace(label(**truth), kind=SINGLE), reply).first
+    assert not mark_answer(replace(label(**truth), kind=WALK), reply).first

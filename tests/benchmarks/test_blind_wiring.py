@@ -22,9 +22,9 @@ def test_cases_are_drawn_audited_and_counted(tmp_path: Path) -> None:
     first, second = (
         json.loads((tmp_path / f"runs/{name}/blind_wiring/cases.json").read_text())["cases"] for name in "ab"
     )
-    assert [(one["kind"], one["joints"], one["found"]) for one in first] == [
-        (one["kind"], one["joints"], one["found"]) for one in second
+    assert [(case["kind"], case["joints"], case["found"]) for case in first] == [
+        (case["kind"], case["joints"], case["found"]) for case in second
     ]
-    assert [bool(one["truth"]) for one in first] == [True] * 3 + [False] * 2
+    assert [bool(case["truth"]) for case in first] == [True] * 3 + [False] * 2
     table = (tmp_path / "runs/a/blind_wiring/table.md").read_text()
     assert "| all | 3 |" in table and "| physics | 1 |" in table

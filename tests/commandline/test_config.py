@@ -15,7 +15,7 @@ from gsl.commandline.config import prepare, resolve
 from gsl.commandline.failure import describe_failure
 from gsl.commandline.multirun import job_level
 from gsl.commandline.plugins import folders
-from gsl.core.described import describe, rebuilt
+from gsl.core.described import describe, restore
 from gsl.errors import ConfigError
 
 pytestmark = pytest.mark.slow
@@ -342,18 +342,18 @@ def test_every_option_of_ours_composes_and_builds(line: tuple[str, ...]) -> None
         composition = compose(command, choices)
         stage, settings, _ = prepare(resolve(composition), composition.trust)
     assert stage.kind in (command.replace("-", "_"), command.partition("-")[0])
-    assert rebuilt(describe(stage), trust=composition.trust) == stage
+    assert restore(describe(stage), trust=composition.trust) == stage
     assert not {"preset", "recipe", "name", "out"} & settings.keys()
 
 
 def test_a_saved_component_is_built_again() -> None:
     saved = {"_target_": "gsl.storage.importers.signal.Signal", "column": "mine"}
-    assert rebuilt(saved).column == "mine"
+    assert restore(saved).column == "mine"
 
 
 def test_a_saved_text_is_no_reference() -> None:
     text = "${oc.create:'{_target_: os.getcwd}'}"
-    assert rebuilt({"_target_": "gsl.storage.importers.signal.Signal", "column": text}).column == text
+    assert restore({"_target_": "gsl.storage.importers.signal.Signal", "column": text}).column == text
 
 
 @pytest.mark.parametrize(
@@ -377,11 +377,11 @@ def test_a_saved_text_is_no_reference() -> None:
 )
 def test_a_saved_component_names_classes_of_gsl_and_plain_values_only(saved: dict[str, object]) -> None:
     with pytest.raises(ConfigError):
-        rebuilt(saved)
+        restore(saved)
 
 
 def test_a_saved_component_of_the_users_own_needs_trust() -> None:
     saved = {"_target_": "example_stage.ExampleWorld", "control_period": 0.02}
     with pytest.raises(ConfigError, match="trust=example_stage if you know"):
-        rebuilt(saved)
-    assert rebuilt(saved, trust=["example_stage"]) == ExampleWorld(control_period=0.02)
+        restore(saved)
+    assert restore(saved, trust=["example_stage"]) == ExampleWorld(control_period=0.02)

@@ -58,11 +58,11 @@ def test_an_episode_that_begins_at_rest_has_windows_of_its_first_ticks() -> None
         window.see(episode.position[tick], read_sensors(episode, history.sensors)[tick])
         seen.append(window.complete(episode.action[tick]).copy())
         window.remember(episode.action[tick])
-    found = transitions([episode], history, 2, carried_out=False)
-    np.testing.assert_allclose(found.windows, seen[:-1], atol=1e-15)
-    np.testing.assert_allclose(found.change, episode.position[2:] - episode.position[:-2], atol=1e-15)
+    samples = transitions([episode], history, 2, carried_out=False)
+    np.testing.assert_allclose(samples.windows, seen[:-1], atol=1e-15)
+    np.testing.assert_allclose(samples.change, episode.position[2:] - episode.position[:-2], atol=1e-15)
     later = transitions([episode], replace(history, rested=False), 2, carried_out=False)
-    np.testing.assert_array_equal(found.windows[3:], later.windows)
+    np.testing.assert_array_equal(samples.windows[3:], later.windows)
 
 
 def test_before_the_first_tick_the_robot_stood_still() -> None:
@@ -94,7 +94,7 @@ def test_observations_and_recorded_columns_give_the_same_senses() -> None:
     episode, sensors = an_episode(), ("gyro", "tilt", "foot_force")
     senses = Senses(LAYOUT, sensors)
     rows = observations(episode, LAYOUT)
-    np.testing.assert_allclose([senses.sensed(row) for row in rows], read_sensors(episode, sensors))
+    np.testing.assert_allclose([senses.read(row) for row in rows], read_sensors(episode, sensors))
     np.testing.assert_array_equal([senses.position(row) for row in rows], episode.position)
 
 
@@ -126,20 +126,20 @@ def test_decode_undoes_encode(encoding: str) -> None:
 def test_scaling_gives_zero_mean_and_unit_variance_and_can_be_undone() -> None:
     values = RNG.normal(3.0, 5.0, size=(100, 4))
     values[:, 2] = 7.0
-    one = scaling(values)
-    np.testing.assert_allclose(one.apply(values).mean(axis=0), 0.0, atol=1e-12)
-    np.testing.assert_allclose(one.apply(values).std(axis=0), [1, 1, 0, 1], atol=1e-12)
-    np.testing.assert_allclose(one.undo(one.apply(values)), values)
+    scales = scaling(values)
+    np.testing.assert_allclose(scales.apply(values).mean(axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(scales.apply(values).std(axis=0), [1, 1, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(scales.undo(scales.apply(values)), values)
 
 
 @pytest.mark.parametrize("first", range(0, 6))
 @pytest.mark.parametrize("second", range(0, 6))
 def test_a_split_parts_all_trajectories_and_holds_out_of_every_group_of_two(first: int, second: int) -> None:
     groups = [True] * first + [False] * second
-    one = split(groups, 0.2, np.random.default_rng(1))
-    assert sorted([*one.training, *one.heldout]) == list(range(len(groups)))
-    assert bool(one.heldout) == (len(groups) > 1)
+    parts = split(groups, 0.2, np.random.default_rng(1))
+    assert sorted([*parts.training, *parts.heldout]) == list(range(len(groups)))
+    assert bool(parts.heldout) == (len(groups) > 1)
     for group in (True, False):
         if groups.count(group) >= 2:
-            assert {group} <= {groups[index] for index in one.heldout}
-            assert {group} <= {groups[index] for index in one.training}
+            assert {group} <= {groups[index] for index in parts.heldout}
+            assert {group} <= {groups[index] for index in parts.training}

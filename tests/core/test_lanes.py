@@ -8,18 +8,18 @@ from gsl.core.sine import sine_cosine
 
 
 @compile_kernel
-def _formulas(one: float, other: float, result: np.ndarray) -> None:
-    result[0] = one + 2.0 * other - one / other
-    result[1] = where(one > other, -one, min(1.0, other))
-    result[2] = where(one < 0.0, max(one, other), abs(one))
-    result[3] = np.rint(3.0 * one) + np.exp(other)
+def _formulas(first: float, second: float, result: np.ndarray) -> None:
+    result[0] = first + 2.0 * second - first / second
+    result[1] = where(first > second, -first, min(1.0, second))
+    result[2] = where(first < 0.0, max(first, second), abs(first))
+    result[3] = np.rint(3.0 * first) + np.exp(second)
     total = 0.0
     for k in range(4):
         total += k * result[k]
     result[4] = total
-    result[4] -= one
-    result[4] *= where(one == other, 0.0, 2.0)
-    result[5], result[6] = sine_cosine(20.0 * one)
+    result[4] -= first
+    result[4] *= where(first == second, 0.0, 2.0)
+    result[5], result[6] = sine_cosine(20.0 * first)
 
 
 @compile_kernel
@@ -39,10 +39,10 @@ def test_every_lane_has_the_bits_of_a_float() -> None:
 
 
 @compile_kernel
-def _functions(one: float, result: np.ndarray) -> None:
-    result[0], result[1], result[2] = np.sin(one), np.cos(one), np.tan(one)
-    result[3], result[4] = np.tanh(one), np.arctan(one)
-    result[5], result[6] = np.sqrt(abs(one)), np.log(1.0 + abs(one))
+def _functions(x: float, result: np.ndarray) -> None:
+    result[0], result[1], result[2] = np.sin(x), np.cos(x), np.tan(x)
+    result[3], result[4] = np.tanh(x), np.arctan(x)
+    result[5], result[6] = np.sqrt(abs(x)), np.log(1.0 + abs(x))
 
 
 @compile_kernel
@@ -61,11 +61,11 @@ def test_a_law_may_use_the_functions_of_numpy() -> None:
 
 def test_eight_never_lie_across_two_cache_lines() -> None:
     kept = [zeros_in_lanes(3, k) for k in range(1, 6)]
-    assert all(one.shape == (3, k + 1, LANES) and not one.any() for k, one in enumerate(kept))
-    assert all(one.ctypes.data % (8 * LANES) == 0 for one in kept)
+    assert all(array.shape == (3, k + 1, LANES) and not array.any() for k, array in enumerate(kept))
+    assert all(array.ctypes.data % (8 * LANES) == 0 for array in kept)
 
 
 def test_sine_and_cosine_are_those_of_the_c_library() -> None:
     angles = np.r_[np.linspace(-10.0, 10.0, 20001), np.linspace(-1e4, 1e4, 20001)]
-    told = np.array([sine_cosine(angle) for angle in angles])
-    np.testing.assert_allclose(told, np.column_stack([np.sin(angles), np.cos(angles)]), rtol=0.0, atol=3e-16)
+    pairs = np.array([sine_cosine(angle) for angle in angles])
+    np.testing.assert_allclose(pairs, np.column_stack([np.sin(angles), np.cos(angles)]), rtol=0.0, atol=3e-16)

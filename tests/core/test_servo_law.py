@@ -35,9 +35,9 @@ def torques(plant: Plant, steps: int = 60) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def windows() -> Windows:
-    found = log(with_fields(NAO, {})).windows
-    assert isinstance(found, Windows)
-    return found
+    cut = log(with_fields(NAO, {})).windows
+    assert isinstance(cut, Windows)
+    return cut
 
 
 def replayed(plant: Plant, windows: Windows, load: np.ndarray | None = None) -> np.ndarray:
@@ -56,9 +56,9 @@ def test_zero_weights_are_the_servo_itself_to_the_bit(name: str, windows: Window
 @pytest.mark.parametrize("floating", [True, False])
 def test_zero_weights_are_the_servo_itself_in_bullet(name: str, floating: bool) -> None:
     where = world() if floating else held()
-    given = {} if name == "nominal" else {key: np.full(N, value) for key, value in EVERYTHING.items()}
-    plant = where.plant.with_servo(**given)
-    envs = [BulletEnv(where, one) for one in (plant, lawful(plant, law(plant, **SILENT)))]
+    settings = {} if name == "nominal" else {key: np.full(N, value) for key, value in EVERYTHING.items()}
+    plant = where.plant.with_servo(**settings)
+    envs = [BulletEnv(where, servo) for servo in (plant, lawful(plant, law(plant, **SILENT)))]
     seen = [walked(env, 0, 0.6) for env in envs]
     for env in envs:
         env.close()
@@ -97,7 +97,7 @@ def activated(z: np.ndarray) -> np.ndarray:
 
 def test_the_activation_is_nearly_tanh_odd_and_saturates() -> None:
     z = np.linspace(-6.0, 6.0, 1201)
-    got = np.array([act(one) for one in z])
+    got = np.array([act(value) for value in z])
     assert np.abs(got - np.tanh(z)).max() < 0.025
     np.testing.assert_allclose(got, -got[::-1], rtol=0.0, atol=1e-14)
     assert (np.diff(got) >= 0.0).all() and act(3.0) == act(50.0) == 1.0

@@ -29,7 +29,7 @@ def test_everything_declared_can_be_read_back() -> None:
 def test_any_function_has_settings_too() -> None:
     def world(period: float, steps: int = 4) -> None: ...
 
-    assert {name: one.default for name, one in settings_of(world).items()} == {"period": REQUIRED, "steps": 4}
+    assert {name: option.default for name, option in settings_of(world).items()} == {"period": REQUIRED, "steps": 4}
 
 
 def test_values_beyond_the_documented_range_are_accepted() -> None:

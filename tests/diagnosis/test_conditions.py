@@ -281,7 +281,7 @@ def test_a_grounding_that_does_nothing_replays_as_the_chain_does() -> None:
     simulated = replace(bare(), effects={"coulomb_friction": {"torque": 0.05}}, nuisances=no_shifts(2) + 0.01)
     for one in (found[0], found[-1]):
         other = mean_errors(simulated.simulator, simulated.effects, simulated.nuisances, [one], arm())
-        assert simulated.replayed(one, untouched(), 1) == pytest.approx(other.mean(), rel=1e-3)
+        assert simulated.measure_replay(one, untouched(), 1) == pytest.approx(other.mean(), rel=1e-3)
 
 
 @pytest.mark.parametrize(("cause", "residual", "left"), [(LATE, False, 0.85), (STICKY, True, 0.85)])
@@ -320,18 +320,18 @@ def test_short_trajectories_are_played_whole() -> None:
     made = log({})
     episodes = (*made.episodes[:2], *(shortened(one, 60) for one in made.episodes[2:4]))
     found = to_records(replace(made, episodes=episodes, metadata={}), arm())
-    assert [len(one) for one in bare().played(found, {}, 0.0, 1)] == [100, 100, 60, 60]
+    assert [len(one) for one in bare().play(found, {}, 0.0, 1)] == [100, 100, 60, 60]
     assert np.isfinite(learning().errors(bare(), found, found, 1)).all()
 
 
 def test_replays_beside_others_have_no_noise_and_say_when_they_diverge() -> None:
     found = to_records(log({}), arm())[:3]
     noisy = replace(bare(), effects={"encoder_noise": {"sd": 0.01}, "action_noise": {"sd": 0.05}})
-    assert noisy.replayed(found[0], untouched(), 1) == pytest.approx(
-        bare().replayed(found[0], untouched(), 1), rel=1e-6
+    assert noisy.measure_replay(found[0], untouched(), 1) == pytest.approx(
+        bare().measure_replay(found[0], untouched(), 1), rel=1e-6
     )
     wild = replace(bare(), effects={"viscous_friction": {"coefficient": 50.0}})
-    assert np.isnan(wild.replayed(found[0], untouched(), 1))
+    assert np.isnan(wild.measure_replay(found[0], untouched(), 1))
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ NONE = np.zeros(0)
 @pytest.fixture(scope="module")
 def walk() -> Log:
     sim = BulletWorld(robot="nao", effects={}, start_noise=0.02)
-    log = Walks(episodes=2, duration=1.0).logged(sim, None, {}, 0.0, np.random.default_rng(0))
+    log = Walks(episodes=2, duration=1.0).log(sim, None, {}, 0.0, np.random.default_rng(0))
     return cut_log(log, lump(nao()), walking=True)
 
 

@@ -15,8 +15,8 @@ from gsl.diagnosis.log.records import slope
 from gsl.diagnosis.wiring.audit import Audit, audit
 from gsl.diagnosis.wiring.relation import relate
 from gsl.policies.excitation import Excitation
-from gsl_benchmarks.blind.jitter import jittered
-from gsl_benchmarks.blind.programmes import drawn_programmes
+from gsl_benchmarks.blind.jitter import jitter
+from gsl_benchmarks.blind.programmes import draw_programmes
 from gsl_benchmarks.blind.same import play_same
 from gsl_benchmarks.blind.wiring import KINDS, change, wire
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 PERIOD, STEP = 0.02, 0.002
 MOTIONS = ("steps_small", "steps_large", "triangle_medium", "triangle_fast", "chirp")
-PLAN = drawn_programmes(
+PLAN = draw_programmes(
     Excitation(robot="blind_arm.arm", motions=MOTIONS, repeats=2, duration=3.5), 1, PERIOD, np.random.default_rng(0)
 )[0]  # fmt: skip
 
@@ -32,7 +32,7 @@ PLAN = drawn_programmes(
 def logged(commands: Sequence[np.ndarray] = PLAN.commands, effects: Mapping[str, Any] | None = None) -> Batch:
     """What one robot of the arm's make logs."""
     rng = np.random.default_rng(5)
-    robot = jittered(nominal(arm()), rng)
+    robot = jitter(nominal(arm()), rng)
     episodes = []
     played = play_same(robot, effects or {}, None, commands, [one[0] for one in commands], PERIOD)
     for asked, told in zip(commands, played, strict=True):

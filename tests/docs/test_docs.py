@@ -24,8 +24,8 @@ def name(page: Path) -> str:
 @pytest.mark.parametrize("page", GUIDES, ids=name)
 def test_a_sentence_is_short_and_has_few_figures(page: Path) -> None:
     said = list(sentences(page.read_text("utf-8")))
-    assert [one for one in said if len(words(one)) > LONGEST] == []
-    assert [one for one in said if len(NUMBER.findall(one)) > FIGURES] == []
+    assert [line for line in said if len(words(line)) > LONGEST] == []
+    assert [line for line in said if len(NUMBER.findall(line)) > FIGURES] == []
 
 
 @pytest.mark.parametrize("page", GUIDES, ids=name)
@@ -67,8 +67,8 @@ def test_notebooks_and_messages_name_pages_that_exist() -> None:
 def test_the_site_keeps_links_within_docs_alone() -> None:
     hook = runpy.run_path(str(ROOT / ".ci/docs_links.py"))["on_page_markdown"]
     page = SimpleNamespace(file=SimpleNamespace(src_uri="howto/own-robot.md"))
-    told = hook("[a](../glossary.md#x) [b](../../gsl/cli.py) [c](own-logs.md) ![d](../images/walk.png)", page=page)
-    assert told == "[a](../glossary.md#x) `b` [c](own-logs.md) ![d](../images/walk.png)"
+    text = hook("[a](../glossary.md#x) [b](../../gsl/cli.py) [c](own-logs.md) ![d](../images/walk.png)", page=page)
+    assert text == "[a](../glossary.md#x) `b` [c](own-logs.md) ![d](../images/walk.png)"
 
 
 def test_the_index_and_the_site_have_every_page() -> None:

@@ -68,7 +68,9 @@ SHRUNK = {
 
 def chain() -> list[Command]:
     """The README's commands of the run `mine`, in the order of the page."""
-    return [one for one in TYPED if one.page == "README.md" and any("mine" in word for word in one.words)]
+    return [
+        command for command in TYPED if command.page == "README.md" and any("mine" in word for word in command.words)
+    ]
 
 
 @pytest.fixture(scope="module")

@@ -124,8 +124,8 @@ def test_the_order_of_the_yaml_does_not_matter() -> None:
     }
     backwards = dict(reversed(effects.items()))
     assert build(effects) == build(backwards)
-    one, other = (apply_all(nominal(nao()), build(each)) for each in (effects, backwards))
-    np.testing.assert_array_equal(one.servo.kp, other.servo.kp)
+    first, second = (apply_all(nominal(nao()), build(each)) for each in (effects, backwards))
+    np.testing.assert_array_equal(first.servo.kp, second.servo.kp)
 
 
 def test_an_effect_acts_twice_with_different_scopes() -> None:
@@ -178,5 +178,5 @@ def test_a_users_own_effect_stands_beside_ours() -> None:
 
 @pytest.mark.parametrize("name", names())
 def test_every_effect_says_what_tells_it_from_others(name: str) -> None:
-    told = describe_confusion(name)
-    assert len(told) > 40 and not told.endswith(".")
+    text = describe_confusion(name)
+    assert len(text) > 40 and not text.endswith(".")

@@ -11,7 +11,7 @@ from bodies import STANCE, followed, held, walked
 
 from gsl.commandline.composer import compose, open_hydra
 from gsl.commandline.config import resolve
-from gsl.core.described import rebuilt
+from gsl.core.described import restore
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import Setting, settings_of
 from gsl.effects.effect import KINDS, apply_all, build, effect_class, names
@@ -49,20 +49,20 @@ def chosen(name: str) -> dict[str, Any]:
 
 def numbers(name: str) -> dict[str, Setting]:
     """The settings of an effect that have a range and are not chosen."""
-    known = settings_of(effect_class(name)).items()
-    return {key: one for key, one in known if one.lower is not None and key not in chosen(name)}
+    settings = settings_of(effect_class(name)).items()
+    return {key: option for key, option in settings if option.lower is not None and key not in chosen(name)}
 
 
 def halfway(name: str) -> dict[str, Any]:
     """Values between doing nothing and the upper end of the documented range."""
-    start = {key: one.neutral or 0.0 for key, one in numbers(name).items()} | NEUTRAL.get(name, {})
-    middle = {key: 0.5 * (max(start[key], one.lower) + one.upper) for key, one in numbers(name).items()}
+    start = {key: number.neutral or 0.0 for key, number in numbers(name).items()} | NEUTRAL.get(name, {})
+    middle = {key: 0.5 * (max(start[key], number.lower) + number.upper) for key, number in numbers(name).items()}
     return {**middle, **chosen(name)}
 
 
 def neutral(name: str) -> dict[str, Any]:
     """Values that do nothing."""
-    nothing = {key: one.neutral for key, one in numbers(name).items() if one.neutral is not None}
+    nothing = {key: number.neutral for key, number in numbers(name).items() if number.neutral is not None}
     return {**halfway(name), **nothing, **NEUTRAL.get(name, {})}
 
 
@@ -73,7 +73,7 @@ def from_command_line(name: str, entry: dict[str, Any]) -> BulletWorld:
     where = [f"world.floating={str(on_ground).lower()}", "world.settle=0.1", "world.start_noise=0"]
     with open_hydra(None):
         config = resolve(compose("collect", ["world=nao_ideal", *where, *said]))
-    made: BulletWorld = rebuilt(config["world"])
+    made: BulletWorld = restore(config["world"])
     return made
 
 

@@ -88,10 +88,10 @@ def test_quantisation_makes_a_slow_ramp_a_staircase_of_its_step() -> None:
         assert run({"quantisation": {"step": 0.05}}, stand.held(end, 1.0)).told[-1] == pytest.approx(
             0.05 * np.rint(end / 0.05), abs=1e-6
         )
-    told = run({"quantisation": {"step": 0.05}}, stand.ramp(0.05, 6.0)).told
-    resting = np.abs(told - 0.05 * np.rint(told / 0.05)) < 1e-4
+    position = run({"quantisation": {"step": 0.05}}, stand.ramp(0.05, 6.0)).told
+    resting = np.abs(position - 0.05 * np.rint(position / 0.05)) < 1e-4
     assert resting.mean() > 0.5
-    assert set(np.rint(told[resting] / 0.05)) == set(range(7))
+    assert set(np.rint(position[resting] / 0.05)) == set(range(7))
 
 
 def repeats(effect: dict) -> np.ndarray:
@@ -103,12 +103,12 @@ def repeats(effect: dict) -> np.ndarray:
 
 
 def test_action_noise_grows_and_encoder_noise_does_not() -> None:
-    moved, told = repeats({"action_noise": {"sd": 0.02}}), repeats({"encoder_noise": {"sd": 0.002}})
+    moved, logged = repeats({"action_noise": {"sd": 0.02}}), repeats({"encoder_noise": {"sd": 0.002}})
     assert moved[..., 0].std() < 1e-12
     assert 0.0 < moved[..., 1].std() < 0.85 * moved[..., 10:].std()
-    assert told.std() == pytest.approx(0.002 * np.sqrt(11 / 12), rel=0.05)
+    assert logged.std() == pytest.approx(0.002 * np.sqrt(11 / 12), rel=0.05)
     assert np.mean(moved[..., 5:-1] * moved[..., 6:]) > 0.2 * moved[..., 5:].var()
-    assert abs(np.mean(told[..., :-1] * told[..., 1:])) < 0.05 * told.var()
+    assert abs(np.mean(logged[..., :-1] * logged[..., 1:])) < 0.05 * logged.var()
 
 
 def test_torque_noise_is_constant_in_an_episode_and_gives_way_to_gain() -> None:
@@ -128,8 +128,8 @@ def test_torque_noise_is_constant_in_an_episode_and_gives_way_to_gain() -> None:
 
 def test_servo_gain_kp_bends_under_load_and_kd_damps() -> None:
     for factor in (0.5, 1.5):
-        told = run({"servo_gain": {"kp": factor}}, stand.held(0.0, 2.0), 0.3).told
-        assert told[-1] == pytest.approx(0.3 / (factor * KP), rel=1e-3)
+        position = run({"servo_gain": {"kp": factor}}, stand.held(0.0, 2.0), 0.3).told
+        assert position[-1] == pytest.approx(0.3 / (factor * KP), rel=1e-3)
     peaks = [
         run({"servo_gain": {"kd": factor}}, stand.step(0.1), every_step=True).told.max() for factor in (1.0, 0.6, 0.3)
     ]
@@ -216,9 +216,9 @@ def test_duty_loss_makes_the_error_grow_faster_than_the_load(load: float) -> Non
 
 
 def test_gain_fade_bends_more_and_more_in_the_course_of_an_episode() -> None:
-    told = run({"gain_fade": {"rate": 0.1}}, stand.held(0.0, 5.0), 0.3).told
+    position = run({"gain_fade": {"rate": 0.1}}, stand.held(0.0, 5.0), 0.3).told
     for seconds in (2.0, 3.5, 5.0):
-        assert told[round(seconds / PERIOD)] == pytest.approx(0.3 / (KP * (1.0 - 0.1 * seconds)), rel=0.03)
+        assert position[round(seconds / PERIOD)] == pytest.approx(0.3 / (KP * (1.0 - 0.1 * seconds)), rel=0.03)
 
 
 # body

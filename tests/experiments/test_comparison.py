@@ -27,9 +27,9 @@ def _trial(method: str, number: int, gain: float, generation: int, stable: int =
         "policies": 5,
         "real_episodes": 40,
     }
-    found = {"alpha": 1.0, "grounding_acceptable": number > 1} if method == "gat" else {}
+    search = {"alpha": 1.0, "grounding_acceptable": number > 1} if method == "gat" else {}
     cell = Cell("", "nao_worn", method, 1)
-    return Trial.of(cell, number, found, measured, spent=30 if method == "gat" else 0)
+    return Trial.of(cell, number, search, measured, spent=30 if method == "gat" else 0)
 
 
 TRIALS = [_trial("none", 1, 0.0, 0, 1), _trial("none", 2, -0.05, 1), _trial("gat", 1, 0.2, 4), _trial("gat", 2, 0.1, 2)]
@@ -111,12 +111,15 @@ def test_an_order_is_claimed_by_a_signed_rank_test_over_trials_with_holms_correc
         for method, stables in counts.items()
         for number, stable in enumerate(stables)
     ]
-    found = {
-        (one.method, one.other): one for one in orders(trials, "", "nao_worn", ("gat", "ane"), ("none", "ane", "some"))
+    by_pair = {
+        (order.method, order.other): order
+        for order in orders(trials, "", "nao_worn", ("gat", "ane"), ("none", "ane", "some"))
     }
-    assert found["gat", "none"].difference == pytest.approx(21 / 6)
-    assert found["gat", "none"].p == found["gat", "ane"].p == pytest.approx(3 * 2 / 2**6)  # least of 6 pairs, times 3
-    assert found["ane", "none"].p == 1.0
+    assert by_pair["gat", "none"].difference == pytest.approx(21 / 6)
+    assert (
+        by_pair["gat", "none"].p == by_pair["gat", "ane"].p == pytest.approx(3 * 2 / 2**6)
+    )  # least of 6 pairs, times 3
+    assert by_pair["ane", "none"].p == 1.0
 
 
 def test_a_start_that_may_be_worth_nothing_has_no_percentage() -> None:
@@ -144,7 +147,7 @@ def test_a_share_of_next_to_nothing_is_told_nowhere() -> None:
     assert summary.improvement is None and summary.value.mean == pytest.approx(0.3)
     speed = Unit.of(Walk())
     tables = markdown([summary], trials, speed), Table2().markdown(trials, Walk()), every_trial(trials)
-    assert "29900" not in "".join([*tables, one_by_one(trials, Walk()), trials[1].told(speed)])
+    assert "29900" not in "".join([*tables, one_by_one(trials, Walk()), trials[1].describe(speed)])
     assert worth(trials, Walk()).values == pytest.approx([30.0, 30.0])
 
 
@@ -167,4 +170,4 @@ def test_later_iterations_are_set_against_the_first_ones_start() -> None:
     assert second.improvement == pytest.approx(24.0)
     assert second.real_episodes == first.real_episodes + 40
     assert second.without  # the second iteration's gain may be none
-    assert [one.iteration for one in summaries([first, second])] == [1, 2]
+    assert [summary.iteration for summary in summaries([first, second])] == [1, 2]

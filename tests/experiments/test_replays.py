@@ -17,11 +17,11 @@ from gsl.errors import ArtifactError
 from gsl.report.style import GAT, UNINFORMED
 from gsl.validation.compliance import Compliance
 from gsl.validation.compliance_transfer import compute_transfers
-from gsl_experiments.gain_predictors import points, predictors, rank_correlations, searched
+from gsl_experiments.gain_predictors import points, predictors, rank_correlations, read_searches
 from gsl_experiments.ledger_file import read
 from gsl_experiments.replay import Replay
 from gsl_experiments.replays_table import Shown
-from gsl_experiments.yielding import closed_strength
+from gsl_experiments.yielding import compute_closed_strength
 
 COMMITTED = Path(__file__).parents[2] / "experiments/trials"
 STIFF = "stiffness, legs (joint by joint)"
@@ -48,11 +48,13 @@ def cells(rows: list[Replay]) -> dict[str, dict[str, str]]:
 
 
 def test_trials_of_before_are_read_and_have_no_shares() -> None:
-    known = read(COMMITTED / "replays/replays.json", Replay)
+    batch = read(COMMITTED / "replays/replays.json", Replay)
     rows = [
-        Replay(**{name: one[name] for name in Replay._fields if name in one}) for own in known.values() for one in own
+        Replay(**{name: trial[name] for name in Replay._fields if name in trial})
+        for own in batch.values()
+        for trial in own
     ]
-    assert len(rows) == 180 and not any(one.stiffness or one.strength or one.nearness("legs") for one in rows)
+    assert len(rows) == 180 and not any(row.stiffness or row.strength or row.nearness("legs") for row in rows)
     assert set(cells([before("none", 2.0), before("gat", 1.0)])["gat"]) == {
         *("real world", "grounding", "joints after 0.2 s [°]", "95 % interval", "minus none (95 %, paired)"),
         *("after a tick [°]", "pitch [°]", "forward [mm]", "out of reach [%]"),
@@ -86,9 +88,9 @@ def test_joints_that_go_too_far_do_not_make_up_for_others() -> None:
         for ones, strength in ((np.ones(2), np.array(torque)) for torque in ((3.0, 3.0), (3.0, 1.0), (2.0, 2.0)))
     )
     assert compute_transfers(sim, grounded, real)["legs"].torque == pytest.approx(1.0)
-    assert closed_strength(sim, grounded, real, "legs") == pytest.approx(0.0)
-    assert closed_strength(sim, real, real, "legs") == pytest.approx(1.0)
-    assert closed_strength(sim, grounded, sim, "legs") is None
+    assert compute_closed_strength(sim, grounded, real, "legs") == pytest.approx(0.0)
+    assert compute_closed_strength(sim, real, real, "legs") == pytest.approx(1.0)
+    assert compute_closed_strength(sim, grounded, sim, "legs") is None
 
 
 def test_a_table_says_where_there_is_no_gap_and_where_nobody_measured() -> None:
@@ -121,8 +123,10 @@ def test_rank_correlations_are_those_of_all_permutations() -> None:
     assert rho == pytest.approx({name: spearmanr(first[name], second[name]).statistic for name in first})
     observed = abs(np.mean(list(rho.values())))
     means = [
-        abs(np.mean([spearmanr(first["a"], one).statistic, spearmanr(first["b"], other).statistic]))
-        for one, other in itertools.product(itertools.permutations(second["a"]), itertools.permutations(second["b"]))
+        abs(np.mean([spearmanr(first["a"], permuted).statistic, spearmanr(first["b"], other).statistic]))
+        for permuted, other in itertools.product(
+            itertools.permutations(second["a"]), itertools.permutations(second["b"])
+        )
     ]
     assert p == pytest.approx(np.mean(np.array(means) >= observed - 1e-9), abs=0.015)
 
@@ -134,15 +138,17 @@ def test_what_does_not_vary_predicts_nothing() -> None:
 
 def test_gains_are_set_against_how_joints_move_and_yield() -> None:
     """Table 2's mean gains in nao_worn; the order of replay errors is made up, that of shares is that of the gains."""
-    trials = searched([COMMITTED / "table2/trials.json"])
+    trials = read_searches([COMMITTED / "table2/trials.json"])
     names = ("none", "gat", "gat_residual", "effects")
-    of = {name: [one for one in trials if (one.world, one.method) == ("nao_worn", name)] for name in names}
-    gains = {name: np.mean([one.improvement for one in own if one.improvement is not None]) for name, own in of.items()}
+    of = {name: [trial for trial in trials if (trial.world, trial.method) == ("nao_worn", name)] for name in names}
+    gains = {
+        name: np.mean([trial.improvement for trial in own if trial.improvement is not None]) for name, own in of.items()
+    }
     order = sorted(names, key=lambda name: gains[name])
     rows = [row(name, (1.0, 2.0, 4.0, 3.0)[rank], 0.25 * rank) for rank, name in enumerate(order)]
     own = points(rows, trials)["nao_worn"]
     assert {point.method: point.gain for point in own} == pytest.approx(gains)
-    assert own[0].stable == sum(one.stable for one in of[order[0]]) / sum(one.winners for one in of[order[0]])
+    assert own[0].stable == sum(trial.stable for trial in of[order[0]]) / sum(trial.winners for trial in of[order[0]])
     section = predictors(rows, trials, 1)
     assert "| gain | small replay error | -0.80 | -0.80 |" in section
     assert "| gain | compliance transferred, legs | +1.00 | +1.00 |" in section and "4 points" in section

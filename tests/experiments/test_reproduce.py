@@ -74,19 +74,19 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     assert " for all of its results; a study that was stopped goes on where it was" in said.err
     folder = next((tmp_path / "runs").glob("*/reproduce"))
     trials = json.loads((folder / "trials.json").read_text())
-    assert {one["method"] for one in trials} == set(KEPT[what])
+    assert {trial["method"] for trial in trials} == set(KEPT[what])
     iterations = {"table4": 2, "linear-walk": 2}.get(what, 1)
-    assert {one["iteration"] for one in trials} == set(range(1, iterations + 1))
+    assert {trial["iteration"] for trial in trials} == set(range(1, iterations + 1))
     table = (folder / "table.md").read_text()
     assert all(f"| {name} " in table for name in KEPT[what]) and "Sizes: preset=toy, but" in table
     assert len((folder / "trials.md").read_text().splitlines()) == 2 + len(trials)
-    assert {one["simulator"] for one in trials} == ({"nao_ideal", "nao_weak"} if what == "table3" else {""})
-    assert all((one["rank"] is not None) == (what == "table2") for one in trials)
-    for one in trials:
-        assert [policy[0] for policy in one["tried"]] == list(range(one["winners"] + 1))
+    assert {trial["simulator"] for trial in trials} == ({"nao_ideal", "nao_weak"} if what == "table3" else {""})
+    assert all((trial["rank"] is not None) == (what == "table2") for trial in trials)
+    for trial in trials:
+        assert [policy[0] for policy in trial["tried"]] == list(range(trial["winners"] + 1))
         if what != "table4":  # where falls are tolerated
-            assert sum(policy[3] == 0 for policy in one["tried"][1:]) == one["stable"]
-        assert all((policy[2] is not None) == ("gat" in one["method"]) for policy in one["tried"])
+            assert sum(policy[3] == 0 for policy in trial["tried"][1:]) == trial["stable"]
+        assert all((policy[2] is not None) == ("gat" in trial["method"]) for policy in trial["tried"])
     if what == "table2":
         check_seen(folder / "report.html", *KEPT[what], "Sizes: preset=toy")
     learned = {
@@ -104,16 +104,16 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     done("reproduce", "fig5", *few, folder=tmp_path)
     first = tmp_path / "runs/fig5/trials.json"
     rows = json.loads(first.read_text())
-    assert [one["number"] for one in rows] == [1, 1]
+    assert [row["number"] for row in rows] == [1, 1]
     rows[0]["made_by"] = "a1b2c3d"
     del rows[0]["last_falls"]  # which files have not had from the beginning
     (tmp_path / "more.json").write_text(json.dumps(rows[1:]))
     (tmp_path / "elsewhere.json").write_text(json.dumps([rows[0], {**rows[0], "recipe": "of another study"}]))
-    given = "known=[elsewhere.json,more.json]"
-    said = done("reproduce", "fig5", *few, "trials=2", given, "name=on", folder=tmp_path)
+    files = "known=[elsewhere.json,more.json]"
+    said = done("reproduce", "fig5", *few, "trials=2", files, "name=on", folder=tmp_path)
     assert "1 of 3 known trials are of other settings" in said.err
     again = json.loads((tmp_path / "runs/on/reproduce/trials.json").read_text())
-    assert again[:2] == rows and [one["number"] for one in again] == [1, 1, 2, 2]
+    assert again[:2] == rows and [row["number"] for row in again] == [1, 1, 2, 2]
     assert not list((tmp_path / "runs/on").rglob("trial_01"))
     table = (tmp_path / "runs/on/reproduce/table.md").read_text()
     assert f"Made by a1b2c3d: trial 1 ({rows[0]['method']}). Made by " in table
@@ -124,7 +124,7 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     assert json.loads((tmp_path / "runs/second/reproduce/trials.json").read_text()) == again[2:]
     done("reproduce", "fig5", *few, "first=2", "trials=1", "name=alone", folder=tmp_path)  # run, and not known
     alone = json.loads((tmp_path / "runs/alone/reproduce/trials.json").read_text())
-    assert [{**one, "made_by": ""} for one in alone] == [{**one, "made_by": ""} for one in again[2:]]
+    assert [{**row, "made_by": ""} for row in alone] == [{**row, "made_by": ""} for row in again[2:]]
     assert " 1 trial (2). " in (tmp_path / "runs/second/reproduce/table.md").read_text()
 
 
@@ -191,12 +191,12 @@ class Figure(NamedTuple):
 
 
 def test_a_ledger_only_grows(tmp_path: Path) -> None:
-    path, given = tmp_path / "trials.json", tmp_path / "given.json"
+    path, earlier = tmp_path / "trials.json", tmp_path / "given.json"
     before = Ledger(path, {}, Figure, Silent())
     before.add("a", [{"number": 1, "value": 1.0}])
     before.add("b", [{"number": 2, "value": 2.0}])
-    given.write_text(path.read_text().replace('"b"', '"c"'))
-    after = Ledger(path, {"known": given}, Figure, Silent())
+    earlier.write_text(path.read_text().replace('"b"', '"c"'))
+    after = Ledger(path, {"known": earlier}, Figure, Silent())
     assert not after.take("d")
     after.add("b", [{"number": 2, "value": 3.0}])
     assert {row["recipe"]: row["value"] for row in json.loads(path.read_text())} == {"b": 3.0, "a": 1.0, "c": 2.0}
@@ -204,16 +204,16 @@ def test_a_ledger_only_grows(tmp_path: Path) -> None:
     with pytest.raises(ArtifactError, match="is what this study writes"):
         Ledger(path, {"known": path}, Figure, Silent())
     with pytest.raises(ArtifactError, match=r"say number 2 says 1; leave it out"):
-        Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent()).judge({"a": {"number": 2}})
-    given.write_text(path.read_text().replace("3.0", '"fast"'))
+        Ledger(tmp_path / "new.json", {"known": earlier}, Figure, Silent()).judge({"a": {"number": 2}})
+    earlier.write_text(path.read_text().replace("3.0", '"fast"'))
     with pytest.raises(ArtifactError, match="row 1 has value 'fast': input should be a valid number"):
-        Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent())
-    given.write_text(path.read_text().replace("3.0", "NaN"))
+        Ledger(tmp_path / "new.json", {"known": earlier}, Figure, Silent())
+    earlier.write_text(path.read_text().replace("3.0", "NaN"))
     with pytest.raises(ArtifactError, match="NaN is no figure"):
-        Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent())
-    given.write_text(json.dumps([*json.loads(path.read_text()), json.loads(path.read_text())[0]]))
+        Ledger(tmp_path / "new.json", {"known": earlier}, Figure, Silent())
+    earlier.write_text(json.dumps([*json.loads(path.read_text()), json.loads(path.read_text())[0]]))
     with pytest.raises(ArtifactError, match="row 4 is of a trial that the file has already"):
-        Ledger(tmp_path / "new.json", {"known": given}, Figure, Silent())
+        Ledger(tmp_path / "new.json", {"known": earlier}, Figure, Silent())
 
 
 def test_a_growing_file_that_was_damaged_is_not_believed(tmp_path: Path) -> None:
@@ -233,12 +233,12 @@ def test_a_growing_file_that_was_damaged_is_not_believed(tmp_path: Path) -> None
 
 def test_two_studies_may_write_one_ledger(tmp_path: Path) -> None:
     path = tmp_path / "trials.json"
-    one, other = (Ledger(path, {}, Figure, Silent()) for _ in range(2))
-    one.add("a", [{"number": 1, "value": 1.0}])
-    other.add("b", [{"number": 2, "value": 2.0}])
+    first, second = (Ledger(path, {}, Figure, Silent()) for _ in range(2))
+    first.add("a", [{"number": 1, "value": 1.0}])
+    second.add("b", [{"number": 2, "value": 2.0}])
     assert [row["recipe"] for row in json.loads(path.read_text())] == ["b", "a"]
     third = Ledger(path, {}, Figure, Silent())
-    one.add("c", [{"number": 3, "value": 3.0}])
+    first.add("c", [{"number": 3, "value": 3.0}])
     assert third.take("a")
     assert {row["recipe"] for row in json.loads(path.read_text())} == {"a", "b", "c"}
 
@@ -254,42 +254,42 @@ def test_two_studies_may_write_one_ledger(tmp_path: Path) -> None:
     ],
 )
 def test_figures_that_contradict_each_other_are_no_trial(more: dict[str, Any], problem: str, tmp_path: Path) -> None:
-    path, given = tmp_path / "trials.json", tmp_path / "given.json"
+    path, earlier = tmp_path / "trials.json", tmp_path / "given.json"
     row = {**a_trial("gat", 1)._asdict(), "recipe": "a", "made_by": "b"}
-    given.write_text(json.dumps([row]))
-    ledger = Ledger(path, {"known": given}, Trial, Silent())
+    earlier.write_text(json.dumps([row]))
+    ledger = Ledger(path, {"known": earlier}, Trial, Silent())
     ledger.judge({"a": {"iteration": [1], "method": "gat"}})
     assert ledger.take("a")
-    given.write_text(json.dumps([{**row, **more}]))
+    earlier.write_text(json.dumps([{**row, **more}]))
     with pytest.raises(ArtifactError, match=f"row 1 contradicts itself: {problem}"):
-        Ledger(tmp_path / "new.json", {"known": given}, Trial, Silent())
+        Ledger(tmp_path / "new.json", {"known": earlier}, Trial, Silent())
 
 
 def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
-    given, console = tmp_path / "given.json", Listening()
-    given.write_text(json.dumps([{"number": 1, "value": 1.0, "recipe": "a", "made_by": "b"}]))
+    earlier, console = tmp_path / "given.json", Listening()
+    earlier.write_text(json.dumps([{"number": 1, "value": 1.0, "recipe": "a", "made_by": "b"}]))
     path = tmp_path / "t.json"
     wanted = {"a": "none", "b": "gat", "c": "gat", "d": "sgat"}
     Ledger(path, {}, Figure, console).announce(wanted, lambda: 6000.0)
-    ledger = Ledger(path, {"known": given}, Figure, console)
+    ledger = Ledger(path, {"known": earlier}, Figure, console)
     ledger.announce(wanted, lambda: 6000.0)
     ledger.add("d", [{"number": 4, "value": 1.0}])
-    Ledger(path, {"known": given}, Figure, console).announce(wanted, lambda: 6000.0)
-    Ledger(path, {"known": given}, Figure, console).announce({"a": "none"}, lambda: 6000.0)
+    Ledger(path, {"known": earlier}, Figure, console).announce(wanted, lambda: 6000.0)
+    Ledger(path, {"known": earlier}, Figure, console).announce({"a": "none"}, lambda: 6000.0)
     goes_on = "; a study that was stopped goes on where it was"
-    known = f"1 of this study's 4 results are in {given}"
+    sentence = f"1 of this study's 4 results are in {earlier}"
     assert console.said == [
         f"about 1.7 hours for all of its results{goes_on}",
-        *(known, f"about 75 minutes for 3 of 4 results, gat (2), sgat (1){goes_on}"),
+        *(sentence, f"about 75 minutes for 3 of 4 results, gat (2), sgat (1){goes_on}"),
         *(
-            known,
+            sentence,
             f"1 of this study's 4 results are in {path}",
             f"about 50 minutes for 2 of 4 results, gat (2){goes_on}",
         ),
-        f"1 of this study's 1 results are in {given}",
+        f"1 of this study's 1 results are in {earlier}",
     ]
     old = tmp_path / "old.json"
-    old.write_text(given.read_text())
+    old.write_text(earlier.read_text())
     Ledger(old, {}, Figure, console).announce({"a": "none"}, lambda: 6000.0)
     assert "1 of this study's 1 results in" in console.said[-2]
     assert "are of another version of gsl and not taken" in console.said[-2]
@@ -299,20 +299,22 @@ def test_what_is_known_of_a_study_is_announced(tmp_path: Path) -> None:
         {"number": 9, "value": 9.0, "recipe": "b", "made_by": "c"},
     ]
     other.write_text(json.dumps(rows))
-    both = Ledger(tmp_path / "both.json", {"known.0": given, "known.1": other, "known.2": given}, Figure, console)
+    both = Ledger(tmp_path / "both.json", {"known.0": earlier, "known.1": other, "known.2": earlier}, Figure, console)
     both.announce(wanted)
-    assert console.said[-2:] == [known, known.replace("given", "other")]
+    assert console.said[-2:] == [sentence, sentence.replace("given", "other")]
     both.judge({"a": {"number": 1}, "b": {"number": 9}})
     assert both.take("a") and both.take("b")
     with pytest.raises(ArtifactError, match=r"other\.json: a trial whose settings .* say number 2 says 9; leave"):
         both.judge({"b": {"number": 2}})
-    Ledger(path, {"known.0": given, "known.1": other}, Figure, console).announce({"b": "gat"})  # one of them is enough
+    Ledger(path, {"known.0": earlier, "known.1": other}, Figure, console).announce(
+        {"b": "gat"}
+    )  # one of them is enough
     assert console.said[-1] == f"1 of this study's 1 results are in {other}"
     other.write_text(json.dumps([{**rows[0], "value": 2.0}]))
     with pytest.raises(ArtifactError, match=r"other\.json: tells a trial .* otherwise than .*given\.json; leave"):
-        Ledger(path, {"known.0": given, "known.1": other}, Figure, console)
+        Ledger(path, {"known.0": earlier, "known.1": other}, Figure, console)
     with pytest.raises(ArtifactError, match="holds no result of this study: its trials have other settings, seeds"):
-        Ledger(path, {"known": given}, Figure, console).announce({"b": "gat"})
+        Ledger(path, {"known": earlier}, Figure, console).announce({"b": "gat"})
 
 
 def test_a_recipe_is_of_what_a_trial_comes_from(tmp_path: Path) -> None:
@@ -351,14 +353,14 @@ def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
     said = done("reproduce", "replays", *few, "~worlds.nao_weak", gains, folder=tmp_path)
     assert "about 1 minute for all of its results" in said.err
     folder = tmp_path / "runs/replays/reproduce"
-    rows = {one["method"]: one for one in json.loads((folder / "replays.json").read_text())}
+    rows = {row["method"]: row for row in json.loads((folder / "replays.json").read_text())}
     assert set(rows) == {"none", "gat", "identified", "servo"} and not list(tmp_path.rglob("optimize"))
     assert rows["identified"]["joints"] < rows["none"]["joints"] != rows["gat"]["joints"]
     assert rows["servo"]["joints"] < rows["none"]["joints"] and 0.8 < rows["servo"]["stiffness"]["legs"] < 1.2
     assert rows["none"]["stiffness"] == rows["none"]["strength"] == {"legs": 0.0, "arms": 0.0}
     assert rows["none"]["unreached"] is None and 0.0 <= rows["gat"]["unreached"] < 1.0
     table = (folder / "table.md").read_text()
-    assert all(f"| nao_worn | {name} | {one['joints']:.2f} |" in table for name, one in rows.items())
+    assert all(f"| nao_worn | {name} | {row['joints']:.2f} |" in table for name, row in rows.items())
     assert (folder / "replays.png").stat().st_size > 10_000
     assert "3 points (nao_worn: none, gat, identified)" in table
     assert "| minus none (95 %, paired) |" in table and "effects and servos from motions in the air" in table
@@ -384,9 +386,9 @@ def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     said = done("reproduce", "budget", *few, "budgets=[4,6]", folder=tmp_path)
     folder = tmp_path / "runs/budget/reproduce"
     points = json.loads((folder / "points.json").read_text())
-    made = [(one["method"], one["trajectories"]) for one in points]
+    made = [(point["method"], point["trajectories"]) for point in points]
     assert made == [("none", 0), ("gat", 4), ("sgat", 4), ("gat", 6), ("sgat", 6)]
-    assert all(one["error"] > 0.0 < one["bare"] for one in points[1:])
+    assert all(point["error"] > 0.0 < point["bare"] for point in points[1:])
     assert points[1]["error"] != points[3]["error"]
     assert len(list((tmp_path / "runs/budget").rglob("collect_real"))) == 2  # what the methods share
     refused = gsl("reproduce", "budget", *few, "budgets=[6,6]", "name=n", folder=tmp_path)
@@ -444,7 +446,7 @@ def test_table_2_marks_the_noise_that_only_real_figures_choose() -> None:
     ]
     text = Table2().markdown(trials, Walk())
     assert "| ane_01 (oracle: best by real) |" in text and "| ane_02 (chosen beforehand) |" in text
-    assert "oracle" not in Table2().markdown([one for one in trials if one.method != "ane_01"], Walk())
+    assert "oracle" not in Table2().markdown([trial for trial in trials if trial.method != "ane_01"], Walk())
     best = Table2(width="ane_01").markdown(trials, Walk())
     assert "| ane_01 (chosen beforehand; oracle: best by real) |" in best and "| ane_02 |" in best
     assert "| 18.9 | 5 of 10 | 6.6 |" in next(line for line in text.splitlines() if line.startswith("| w | ane_02"))
@@ -462,8 +464,8 @@ def test_rows_say_where_trials_were(table: Any) -> None:
         for iteration in (1, 2)
     ]
     lines = table.markdown(trials, Walk()).split("\n\n")[0].splitlines()[2:6]
-    told = {tuple(cell for cell in line.split(" | ")[:3] if cell in ("| v", "| w", "1", "2")) for line in lines}
-    assert told == {("| v", "1"), ("| v", "2"), ("| w", "1"), ("| w", "2")}
+    cells = {tuple(cell for cell in line.split(" | ")[:3] if cell in ("| v", "| w", "1", "2")) for line in lines}
+    assert cells == {("| v", "1"), ("| v", "2"), ("| w", "1"), ("| w", "2")}
     if isinstance(table, Table3 | LinearWalkTable):
         return
     paper = [any(value in line for value in ("22.5", "15.7 ± 3.0")) for line in lines]
@@ -485,8 +487,8 @@ def test_differences_say_in_which_simulator(table: Any) -> None:
 
 
 def test_one_method_is_set_against_no_other() -> None:
-    told = LinearWalkTable().markdown([a_trial("gat", 1), a_trial("gat", 2)], Distance())
-    assert "| w | gat | 1 |" in told and "difference" not in told
+    table = LinearWalkTable().markdown([a_trial("gat", 1), a_trial("gat", 2)], Distance())
+    assert "| w | gat | 1 |" in table and "difference" not in table
 
 
 @pytest.mark.parametrize(
@@ -549,8 +551,8 @@ def test_one_trial_tells_no_interval(table: Any) -> None:
 
 
 def test_table_4_counts_falls_over_episodes() -> None:
-    known = [a_trial(method, k, value=0.2) for method in ("none", "gat") for k in (1, 2)]
-    trials = [*known, *(a_trial("sgat", k, falls=k, outcome={"speed [cm/s]": 20.0 + k}) for k in (1, 2))]
+    first = [a_trial(method, k, value=0.2) for method in ("none", "gat") for k in (1, 2)]
+    trials = [*first, *(a_trial("sgat", k, falls=k, outcome={"speed [cm/s]": 20.0 + k}) for k in (1, 2))]
     lines = Table4().markdown(trials, Walk()).splitlines()
     row = next(line for line in lines if line.startswith("| w | sgat"))
     assert "| 21.5 | 3 of 20 | 0 to 79 |" in row and "0 of 10" in row  # shares .1 and .2: over trials, not over walks

@@ -19,7 +19,7 @@ from gsl_experiments import budget, noise_table
 from gsl_experiments.budget import Budget
 from gsl_experiments.compare import Compare
 from gsl_experiments.comparison import differences, summaries
-from gsl_experiments.comparison_table import bounds, markdown, told_difference
+from gsl_experiments.comparison_table import bounds, format_difference, markdown
 from gsl_experiments.noise import NoiseStudy
 from gsl_experiments.replays import Replay, Replays
 from gsl_experiments.reproduce import Reproduce
@@ -43,15 +43,15 @@ KNOWN = re.compile(r"(?:known=\[?|,)(experiments/trials/[^\s,\]]+\.json)")
 @cache
 def told() -> list[list[str]]:
     """Every command of a page that takes known results, as a shell gives it to gsl."""
-    found = []
+    outputs = []
     for page in PAGES:
         for block in re.findall(r"```console\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
             for line in block.replace("\\\n", " ").splitlines():
                 if line.startswith("$ gsl ") and KNOWN.search(line):
                     typed = f"printf '%s\\n' {line.removeprefix('$ gsl ')}"
                     said = subprocess.run(["bash", "-c", typed], capture_output=True, text=True, check=True)
-                    found.append(said.stdout.splitlines())
-    return found
+                    outputs.append(said.stdout.splitlines())
+    return outputs
 
 
 def as_trial(row: dict[str, Any]) -> Trial:
@@ -84,17 +84,17 @@ def test_a_page_tells_what_is_committed(typed: list[str], tmp_path: Path) -> Non
         assert isinstance(study, NoiseStudy) or len(keys) == len(rows)  # whose files hold no more than is told
         rows = [row for row in rows if row["recipe"] in keys.values()]
         study.tell(tmp_path, [kind(**{name: row.get(name) for name in kind._fields}) for row in rows], "")
-        found = (PLACE / files[0].parent.name / "table.md").read_text(encoding="utf-8")
-        assert found.startswith((tmp_path / "table.md").read_text(encoding="utf-8").strip())
+        words_seen = (PLACE / files[0].parent.name / "table.md").read_text(encoding="utf-8")
+        assert words_seen.startswith((tmp_path / "table.md").read_text(encoding="utf-8").strip())
         return
     of = {row["recipe"]: [] for row in rows}
     for row in rows:
         of[row["recipe"]].append(as_trial(row))
     for (number, cell), key in keys.items():
-        told_of = {(one.number, one.simulator, one.world, one.method) for one in of[key]}
+        told_of = {(trial.number, trial.simulator, trial.world, trial.method) for trial in of[key]}
         assert told_of == {(number, cell.simulator, cell.world, cell.method)}
     trials = sorted((trial for key in keys.values() for trial in of[key]), key=lambda trial: trial.number)
-    name = next((one.removeprefix("name=") for one in typed if one.startswith("name=")), "")
+    name = next((word.removeprefix("name=") for word in typed if word.startswith("name=")), "")
     folder = PLACE / (files[0].parent.name if len(files) == 1 else name)
     table, task = folder / "table.md", study.iterate.task
     text = (
@@ -124,46 +124,48 @@ def test_the_aims_of_table_2_stand_beside_its_trials() -> None:
         world, method = place.strip("`"), named.strip("`")
         among = ten if count == "10" else twenty
         if method.startswith("no gap"):
-            without_gap = [one._replace(method=method) for one in trials_of(world.replace("nao", "table2_in"))]
-            among = [*among, *(one for one in without_gap if one.world == world)]
-        own = [one for one in among if (one.world, one.method) == (world, method)]
-        (found,) = summaries(own)
-        assert found.improvement is not None and found.trials == int(count)
-        assert gain == f"{found.improvement.mean:.1f} ({bounds(found.improvement)})"
-        assert more == ("" if method == "none" else told_difference(differences(among, own[0].cell, "none")))
-        assert (without, unimproved) == (f"{found.without} of {count}", f"{found.unimproved} of {count}")
-        assert spent == f"{found.real_episodes:.0f}"
+            without_gap = [trial._replace(method=method) for trial in trials_of(world.replace("nao", "table2_in"))]
+            among = [*among, *(trial for trial in without_gap if trial.world == world)]
+        own = [trial for trial in among if (trial.world, trial.method) == (world, method)]
+        (summary,) = summaries(own)
+        assert summary.improvement is not None and summary.trials == int(count)
+        assert gain == f"{summary.improvement.mean:.1f} ({bounds(summary.improvement)})"
+        assert more == ("" if method == "none" else format_difference(differences(among, own[0].cell, "none")))
+        assert (without, unimproved) == (f"{summary.without} of {count}", f"{summary.unimproved} of {count}")
+        assert spent == f"{summary.real_episodes:.0f}"
 
 
 def test_the_guide_tells_gains_and_falls_of_the_trials() -> None:
     """Of a policy that was returned, and of those that were tried."""
     guide = (ROOT / "docs/explanation/grounding.md").read_text(encoding="utf-8")
-    _, (_, *worlds), rows = next(one for one in tables(guide) if "`nao_harsh`" in one[1])
+    _, (_, *worlds), rows = next(table for table in tables(guide) if "`nao_harsh`" in table[1])
     ten, twenty = trials_of("table2"), trials_of("table2", "table2_again")
     itself = [
-        one._replace(method="learned in this world itself") for one in trials_of("table2_in_weak", "table2_in_worn")
+        trial._replace(method="learned in this world itself") for trial in trials_of("table2_in_weak", "table2_in_worn")
     ]
     elsewhere = {"`nao_worn`, its causes withheld": trials_of("withheld")}
-    told = 0
+    count = 0
     for named, *cells in rows:
         method = named.strip("`")
-        first = twenty if method in {one.method for one in trials_of("table2_again")} else [*ten, *itself]
+        first = twenty if method in {trial.method for trial in trials_of("table2_again")} else [*ten, *itself]
         for title, cell in zip(worlds, cells, strict=True):
             among = elsewhere.get(title, [*first, *trials_of("worlds")])
-            own = [one for one in among if (one.world, one.method) == (title.split("`")[1], method)]
-            gain = sum(one.improvement for one in own) / max(len(own), 1)
-            fell = 100 * sum(one.winners - one.stable for one in own) / max(sum(one.winners for one in own), 1)
+            own = [trial for trial in among if (trial.world, trial.method) == (title.split("`")[1], method)]
+            gain = sum(trial.improvement for trial in own) / max(len(own), 1)
+            fell = (
+                100 * sum(trial.winners - trial.stable for trial in own) / max(sum(trial.winners for trial in own), 1)
+            )
             assert cell == (f"{gain:.1f} ({fell:.0f})" if own else ""), (method, title)
-            told += bool(cell)
-    assert told == 30
+            count += bool(cell)
+    assert count == 30
 
 
 def by_number(study: Any) -> dict[int, set[str]]:
     """The recipes of each trial."""
-    found: dict[int, set[str]] = {}
+    keys: dict[int, set[str]] = {}
     for cell, key in study.recipes.items():
-        found.setdefault(cell if isinstance(cell, int) else cell[0], set()).add(key)
-    return found
+        keys.setdefault(cell if isinstance(cell, int) else cell[0], set()).add(key)
+    return keys
 
 
 @pytest.mark.parametrize("name", ["fig12", "budget", "replays", "table2"])
@@ -175,33 +177,33 @@ def test_trials_are_the_same_wherever_a_study_begins(name: str) -> None:
 
 def tables(text: str) -> list[tuple[str, list[str], list[list[str]]]]:
     """Return the tables of a page: the line before each, titles and rows."""
-    found = []
+    blocks = []
     for block in re.finditer(r"(?:^\|.*\|$\n?)+", text, re.MULTILINE):
         titles, _, *rows = ([cell.strip() for cell in line[1:-1].split("|")] for line in block[0].splitlines())
-        found.append((text[: block.start()].rstrip().rpartition("\n")[2], titles, rows))
-    return found
+        blocks.append((text[: block.start()].rstrip().rpartition("\n")[2], titles, rows))
+    return blocks
 
 
 def positions(titles: list[str], among: list[str]) -> list[int]:
     """Return where titles stand among others, in their order; nothing if they do not all."""
-    found = list[int]()
+    places = list[int]()
     for title in titles:
-        begin = found[-1] + 1 if found else 0
+        begin = places[-1] + 1 if places else 0
         if title not in among[begin:]:
             return []
-        found.append(among.index(title, begin))
-    return found
+        places.append(among.index(title, begin))
+    return places
 
 
 def parts(titles: list[str], whole: str) -> dict[tuple[str, ...], list[list[str]]]:
     """Return the rows of these columns, by the worlds that stand in none of them."""
-    found: dict[tuple[str, ...], list[list[str]]] = {}
+    groups: dict[tuple[str, ...], list[list[str]]] = {}
     for _, every, rows in tables(whole):
         kept = positions(titles, every)
         worlds = [k for k, title in enumerate(every) if title in ("simulator", "real world") and k not in kept]
         for row in rows if kept else ():
-            found.setdefault(tuple(row[k] for k in worlds), []).append([row[k] for k in kept])
-    return found
+            groups.setdefault(tuple(row[k] for k in worlds), []).append([row[k] for k in kept])
+    return groups
 
 
 def test_a_page_repeats_its_tables_to_the_letter() -> None:
@@ -211,7 +213,7 @@ def test_a_page_repeats_its_tables_to_the_letter() -> None:
         folders = {PLACE / name for name in re.findall(r"(?:docs/results|(?:=\[?|,)experiments/trials)/(\w+)/", text)}
         whole = [(folder / "table.md").read_text(encoding="utf-8") for folder in folders]
         for before, titles, rows in tables(text):
-            of = [part for part in (parts(titles, one) for one in whole) if part]
+            of = [part for part in (parts(titles, row) for row in whole) if part]
             if of:
                 repeated[page.stem] += 1
                 same = [(len(part), worlds) for part in of for worlds, below in part.items() if below == rows]

@@ -30,13 +30,16 @@ def _records(kp: float) -> list[Record]:
     plant = change(WORLD.plant, {"servo_gain": {"kp": kp}})
     played = play(bare, plant, [path[0] for path in paths], step=0.0005, period=PERIOD, settle=200)
     positions = [path + 0.01 for path in played]
-    return [Record(one.name, one.targets, path, slope(path, PERIOD)) for one, path in zip(bare, positions, strict=True)]
+    return [
+        Record(record.name, record.targets, path, slope(path, PERIOD))
+        for record, path in zip(bare, positions, strict=True)
+    ]
 
 
 def test_the_free_gain_and_the_zeros_of_a_log_are_found_on_motions_that_are_not_judged() -> None:
     trial = Trial(_records(2.0), np.array([0, 1, 1]), {"plain": (WORLD, [{}, {}])}, ("joint",), PERIOD, "", 1)
     published, gain, zeros = trial.judge("plain", Silent())
-    assert [one.way for one in (published, gain, zeros)] == list(WAYS)
+    assert [way.way for way in (published, gain, zeros)] == list(WAYS)
     assert published.gains == (1.0, 1.0) and gain.gains == pytest.approx((2.0, 2.0))
     assert gain.mean.mean() < 0.5 * published.mean.mean()
     assert zeros.mean.max() < 0.002 < gain.mean.min()
@@ -45,9 +48,9 @@ def test_the_free_gain_and_the_zeros_of_a_log_are_found_on_motions_that_are_not_
 def test_records_of_unlike_length_side_by_side_replay_as_each_alone() -> None:
     records, simulator = _records(1.0), InTheAir(WORLD.plant, 0.001, PERIOD, accurate=True)
     together = simulator.simulate({}, no_shifts(1), pad(records, simulator, PERIOD))
-    for k, one in enumerate(records):
-        whole = cut_pieces([one], lump(WORLD.plant.robot), PERIOD, warm_up=0, scored=len(one))
-        np.testing.assert_array_equal(together[k, : len(one)], simulator.simulate({}, no_shifts(1), whole)[0])
+    for k, record in enumerate(records):
+        whole = cut_pieces([record], lump(WORLD.plant.robot), PERIOD, warm_up=0, scored=len(record))
+        np.testing.assert_array_equal(together[k, : len(record)], simulator.simulate({}, no_shifts(1), whole)[0])
 
 
 @pytest.mark.parametrize("lowest", [-5.25, -0.5, 0.0, 1.75])

@@ -35,17 +35,17 @@ def test_what_was_tried_is_read_from_a_search_and_its_evaluation(tmp_path: Path)
     measured = cast(Any, SimpleNamespace(folder=tmp_path))
     assert read_tried({}, measured) == [(0, None, None, 0, 5, 0.2), (1, 0.25, None, 1, 3, 0.1)]
     drift = {"pi0": 0.125, "generation_01": 0.5}
-    assert [one.drift for one in read_tried({"drift": drift}, measured)] == [0.125, 0.5]
+    assert [policy.drift for policy in read_tried({"drift": drift}, measured)] == [0.125, 0.5]
 
 
 def a_trial(number: int, method: str, *policies: tuple[float, float | None, int]) -> Trial:
     """A search whose policies have a promise, a drift, and falls in one to five episodes of the choice."""
-    found = [Tried(k, *one, 1 if one[2] else 5, 0.2) for k, one in enumerate(policies, start=1)]
+    winners = [Tried(k, *policy, 1 if policy[2] else 5, 0.2) for k, policy in enumerate(policies, start=1)]
     start = Tried(0, None, 0.9, 1, 5, 0.2)  # which fell, and is not among them
     some = {"start": 0.2, "value": 0.2, "improvement": 0.0, "surely": 0.0, "returned": "pi0", "generation": 0}
-    counts = {"falls": 0, "episodes": 20, "stable": len(found), "improving": 0, "winners": len(found)}
+    counts = {"falls": 0, "episodes": 20, "stable": len(winners), "improving": 0, "winners": len(winners)}
     rest = {"alpha": None, "refused": False, "rank": None, "real_episodes": 9, "outcome": {}, "last": {}}
-    return Trial("", "w", method, 1, number, **some, **counts, **rest, tried=[start, *found])
+    return Trial("", "w", method, 1, number, **some, **counts, **rest, tried=[start, *winners])
 
 
 def test_figures_that_tell_who_falls_are_told_apart_with_intervals_over_trials() -> None:
@@ -57,10 +57,10 @@ def test_figures_that_tell_who_falls_are_told_apart_with_intervals_over_trials()
         a_trial(1, "none", (0.1, None, 1), (0.2, None, 0)),
         a_trial(2, "none", (0.1, None, 0), (0.2, None, 1))._replace(tried=None),
     ]
-    told = foretelling(trials)
+    table = foretelling(trials)
     gat = "| w | gat | 1 | 12 of 22 | 5 of 6 | 0.95 (0.81 to 1.00) | 0.75 | 0.50 |"
-    assert gat in told
-    assert "| w | none | 1 | 1 of 2 | 1 of 1 | 0.00 | 0.00 |  |" in told
+    assert gat in table
+    assert "| w | none | 1 | 1 of 2 | 1 of 1 | 0.00 | 0.00 |  |" in table
 
 
 def test_nothing_is_told_of_trials_without_a_fall_or_of_those_that_kept_none() -> None:

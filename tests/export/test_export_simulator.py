@@ -51,7 +51,7 @@ def simulator(name: str, effects: dict[str, Any]) -> Simulator:
 
 def path(plant: Plant) -> np.ndarray:
     """A motion of all joints within their ranges, shape (100, n_motors) [rad]."""
-    low, high = np.array([plant.robot.commanded(name) for name in plant.robot.motors]).T
+    low, high = np.array([plant.robot.bound_commands(name) for name in plant.robot.motors]).T
     low, high = np.maximum(low, -1.0), np.minimum(high, 1.0)
     time = PERIOD * np.arange(100)[:, None]
     phase = np.arange(len(low))
@@ -103,7 +103,7 @@ def test_mujoco_replays_a_real_log_as_well_as_gsl_does(tmp_path: Path) -> None:
     worn = simulator("pendulum", {"coulomb_friction": {"torque": 0.03}})._replace(period=period)
     ours, theirs = [], []
     for episode in [
-        one for one, label in zip(batch.episodes, batch.metadata["episodes"], strict=True) if label["kp"] == 400
+        episode for episode, label in zip(batch.episodes, batch.metadata["episodes"], strict=True) if label["kp"] == 400
     ][:4]:
         commands, start = episode.action, episode.position[0]
         here = Held.of(worn.plant, STEP, period).play([commands], [start], settle=1)[0]
@@ -130,10 +130,10 @@ def test_a_format_lists_everything_that_acts_and_that_it_cannot_hold() -> None:
     assert exports(simulator("so101", {}))["mjcf"].missing[0].startswith("no_load_speed")
 
 
-def exports(one: Simulator) -> dict[str, Export]:
+def exports(simulator: Simulator) -> dict[str, Export]:
     return {
-        "mjcf": export_mjcf(one), "isaac_lab": export_isaac(one), "bam": export_bam(one, "sts3215"),
-        "urdf": export_urdf(one, None), "json": export_json(one),
+        "mjcf": export_mjcf(simulator), "isaac_lab": export_isaac(simulator), "bam": export_bam(simulator, "sts3215"),
+        "urdf": export_urdf(simulator, None), "json": export_json(simulator),
     }  # fmt: skip
 
 

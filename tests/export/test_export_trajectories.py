@@ -39,10 +39,10 @@ def export(folder: Path, kind: str) -> Path:
 
 def check_alike(again: Batch, batch: Batch, *, rows: int, precision: float) -> None:
     assert len(again) == len(batch)
-    for one, other in zip(again.episodes, batch.episodes, strict=True):
+    for episode, other in zip(again.episodes, batch.episodes, strict=True):
         n = len(other) - (1 - rows)
-        np.testing.assert_allclose(one.position[:n], other.position[:n], atol=precision)
-        np.testing.assert_allclose(one.action[: n - 1], other.action[: n - 1], atol=precision)
+        np.testing.assert_allclose(episode.position[:n], other.position[:n], atol=precision)
+        np.testing.assert_allclose(episode.action[: n - 1], other.action[: n - 1], atol=precision)
 
 
 def test_a_lerobot_data_set_is_imported_again(batch: Batch, tmp_path: Path) -> None:
@@ -67,7 +67,7 @@ def test_a_csv_is_imported_again(batch: Batch, tmp_path: Path) -> None:
     assert table["episode"].nunique() == len(batch)
     np.testing.assert_array_equal(
         table[[f"position.{joint}" for joint in JOINTS]].to_numpy(),
-        np.concatenate([one.position for one in batch.episodes]),
+        np.concatenate([episode.position for episode in batch.episodes]),
     )
 
 
@@ -76,14 +76,14 @@ def test_a_bag_holds_states_and_commands_with_their_times(batch: Batch, tmp_path
     from gsl.storage.importers.bag_table import BagTable
 
     place = export(tmp_path, "mcap")
-    for number, one in enumerate(batch.episodes):
+    for number, episode in enumerate(batch.episodes):
         states = BagTable(place / f"episode_{number:03d}", "/joint_states", 1e9)
         names = [f"position.{joint}" for joint in JOINTS]
         columns = states.columns(["time", *names])
-        np.testing.assert_allclose(columns["time"], one.time, atol=1e-9)
-        np.testing.assert_array_equal(np.column_stack([columns[name] for name in names]), one.position)
+        np.testing.assert_allclose(columns["time"], episode.time, atol=1e-9)
+        np.testing.assert_array_equal(np.column_stack([columns[name] for name in names]), episode.position)
         commands = BagTable(place / f"episode_{number:03d}", "/joint_commands", 1e9).columns(names)
-        np.testing.assert_array_equal(np.column_stack([commands[name] for name in names]), one.action)
+        np.testing.assert_array_equal(np.column_stack([commands[name] for name in names]), episode.action)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -92,9 +92,9 @@ def test_minari_loads_its_data_set(batch: Batch, tmp_path: Path, monkeypatch: py
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(export(tmp_path, "minari")))
     data = minari.load_dataset("gsl/trajectories-v0")
     assert (data.total_episodes, data.total_steps) == (2, 95)
-    for stored, one in zip(data, batch.episodes, strict=True):
-        np.testing.assert_array_equal(stored.observations, np.hstack([one.position, one.velocity]))
-        np.testing.assert_array_equal(stored.actions, one.action)
+    for stored, episode in zip(data, batch.episodes, strict=True):
+        np.testing.assert_array_equal(stored.observations, np.hstack([episode.position, episode.velocity]))
+        np.testing.assert_array_equal(stored.actions, episode.action)
         assert stored.truncations[-1] and not stored.terminations.any()
 
 

@@ -70,26 +70,26 @@ def closed_form(plant: Plant) -> np.ndarray:
 @pytest.mark.parametrize("effects", [{}, SOFT])
 def test_a_pd_servo_is_as_stiff_as_its_gain_and_its_body_say(effects: dict) -> None:
     """Stiffness to 1 %; light links with heavy rotors (rotor.py) answer up to 3 steps late, which costs damping."""
-    expected, found = closed_form(held(effects).plant), of(effects)
-    np.testing.assert_allclose(found.stiffness, expected.real, rtol=0.01)
-    late = (expected.imag / OMEGA - found.damping) / held(effects).plant.servo.kp  # [s]
+    expected, compliance = closed_form(held(effects).plant), of(effects)
+    np.testing.assert_allclose(compliance.stiffness, expected.real, rtol=0.01)
+    late = (expected.imag / OMEGA - compliance.damping) / held(effects).plant.servo.kp  # [s]
     assert (late > -1e-4).all() and (late < 3.3 * held().step).all()
-    assert (late[found.where("arms")] < 0.3 * held().step).all()
+    assert (late[compliance.where("arms")] < 0.3 * held().step).all()
 
 
 def test_dry_friction_adds_the_describing_function_of_a_bristle_that_slips() -> None:
     """F / z (p - sin p cos p) / pi, cos p = 1 - 2 z / Q, and 4 F (Q - z) / pi Q² at amplitude Q."""
     friction = 0.2
-    found, plain = of({"coulomb_friction": {"torque": friction, "joints": "legs"}}), of({})
-    legs = found.where("legs")
-    moved = (AMPLITUDE * EFFORT / np.abs(found.impedance))[legs]
+    rubbing, plain = of({"coulomb_friction": {"torque": friction, "joints": "legs"}}), of({})
+    legs = rubbing.where("legs")
+    moved = (AMPLITUDE * EFFORT / np.abs(rubbing.impedance))[legs]
     part = np.arccos(1.0 - 2.0 * BRISTLE / moved)
     spring = friction / BRISTLE * (part - np.sin(part) * np.cos(part)) / np.pi
     lost = 4.0 * friction * (moved - BRISTLE) / (np.pi * moved**2)
-    more = (found.impedance - plain.impedance)[legs]
+    more = (rubbing.impedance - plain.impedance)[legs]
     np.testing.assert_allclose(more.real, spring, rtol=0.1)
     np.testing.assert_allclose(more.imag, lost, rtol=0.06)
-    np.testing.assert_allclose(found.stiffness[~legs], plain.stiffness[~legs])
+    np.testing.assert_allclose(rubbing.stiffness[~legs], plain.stiffness[~legs])
 
 
 def test_a_joint_gives_way_where_its_torque_limit_and_its_weight_say() -> None:
@@ -117,12 +117,12 @@ def test_without_grounding_nothing_is_handed_over_and_with_the_true_effects_ever
 def test_where_simulator_and_robot_do_not_differ_there_is_no_share() -> None:
     for share in compute_transfers(of({}), of({}), of(WEAK)).values():
         assert share.stiffness is None and share.impedance is None and share.torque == pytest.approx(0.0)
-    assert "legs: stiffness no difference, strength 0.00" in ComplianceReport(of({}), of({}), of(WEAK)).told
+    assert "legs: stiffness no difference, strength 0.00" in ComplianceReport(of({}), of({}), of(WEAK)).sentence
 
 
 def test_a_grounding_that_softens_joints_which_are_as_stiff_as_the_robots_is_told() -> None:
-    told = ComplianceReport(of({}), of(SOFT), of({})).told
-    assert "legs: stiffness no difference, yet the grounding changes it by -50 %" in told
+    sentence = ComplianceReport(of({}), of(SOFT), of({})).sentence
+    assert "legs: stiffness no difference, yet the grounding changes it by -50 %" in sentence
 
 
 def motions(seed: int, count: int) -> list[np.ndarray]:
@@ -163,11 +163,11 @@ def test_models_that_know_how_joints_move_hand_over_little_of_how_they_yield() -
     assert max(left, left_of_simulator) < 1e-3
     by_action = simulator.network.layers[0][0][:, : len(simulator.joints)]
     grounding = LoadedTransformation(forward, Solver(simulator, gain(by_action, 0.2), 0.2))
-    found = measure(held(), grounding, 1)
-    for share in compute_transfers(of({}), found, of(real)).values():
+    compliance = measure(held(), grounding, 1)
+    for share in compute_transfers(of({}), compliance, of(real)).values():
         assert share.stiffness is not None and -0.2 < share.stiffness < 0.3
         assert share.impedance is not None and share.impedance < 0.3
-    assert (np.abs(found.torque - of({}).torque) < 0.05 * EFFORT).all()
+    assert (np.abs(compliance.torque - of({}).torque) < 0.05 * EFFORT).all()
 
 
 class Softer:
@@ -188,30 +188,32 @@ class Softer:
 def test_a_users_own_grounding_is_measured_as_it_acts() -> None:
     """Held for a tick T, a' = q + c (a - q) has K = c kp and a damping of kd - (1 - c) kp T / 2 or more (torque.md)."""
     world = replace(held(), period=0.004)
-    found = measure(world, Softer(0.5), 1)
-    seen = np.array([name in world.plant.robot.controlled for name in found.motors])
+    compliance = measure(world, Softer(0.5), 1)
+    seen = np.array([name in world.plant.robot.controlled for name in compliance.motors])
     np.testing.assert_allclose(
-        found.stiffness[seen], of({}).stiffness[seen] - 0.5 * world.plant.servo.kp[seen], rtol=0.04
+        compliance.stiffness[seen], of({}).stiffness[seen] - 0.5 * world.plant.servo.kp[seen], rtol=0.04
     )
-    np.testing.assert_allclose(found.stiffness[~seen], of({}).stiffness[~seen], rtol=0.01)  # its command has no eyes
+    np.testing.assert_allclose(
+        compliance.stiffness[~seen], of({}).stiffness[~seen], rtol=0.01
+    )  # its command has no eyes
 
 
 def test_one_branch_does_not_feel_a_load_on_another() -> None:
     robot = held().plant.robot
     loaded = rounds(robot)
     np.testing.assert_array_equal(np.sum(loaded, axis=0), 1)
-    found = measure(held(), Softer(1.0), 1)  # one joint at a time
-    np.testing.assert_allclose(found.stiffness, of({}).stiffness, rtol=1e-6)
-    np.testing.assert_allclose(found.torque, of({}).torque, rtol=1e-3)
+    compliance = measure(held(), Softer(1.0), 1)  # one joint at a time
+    np.testing.assert_allclose(compliance.stiffness, of({}).stiffness, rtol=1e-6)
+    np.testing.assert_allclose(compliance.torque, of({}).torque, rtol=1e-3)
 
 
 PENDULUM = BulletWorld(robot="pendulum", effects={}, floating=False, step=0.001, period=0.005)
 
 
 def test_a_robot_without_groups_is_one_group() -> None:
-    found = measure(PENDULUM, NoGrounding(), 1)
-    assert list(found.groups) == ["all"]
-    assert found.stiffness[0] == pytest.approx(closed_form(PENDULUM.plant)[0].real, rel=0.02)
+    compliance = measure(PENDULUM, NoGrounding(), 1)
+    assert list(compliance.groups) == ["all"]
+    assert compliance.stiffness[0] == pytest.approx(closed_form(PENDULUM.plant)[0].real, rel=0.02)
 
 
 def test_noise_is_told_and_the_seed_decides() -> None:
@@ -230,14 +232,14 @@ def test_a_world_that_is_no_robot_is_refused() -> None:
 def test_the_report_of_a_search_gains_a_section_and_the_real_robot_beside_it_shares(tmp_path: Path) -> None:
     report, real = tmp_path / "grounding.json", held(SOFT)
     report.write_text('{"acceptable": true}')
-    told = report_compliance(held(), real, NoGrounding(), report, QUIET, 1)
+    metrics = report_compliance(held(), real, NoGrounding(), report, QUIET, 1)
     document = json.loads(report.read_text())
     assert document["acceptable"] and set(document[SECTION]["groups"]) == {"legs", "arms"}
-    legs = told[SECTION]["legs"]["stiffness"]
+    legs = metrics[SECTION]["legs"]["stiffness"]
     assert legs["grounded"] < 0.6 * legs["sim"]
     beside = with_real(report, real, 1)
     assert beside is not None and beside.metrics()["legs"]["share"]["stiffness"] == pytest.approx(1.0)
-    assert "legs: stiffness 1.00" in beside.told and len(beside.rows()) == 6
+    assert "legs: stiffness 1.00" in beside.sentence and len(beside.rows()) == 6
 
 
 def test_what_changes_nothing_or_cannot_be_loaded_has_no_section(tmp_path: Path) -> None:
@@ -247,8 +249,8 @@ def test_what_changes_nothing_or_cannot_be_loaded_has_no_section(tmp_path: Path)
 
 
 def test_a_document_returns_what_was_measured() -> None:
-    found = Compliance.of(json.loads(json.dumps(of({}).document())))
-    np.testing.assert_array_equal(found.stiffness, of({}).stiffness)
-    assert found.groups == of({}).groups
-    rows = ComplianceReport(found, found).rows()
+    compliance = Compliance.of(json.loads(json.dumps(of({}).document())))
+    np.testing.assert_array_equal(compliance.stiffness, of({}).stiffness)
+    assert compliance.groups == of({}).groups
+    rows = ComplianceReport(compliance, compliance).rows()
     assert [row[0] for row in rows] == ["legs"] * 3 + ["arms"] * 3

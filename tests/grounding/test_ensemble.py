@@ -135,18 +135,18 @@ def soft(kp: float, world: BulletWorld = GROUND) -> BulletWorld:
 
 def test_an_episode_is_that_of_one_member_alone_whatever_came_before() -> None:
     worlds = tuple(soft(kp) for kp in (1.0, 0.5, 0.2))
-    one, other = (pickle.loads(pickle.dumps(EnsembleWorld(GROUND, worlds))).make() for _ in range(2))
-    by_seed = {seed: positions(one, seed) for seed in range(8)}
+    first, second = (pickle.loads(pickle.dumps(EnsembleWorld(GROUND, worlds))).make() for _ in range(2))
+    by_seed = {seed: positions(first, seed) for seed in range(8)}
     for seed in reversed(by_seed):
-        np.testing.assert_array_equal(positions(other, seed), by_seed[seed])
-    found = {
+        np.testing.assert_array_equal(positions(second, seed), by_seed[seed])
+    members_of = {
         seed: [k for k, world in enumerate(worlds) if np.array_equal(alone(world, seed), rows)]
         for seed, rows in by_seed.items()
     }
-    assert all(len(members) == 1 for members in found.values())
-    assert {members[0] for members in found.values()} == {0, 1, 2}
-    one.close()
-    other.close()
+    assert all(len(members) == 1 for members in members_of.values())
+    assert {members[0] for members in members_of.values()} == {0, 1, 2}
+    first.close()
+    second.close()
 
 
 def test_an_ensemble_of_one_is_its_member() -> None:
@@ -172,10 +172,10 @@ def test_a_checkpoint_keeps_its_members_and_a_world_has_the_one_it_names(folder:
 
 def test_the_members_of_a_servo_take_turns(folder: Path) -> None:
     place = str(folder / "runs/several/train_servo")
-    world = LearnedServo(servo=place, ensemble=True, torque_noise=0.0).switched_on(AIR)
+    world = LearnedServo(servo=place, ensemble=True, torque_noise=0.0).switch_on(AIR)
     assert isinstance(world, EnsembleWorld)
     assert world.members == tuple(replace(AIR, servo=place, servo_member=k) for k in range(3))
-    assert world.world == LearnedServo(servo=place).switched_on(AIR) == world.members[0]
+    assert world.world == LearnedServo(servo=place).switch_on(AIR) == world.members[0]
 
 
 def test_draws_are_a_normal_distribution_within_the_interval() -> None:
@@ -199,28 +199,30 @@ def test_numbers_are_spread_evenly_over_every_column() -> None:
 def test_a_cause_acts_by_its_probability_within_its_interval(probability: float) -> None:
     entry = {"kp": 0.6, "kd": 0.8, "joints": "legs"}
     cause = UncertainCause("servo_gain", entry, probability, {"kp": (0.5, 0.7), "kd": (0.8, 0.8)})
-    drawn = [one for (one,) in drawings([cause], DRAWS)]
-    acting = [one for one in drawn if one is not None]
+    drawn = [entry for (entry,) in drawings([cause], DRAWS)]
+    acting = [draw for draw in drawn if draw is not None]
     assert abs(len(acting) - probability * DRAWS) <= 1.0
-    assert all(0.5 <= one["kp"] <= 0.7 and (one["kd"], one["joints"]) == (0.8, "legs") for one in acting)
-    assert len({one["kp"] for one in acting}) == len(acting)
+    assert all(0.5 <= entry["kp"] <= 0.7 and (entry["kd"], entry["joints"]) == (0.8, "legs") for entry in acting)
+    assert len({entry["kp"] for entry in acting}) == len(acting)
 
 
 def test_a_diagnosis_that_is_sure_makes_the_plain_world_of_its_effects() -> None:
     sure = UncertainCause("servo_gain", {"kp": 0.6, "joints": "legs"}, 1.0, {"kp": (0.6, 0.6)})
     bare = UncertainCause("command_latency", {"delay": 0.01, "joints": "all"}, 1.0, {})
-    world = replace(AIR, effects={one.effect: [one.entry] for one in (sure, bare)})
+    world = replace(AIR, effects={cause.effect: [cause.entry] for cause in (sure, bare)})
     assert around(world, [sure, bare]) is world
     assert around(world, []) is world
     unsure = around(world, [replace(sure, probability=0.5), bare])
     assert isinstance(unsure, EnsembleWorld) and unsure.world == world
-    assert {len(one.effects) for one in unsure.members} == {1, 2}
-    np.testing.assert_array_equal(alone(next(one for one in unsure.members if one == world), 2), alone(world, 2))
+    assert {len(member.effects) for member in unsure.members} == {1, 2}
+    np.testing.assert_array_equal(
+        alone(next(member for member in unsure.members if member == world), 2), alone(world, 2)
+    )
 
 
 def test_draws_of_a_report_leave_its_calibration(folder: Path) -> None:
-    found = read_diagnosis(str(folder / "runs/found/diagnose"), "diagnose")
-    late, gain = found.uncertain
+    diagnosis = read_diagnosis(str(folder / "runs/found/diagnose"), "diagnose")
+    late, gain = diagnosis.uncertain
     assert (late.entry, late.probability, late.intervals) == (
         EFFECTS["command_latency"][0],
         0.8,
@@ -228,12 +230,12 @@ def test_draws_of_a_report_leave_its_calibration(folder: Path) -> None:
     )
     assert gain.entry == EFFECTS["servo_gain"][0]
     grounding = DiagnosedEffects(diagnosis=str(folder / "runs/found/diagnose"), draws=True)
-    world = switch_on(NAO, found)
-    drawn = grounding.drawn(world, found)
+    world = switch_on(NAO, diagnosis)
+    drawn = grounding.draw(world, diagnosis)
     assert isinstance(drawn, EnsembleWorld) and len(drawn.members) == DRAWS
-    for one in drawn.members:
-        assert one.effects["servo_gain"][-2:] == CALIBRATION
-    assert replace(grounding, draws=False).drawn(world, found) is world
+    for member in drawn.members:
+        assert member.effects["servo_gain"][-2:] == CALIBRATION
+    assert replace(grounding, draws=False).draw(world, diagnosis) is world
     assert not [*uncertain_causes({"causes": [{"effect": "backlash"}], "effects": {"backlash": [{"width": 0.01}]}})]
 
 
@@ -243,8 +245,8 @@ def test_drawn_effects_and_members_of_a_servo_go_together(folder: Path, tmp_path
     scenario = Scenario(NAO, Walk(duration=0.6), WalkEngine(), "sim", both)
     ready, about = check_grounding(scenario, Gate(WalkEngine().initial, tmp_path, QUIET, False, 1))
     assert isinstance(ready.world, EnsembleWorld) and ready.grounding == NoGrounding()
-    assert [one.servo_member for one in ready.world.members] == [k % 3 for k in range(DRAWS)]
-    assert len({str(one.effects) for one in ready.world.members}) == DRAWS
+    assert [member.servo_member for member in ready.world.members] == [k % 3 for k in range(DRAWS)]
+    assert len({str(member.effects) for member in ready.world.members}) == DRAWS
     assert scenario.prepare(about) == ready
     report = json.loads((tmp_path / "grounding.json").read_text())
     assert report["acceptable"] and report["drawn"]["acceptable"]
@@ -257,10 +259,10 @@ def test_a_bootstrap_draws_whole_motions_as_many_as_there_are() -> None:
     samples = np.array([4, 4, 7, 9, 9, 9])
     drawn = [samples[bootstrap(samples, np.random.default_rng(seed))] for seed in range(20)]
     size = {4: 2, 7: 1, 9: 3}
-    for one in drawn:
-        counts = [np.sum(one == key) / size[key] for key in size]
+    for draw in drawn:
+        counts = [np.sum(draw == key) / size[key] for key in size]
         assert sum(counts) == 3 and all(count == int(count) for count in counts)
-    assert len({tuple(one) for one in drawn}) > 3
+    assert len({tuple(draw) for draw in drawn}) > 3
 
 
 def test_a_member_far_from_the_log_is_a_problem_of_the_ensemble_alone() -> None:
@@ -290,7 +292,7 @@ def test_a_search_goes_through_an_ensemble_and_counts_the_worst(folder: Path, gr
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "problem"),
     [
         (("collect", "world=learned", "world.servo=several", "world.servo_member=3"), "numbered from 0 to 2"),
         (("collect", "world=learned", "world.servo=several", "world.servo_member=-1"), "servo_member"),
@@ -304,10 +306,10 @@ def test_a_search_goes_through_an_ensemble_and_counts_the_worst(folder: Path, gr
         (("train-servo", "real=x", "members=0"), "members"),
     ],
 )
-def test_what_cannot_be_gets_one_line(folder: Path, line: tuple[str, ...], told: str) -> None:
+def test_what_cannot_be_gets_one_line(folder: Path, line: tuple[str, ...], problem: str) -> None:
     role = ("role=sim",) if line[0] == "collect" else ()
     small = () if line[0] == "train-servo" else SMALL
-    assert told in refused(*line, *role, *small, "name=refused", folder=folder)
+    assert problem in refused(*line, *role, *small, "name=refused", folder=folder)
 
 
 def test_simulators_are_not_drawn_twice() -> None:

@@ -78,8 +78,8 @@ def test_the_gain_solves_the_damped_least_squares() -> None:
 def test_undamped_the_solved_action_has_the_wanted_effect() -> None:
     rng = np.random.default_rng(0)
     sensitivity, action, wanted = rng.normal(size=(N, N)), rng.normal(size=N), rng.normal(size=N)
-    found = solve_action(action, gain(sensitivity, 1e-12), wanted, sensitivity @ action)
-    np.testing.assert_allclose(sensitivity @ found, wanted)
+    solution = solve_action(action, gain(sensitivity, 1e-12), wanted, sensitivity @ action)
+    np.testing.assert_allclose(sensitivity @ solution, wanted)
 
 
 @pytest.mark.parametrize("alpha", [0.3, 1.0])

@@ -38,8 +38,8 @@ DRY = {"coulomb_friction": [{"torque": 0.1, "joints": "legs"}, {"torque": 0.05, 
 PAIRS = {"without an effect": {}, "one": LATE, "several": {**LATE, **DRY}}
 
 
-def found(effects: Mapping[str, Any], **given: Any) -> Diagnosis:
-    return Diagnosis("causes", tuple(effects), "told", "nao", given.pop("simulated", {}), effects, **given)
+def found(effects: Mapping[str, Any], **settings: Any) -> Diagnosis:
+    return Diagnosis("causes", tuple(effects), "told", "nao", settings.pop("simulated", {}), effects, **settings)
 
 
 def passed(scenario: Scenario, folder: Path, *, accept: bool = False) -> tuple[Scenario, Mapping[str, Any]]:
@@ -58,8 +58,8 @@ def ran(scenario: Scenario, seed: int = 3) -> Trajectory:
 def test_a_simulator_with_what_it_lacks_is_the_real_world(effects: Mapping[str, Any]) -> None:
     real = replace(AIR, effects=effects)
     mended = switch_on(AIR, found(effects))
-    one, other = (ran(replace(arm(), world=world)) for world in (mended, real))
-    np.testing.assert_array_equal(one.position, other.position)
+    first, second = (ran(replace(arm(), world=world)) for world in (mended, real))
+    np.testing.assert_array_equal(first.position, second.position)
 
 
 def test_effects_add_up_to_those_of_the_simulator() -> None:
@@ -85,16 +85,16 @@ def test_a_grounding_without_diagnosis_or_before_its_effects_are_on_is_refused()
 
 
 def test_given_effects_need_no_diagnosis_and_win_over_one() -> None:
-    told = DiagnosedEffects(diagnosis="x", effects=LATE).load(lambda reference, method: found(DRY))
-    assert (told.verdict, told.effects, told.causes) == ("given", LATE, ("command_latency",))
+    diagnosis = DiagnosedEffects(diagnosis="x", effects=LATE).load(lambda reference, method: found(DRY))
+    assert (diagnosis.verdict, diagnosis.effects, diagnosis.causes) == ("given", LATE, ("command_latency",))
 
 
 def test_the_inner_grounding_acts_in_the_diagnosed_world(tmp_path: Path) -> None:
-    given = DiagnosedEffects(effects=LATE, inner=ActionNoise(sd=0.01))
-    ready, about = passed(replace(arm(), grounding=given), tmp_path)
+    grounding = DiagnosedEffects(effects=LATE, inner=ActionNoise(sd=0.01))
+    ready, about = passed(replace(arm(), grounding=grounding), tmp_path)
     noisy = replace(arm(), world=replace(AIR, effects=LATE), grounding=ActionNoise(sd=0.01))
     np.testing.assert_array_equal(ran(ready).position, ran(noisy).position)
-    assert innermost(given) == ready.grounding
+    assert innermost(grounding) == ready.grounding
     assert about == {"effects": ["command_latency"], "diagnosis": "given", "grounding_acceptable": True}
 
 
@@ -118,8 +118,8 @@ def test_effects_with_which_nobody_can_stand_are_refused(tmp_path: Path) -> None
 
 
 def test_effects_around_drawn_ones_are_checked_too(tmp_path: Path) -> None:
-    given = DiagnosedEffects(effects=LATE, inner=RandomisedEffects(("link_mass",), width=0.1))
-    _, about = passed(replace(arm(), grounding=given), tmp_path)
+    grounding = DiagnosedEffects(effects=LATE, inner=RandomisedEffects(("link_mass",), width=0.1))
+    _, about = passed(replace(arm(), grounding=grounding), tmp_path)
     assert about["width"] == 0.1 and about["grounding_acceptable"]
     assert json.loads((tmp_path / "grounding.json").read_text())["effects"] == LATE
 
@@ -131,10 +131,10 @@ def test_effects_that_take_the_held_out_gap_nowhere_are_a_problem() -> None:
 
 
 def test_without_a_cause_the_simulator_is_only_calibrated() -> None:
-    known, unknown = (Diagnosis(verdict, (), "", "nao", {}, {}).told for verdict in ("no_gap", "unknown"))
-    assert known.endswith("calibrated joint by joint.")
-    assert unknown == f"{known} In the task that may be no nearer: compare with grounding=ane and grounding=gat."
-    assert found(LATE).told == "Switched on in the simulator: command_latency."
+    clean, unknown = (Diagnosis(verdict, (), "", "nao", {}, {}).sentence for verdict in ("no_gap", "unknown"))
+    assert clean.endswith("calibrated joint by joint.")
+    assert unknown == f"{clean} In the task that may be no nearer: compare with grounding=ane and grounding=gat."
+    assert found(LATE).sentence == "Switched on in the simulator: command_latency."
 
 
 def test_optimising_with_an_effect_as_grounding_is_optimising_in_the_world_that_has_it(tmp_path: Path) -> None:
@@ -142,8 +142,8 @@ def test_optimising_with_an_effect_as_grounding_is_optimising_in_the_world_that_
     effect = "effects.command_latency.delay=0.02"
     done(*line, "name=a", "grounding=effects", f"grounding.{effect}", folder=tmp_path)
     done(*line, "name=b", "grounding=none", f"world.{effect}", folder=tmp_path)
-    one, other = (read_policies(tmp_path / f"runs/{name}/optimize/policies.json") for name in "ab")
-    assert one.records == other.records
+    first, second = (read_policies(tmp_path / f"runs/{name}/optimize/policies.json") for name in "ab")
+    assert first.records == second.records
 
 
 def test_a_grounding_names_what_is_missing(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ def noise(world: Any) -> np.ndarray:
 
 
 def test_shares_are_of_what_each_joint_of_this_simulator_can_give() -> None:
-    made = TorqueNoise(step=0.5, constant=0.1).switched_on(WORLD)
+    made = TorqueNoise(step=0.5, constant=0.1).switch_on(WORLD)
     np.testing.assert_allclose(noise(made), np.outer([0.5, 0.1], WORLD.plant.servo.limit))
     assert torque_limits(WORLD)["LShoulderPitch"] == pytest.approx(0.5 * 1.329)
     assert made.effects["torque_limit"] == [WORLD.effects["torque_limit"]]
@@ -96,7 +96,7 @@ def test_noise_in_which_pi0_falls_is_refused(tmp_path: Path) -> None:
 
 def test_a_world_without_torques_is_refused_in_a_line() -> None:
     with pytest.raises(ConfigError, match="only Bullet worlds have torques"):
-        TorqueNoise().switched_on(NoGrounding())
+        TorqueNoise().switch_on(NoGrounding())
     with pytest.raises(ConfigError, match="not switched on"):
         TorqueNoise().start(WORLD.layout, np.random.default_rng(0))
 
@@ -106,7 +106,7 @@ def test_it_goes_through_a_search_and_an_iteration(tmp_path: Path) -> None:
     metrics = json.loads((tmp_path / "runs/one/optimize/metrics.json").read_text())
     assert metrics["grounding_acceptable"]
     late = ("real=nao_ideal", "real.effects.command_latency.delay=0.02")
-    given = "grounding.effects={command_latency:{delay:0.02}}"
-    said = done("iterate", *SMALL, *late, "grounding=effects_torque_noise", given, "name=two", folder=tmp_path)
+    effects = "grounding.effects={command_latency:{delay:0.02}}"
+    said = done("iterate", *SMALL, *late, "grounding=effects_torque_noise", effects, "name=two", folder=tmp_path)
     assert "real data: " in said.out
     assert json.loads((tmp_path / "runs/two/iteration_01/optimize/metrics.json").read_text())["effects"]

@@ -46,13 +46,13 @@ def test_a_draw_stays_within_its_share_of_the_documented_ranges_and_reaches_its_
     width, rng = 0.4, np.random.default_rng(0)
     own = replace(robot("nao"), ranges={"command_latency": {"delay": (0.0, 0.2)}})
     drawn = [Draw(SETTINGS.effects, width, own)(rng) for _ in range(400)]
-    assert max(one["command_latency"]["delay"] for one in drawn) > 0.07  # of .08
+    assert max(draw["command_latency"]["delay"] for draw in drawn) > 0.07  # of .08
     for name in SETTINGS.effects:
-        for key, known in list_documented(name, own).items():
-            if known.neutral is None:
+        for key, option in list_documented(name, own).items():
+            if option.neutral is None:
                 continue
-            values = np.array([one[name][key] for one in drawn])
-            low, high = (known.neutral + width * (end - known.neutral) for end in (known.lower, known.upper))
+            values = np.array([draw[name][key] for draw in drawn])
+            low, high = (option.neutral + width * (end - option.neutral) for end in (option.lower, option.upper))
             assert low <= values.min() < low + 0.02 * (high - low), name
             assert high - 0.02 * (high - low) < values.max() <= high, name
 

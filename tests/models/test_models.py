@@ -70,8 +70,8 @@ def test_the_linear_model_finds_a_linear_law_whatever_the_units() -> None:
 
 
 def test_the_ridge_keeps_collinear_inputs_in_bounds() -> None:
-    one = RNG.normal(size=(100, 1))
-    network = fit_linear(np.hstack([one, one]), one, ridge=1e-3)
+    column = RNG.normal(size=(100, 1))
+    network = fit_linear(np.hstack([column, column]), column, ridge=1e-3)
     np.testing.assert_allclose(network.layers[0][0], [[0.5, 0.5]], atol=1e-3)
 
 

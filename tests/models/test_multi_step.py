@@ -41,32 +41,35 @@ def test_the_loss_is_of_what_a_model_says_when_it_is_fed_with_its_own_answers(hi
     layer = 0.1 * rng.standard_normal((2, history.size(2))), np.array([0.01, -0.02])
     model = ForwardModel(Network([layer]), history, batch.joints)
     errors = [predict_error(model, pieces._replace(ticks=tick)) for tick in range(1, TICKS + 1)]
-    by_tick, scale = np.array([np.mean(one**2) for one in errors]), np.array([1.0, 2.0, 3.0, 4.0])
+    by_tick, scale = np.array([np.mean(error**2) for error in errors]), np.array([1.0, 2.0, 3.0, 4.0])
     weight, bias = (torch.as_tensor(part, dtype=torch.float32) for part in layer)
     loss = MultiStep(pieces, scale).loss(lambda windows: windows @ weight.T + bias)
     assert loss.item() == pytest.approx(np.mean(by_tick / scale), rel=1e-4)
     few = torch.arange(3)
     some = MultiStep(pieces, scale).loss(lambda windows: windows @ weight.T + bias, few)
-    assert some.item() == pytest.approx(np.mean([np.mean(one[:3] ** 2) for one in errors] / scale), rel=1e-4)
+    assert some.item() == pytest.approx(np.mean([np.mean(error[:3] ** 2) for error in errors] / scale), rel=1e-4)
     moved = measure_travel(pieces)
     assert len(moved) == TICKS and 0.0 < moved[0] < moved[1]
 
 
 def test_it_brings_answers_that_are_fed_back_nearer_to_the_robot(tmp_path: Path) -> None:
     write(tmp_path / "real.parquet", a_batch(SLOW, "real", pi0=6, others=12))
-    found = {}
+    error = {}
     for ticks in (1, 10):
         (tmp_path / str(ticks)).mkdir()
         model = ModelConfig(family="mlp", hidden=(20,), epochs=15, multi_step=ticks)
         metrics = TrainForward(str(tmp_path / "real.parquet"), model).run(tmp_path / str(ticks), QUIET)
-        found[ticks] = metrics["heldout"]["off_pi0"]["free_run_deg"]
-    assert found[10] < 0.7 * found[1]
+        error[ticks] = metrics["heldout"]["off_pi0"]["free_run_deg"]
+    assert error[10] < 0.7 * error[1]
 
 
 def test_a_grounding_asks_for_it_of_a_network() -> None:
     needed = as_needed(ModelConfig(), ActionTransformation("f", "i", multi_step=8))
     assert (needed.family, needed.multi_step) == ("mlp", 8)
-    assert {name: one.multi_step for name, one in ModelConfig(multi_step=8).variants.items()} == {"linear": 1, "mlp": 8}
+    assert {name: variant.multi_step for name, variant in ModelConfig(multi_step=8).variants.items()} == {
+        "linear": 1,
+        "mlp": 8,
+    }
 
 
 def test_models_of_a_late_simulator_are_fitted_without_it() -> None:
@@ -173,8 +176,8 @@ def test_it_is_of_a_forward_model_that_corrects_nothing(tmp_path: Path) -> None:
 
 def test_it_is_one_setting_of_the_command(tmp_path: Path) -> None:
     write(tmp_path / "real.parquet", a_batch(SLOW, "real"))
-    told = done("train-forward", "data=real.parquet", "model=mlp", "model.multi_step=3", folder=tmp_path)
-    assert "forward model (mlp) on held-out real trajectories" in told.out
+    output = done("train-forward", "data=real.parquet", "model=mlp", "model.multi_step=3", folder=tmp_path)
+    assert "forward model (mlp) on held-out real trajectories" in output.out
     said = refused("train-forward", "data=real.parquet", "model.multi_step=30", folder=tmp_path)
     assert said == "model.multi_step = 30: must be at most 10"
     assert FARTHEST <= FREE  # what an episode has to be long enough for

@@ -56,9 +56,9 @@ def test_widths_and_sizes_belong_together(head: Head) -> None:
 def test_draws_have_the_moments_that_the_outputs_say(head: Head) -> None:
     draws, raw = Draws(np.random.default_rng(0)), np.random.default_rng(1).normal(size=head.width(N))
     weights, means, sds = head.parts(raw)
-    drawn = np.array([head.drawn(raw, draws) for _ in range(20000)])
+    drawn = np.array([head.draw(raw, draws) for _ in range(20000)])
     second = (weights[:, None] * (sds**2 + means**2)).sum(axis=0)
-    np.testing.assert_allclose(drawn.mean(axis=0), head.expected(raw), atol=0.05)
+    np.testing.assert_allclose(drawn.mean(axis=0), head.expect(raw), atol=0.05)
     np.testing.assert_allclose((drawn**2).mean(axis=0), second, rtol=0.06)
 
 
@@ -77,10 +77,10 @@ def test_raw_outputs_of_scaled_targets_are_those_of_plain_ones(head: Head) -> No
     network, x = a_network(head), np.random.default_rng(2).normal(size=(4, SIZE))
     as_they_are = scaling(np.zeros((2, SIZE)))
     plain = unscale(list(network.layers), as_they_are, head.scaling(outputs))
-    wanted = outputs.undo(head.expected(network.predict_many(x)))
-    np.testing.assert_allclose(head.expected(plain.predict_many(x)), wanted, rtol=1e-4)
+    wanted = outputs.undo(head.expect(network.predict_many(x)))
+    np.testing.assert_allclose(head.expect(plain.predict_many(x)), wanted, rtol=1e-4)
     if head.draws:
-        sds = [head.parts(one.predict_many(x))[2] for one in (network, plain)]
+        sds = [head.parts(net.predict_many(x))[2] for net in (network, plain)]
         np.testing.assert_allclose(sds[1], sds[0] * outputs.sd, rtol=1e-4)
 
 
@@ -111,7 +111,7 @@ def test_beta_keeps_a_gaussian_s_mean_where_the_likelihood_takes_it_for_noise() 
         config = ModelConfig(family="mlp", likelihood="gaussian", hidden=(32, 32), beta=beta)
         parts = (inputs[:2400], targets[:2400]), (inputs[2400:], targets[2400:])
         network = fit_network(*parts, config, seed=1, head=config.head)
-        errors = config.head.expected(network.predict_many(inputs[2400:])) - targets[2400:]
+        errors = config.head.expect(network.predict_many(inputs[2400:])) - targets[2400:]
         left[beta] = errors.var() / targets[2400:].var()
     assert left[0.5] < 0.01 < 0.5 < left[0.0]
 
@@ -125,7 +125,7 @@ def test_a_mixture_learns_what_goes_either_way() -> None:
     config, head = replace(QUICK, likelihood="mixture", components=2), Head("mixture", 2)
     network = fit_network(forked(2000, 0), forked(400, 1), config, seed=1, head=head)
     draws, raw = Draws(np.random.default_rng(0)), network.predict(np.zeros(1))
-    drawn = np.array([head.drawn(raw, draws)[0] for _ in range(2000)])
+    drawn = np.array([head.draw(raw, draws)[0] for _ in range(2000)])
     assert (np.abs(np.abs(drawn) - 1.0) < 0.3).mean() > 0.98
     assert (drawn > 0.0).mean() == pytest.approx(0.5, abs=0.1)
 
@@ -137,13 +137,13 @@ def test_calibration_finds_how_wide_errors_are_and_how_long_they_last(head: Head
     inputs = rng.normal(size=(count, SIZE))
     raw = network.predict_many(inputs)
     weights, means, sds = head.parts(raw)
-    expected = head.expected(raw)
+    expected = head.expect(raw)
     sd = np.sqrt((weights[..., None] * (sds**2 + (means - expected[:, None]) ** 2)).sum(axis=-2))
     outputs = expected + [1.5, 0.8] * sd * np.array([drawn.normal(N) for _ in range(count)])
     parts = [(inputs[k : k + 300], outputs[k : k + 300]) for k in range(0, count, 300)]
-    wider, found = calibrate(network, head, parts)
-    np.testing.assert_allclose(found, memory, atol=0.06)
-    np.testing.assert_array_equal(head.expected(wider.predict_many(inputs)), expected)
+    wider, lasting = calibrate(network, head, parts)
+    np.testing.assert_allclose(lasting, memory, atol=0.06)
+    np.testing.assert_array_equal(head.expect(wider.predict_many(inputs)), expected)
     scale = head.parts(wider.predict_many(inputs))[2] / sds
     np.testing.assert_allclose(scale, np.broadcast_to([1.5, 0.8], scale.shape), rtol=0.06)
 
@@ -151,7 +151,7 @@ def test_calibration_finds_how_wide_errors_are_and_how_long_they_last(head: Head
 def test_a_joint_that_is_quite_still_has_no_memory() -> None:
     network, rng = a_network(GAUSSIAN), np.random.default_rng(0)
     inputs = rng.normal(size=(300, SIZE))
-    outputs = GAUSSIAN.expected(network.predict_many(inputs))
+    outputs = GAUSSIAN.expect(network.predict_many(inputs))
     outputs[:, 0] += rng.normal(size=300)
     _, memory = calibrate(network, GAUSSIAN, [(inputs, outputs)])
     assert memory[1] == 0.0 and np.isfinite(memory).all()
@@ -164,12 +164,12 @@ def test_a_linear_mixture_is_refused() -> None:
 
 @pytest.mark.parametrize("head", [GAUSSIAN, MIXTURE], ids=lambda head: head.likelihood)
 def test_a_stochastic_model_and_an_ensemble_come_back_from_their_files(tmp_path: Path, head: Head) -> None:
-    one, windows = a_model(head), np.random.default_rng(3).normal(size=(50, SIZE))
-    for model in (one, ensemble((one, a_model(head, 1)), windows)):
+    single, windows = a_model(head), np.random.default_rng(3).normal(size=(50, SIZE))
+    for model in (single, ensemble((single, a_model(head, 1)), windows)):
         again = read_forward_model(str(write_model(tmp_path, model)))
         assert type(again) is type(model)
         np.testing.assert_array_equal(again.effect(windows[0]), model.effect(windows[0]))
-        first, second = (one.effect(windows[0], Draws(np.random.default_rng(0))) for one in (again, model))
+        first, second = (member.effect(windows[0], Draws(np.random.default_rng(0))) for member in (again, model))
         np.testing.assert_array_equal(first, second)
 
 
@@ -199,20 +199,20 @@ def test_gat_with_a_gaussian_is_its_mode_and_sgat_scatters_about_it() -> None:
 def members() -> Ensemble:
     """Two models that agree at rest and the less the farther a window is from it."""
     both = [a_model(Head(), seed) for seed in (0, 1)]
-    still = [Network([(one.network.layers[0][0], np.full(N, 0.1))]) for one in both]
+    still = [Network([(model.network.layers[0][0], np.full(N, 0.1))]) for model in both]
     windows = 0.01 * np.random.default_rng(3).normal(size=(200, SIZE))
-    return ensemble(tuple(replace(one, network=net) for one, net in zip(both, still, strict=True)), windows)
+    return ensemble(tuple(replace(model, network=net) for model, net in zip(both, still, strict=True)), windows)
 
 
 def test_a_gate_leaves_actions_alone_where_the_ensemble_knows_nothing() -> None:
-    known, open_gate = members(), LoadedTransformation(members(), SOLVER)
+    committee, open_gate = members(), LoadedTransformation(members(), SOLVER)
     gated = replace(open_gate, gate=1.0)
     actions, sent = in_a_run(gated, far=1000.0)
     np.testing.assert_array_equal(sent[5:], actions[5:])
     generous = replace(open_gate, gate=1e6)
     np.testing.assert_array_equal(in_a_run(generous)[1], in_a_run(open_gate)[1])
     windows = 0.01 * np.random.default_rng(8).normal(size=(500, SIZE))
-    assert (np.array([known.judged(window)[1] for window in windows]) < 1.0).mean() == pytest.approx(0.95, abs=0.03)
+    assert (np.array([committee.judge(window)[1] for window in windows]) < 1.0).mean() == pytest.approx(0.95, abs=0.03)
 
 
 def test_what_a_model_cannot_do_is_refused() -> None:
@@ -232,7 +232,7 @@ def test_variables_that_one_noise_moves_are_drawn_together() -> None:
     network = Network([(np.zeros((6, 1)), raw)])
     factor = mixing(network, head, (np.zeros((5000, 1)), outputs))
     draws = Draws(np.random.default_rng(1))
-    drawn = np.array([head.drawn(raw, draws, factor) for _ in range(5000)])
+    drawn = np.array([head.draw(raw, draws, factor) for _ in range(5000)])
     np.testing.assert_allclose(drawn.std(axis=0), [1.0, 2.0, 0.5], rtol=0.05)
     np.testing.assert_allclose(drawn[:, 1], -2.0 * drawn[:, 0], atol=0.05)
     assert abs(np.corrcoef(drawn[:, 0], drawn[:, 2])[0, 1]) < 0.05

@@ -63,13 +63,13 @@ def test_a_search_maximises_it_and_tells_the_mean(tmp_path: Path) -> None:
     assert set(by_mean[0]) == {"number", "values", "falls", "chain"}
     assert generations[0]["means"] == by_mean[0]["values"]  # the same candidates, seeds and episodes
     assert all(worst < mean for worst, mean in zip(generations[0]["values"], by_mean[0]["values"], strict=True))
-    winners = [int(np.argmax(one["values"])) for one in generations]
-    values = [one.value_sim for one in read_policies(tmp_path / "cvar/policies.json").records[1:]]
-    assert values == [one["means"][k] for one, k in zip(generations, winners, strict=True)]
+    winners = [int(np.argmax(generation["values"])) for generation in generations]
+    values = [record.value_sim for record in read_policies(tmp_path / "cvar/policies.json").records[1:]]
+    assert values == [generation["means"][k] for generation, k in zip(generations, winners, strict=True)]
     last = max(reversed(range(3)), key=lambda index: max(generations[index]["values"]))
     assert metrics["best_cvar_sim"] == max(generations[last]["values"])
     assert metrics["best_value_sim"] == values[last]
-    assert [one.name for one in read_policies(tmp_path / "cvar" / BEST).records] == [f"generation_{last + 1:02d}"]
+    assert [record.name for record in read_policies(tmp_path / "cvar" / BEST).records] == [f"generation_{last + 1:02d}"]
     whole, _ = searched("cvar", tmp_path / "whole", 1.0)
     assert whole["best_cvar_sim"] == pytest.approx(whole["best_value_sim"])
 

@@ -38,17 +38,17 @@ def _search(generations: int, seed: int = 1) -> Optimize:
 
 def test_the_file_holds_pi0_and_the_best_of_each_generation(tmp_path: Path) -> None:
     metrics = _search(3).run(tmp_path, QUIET)
-    found = read_policies(tmp_path / "policies.json").records
-    assert [one.name for one in found] == ["pi0", "generation_01", "generation_02", "generation_03"]
-    assert metrics["best_value_sim"] == max(one.value_sim for one in found[1:])
-    assert found[0].parameters == dict(zip(REACH.names, REACH.initial, strict=True))
+    records = read_policies(tmp_path / "policies.json").records
+    assert [entry.name for entry in records] == ["pi0", "generation_01", "generation_02", "generation_03"]
+    assert metrics["best_value_sim"] == max(entry.value_sim for entry in records[1:])
+    assert records[0].parameters == dict(zip(REACH.names, REACH.initial, strict=True))
 
 
 def test_the_arm_learns_to_reach_its_goal(tmp_path: Path) -> None:
     optimizer = CmaEs(candidates=12, generations=12, sigma=0.3)
     search = Optimize(AIR, Arm(), REACH, NoGrounding(), optimizer, rollouts=1, workers=-1)
     search.run(tmp_path, QUIET)
-    values = [one.value_sim for one in read_policies(tmp_path / "policies.json").records[1:]]
+    values = [record.value_sim for record in read_policies(tmp_path / "policies.json").records[1:]]
     assert max(values) > 20 * values[0] or max(values) > 20.0
 
 
@@ -101,9 +101,9 @@ def test_whatever_bit_is_flipped_the_log_returns_only_what_was_written(tmp_path:
         damaged[bit // 8] ^= 1 << bit % 8
         path.write_bytes(damaged)
         said: list[str] = []
-        found = GenerationLog(tmp_path, said.append)
+        reader = GenerationLog(tmp_path, said.append)
         intact = int(np.searchsorted(ends, bit // 8, side="right")) - 1
-        assert [found.read(n) for n in range(3)] == [*written[:intact], *[None] * (3 - intact)]
+        assert [reader.read(n) for n in range(3)] == [*written[:intact], *[None] * (3 - intact)]
         assert len(said) == 1
         assert path.read_bytes() == whole[: ends[intact]]
 
@@ -124,8 +124,8 @@ def test_a_line_that_is_missing_repeated_or_moved_ends_the_log(tmp_path: Path) -
     }
     for lines, kept in cases.items():
         path.write_bytes(b"".join(lines))
-        found = GenerationLog(tmp_path)
-        assert [found.read(n) is not None for n in range(3)] == [n < kept for n in range(3)]
+        reader = GenerationLog(tmp_path)
+        assert [reader.read(n) is not None for n in range(3)] == [n < kept for n in range(3)]
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Anything(Arm):
 def test_of_equally_good_generations_the_last_one_is_the_best(tmp_path: Path, value: float) -> None:
     search = replace(_search(3), task=Anything(duration=0.1, worth=value))
     assert search.run(tmp_path, QUIET)["best_value_sim"] == pytest.approx(5 * value)
-    assert [one.name for one in read_policies(tmp_path / BEST).records] == ["generation_03"]
+    assert [record.name for record in read_policies(tmp_path / BEST).records] == ["generation_03"]
 
 
 def test_a_log_returns_its_values_to_the_bit(tmp_path: Path) -> None:

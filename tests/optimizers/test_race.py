@@ -132,13 +132,13 @@ def test_a_raced_search_is_the_same_with_more_workers_and_after_a_kill(tmp_path:
 
 @pytest.mark.slow
 def test_a_raced_search_starts_as_the_whole_one_does_and_plays_less(tmp_path: Path) -> None:
-    found = {}
+    winners = {}
     for race in (0.0, 0.1):
         folder = tmp_path / f"{race:g}"
         folder.mkdir()
         _search(race).run(folder, QUIET)
-        found[race] = read_policies(folder / "policies.json").records[1]
-    assert found[0.0] == found[0.1]  # the winner of the first generation, and its value
+        winners[race] = read_policies(folder / "policies.json").records[1]
+    assert winners[0.0] == winners[0.1]  # the winner of the first generation, and its value
     logged = [json.loads(line) for line in (tmp_path / "0.1" / "generations.jsonl").read_text().splitlines()]
     assert sum(sum(line["played"]) for line in logged) < 3 * 8 * 8
     assert "played" not in (tmp_path / "0" / "generations.jsonl").read_text()

@@ -103,14 +103,14 @@ def test_over_the_programme_no_joint_is_a_copy_of_another() -> None:
 
 def test_the_programme_repeats_what_it_is_told_and_only_that() -> None:
     programme = Excitation(robot="nao", repeats=3).programme
-    found = {
+    by_label = {
         piece.label: [other.parameters for other in programme if other.label == piece.label] for piece in programme
     }
-    assert {label: len(parameters) for label, parameters in found.items()} == {
+    assert {label: len(parameters) for label, parameters in by_label.items()} == {
         f"{motion}_{variant}": 3 if motion in ("steps_large", "triangle_medium") and variant == "a" else 1
         for motion, variant in ALL
     }
-    assert all((one == parameters[0]).all() for parameters in found.values() for one in parameters)
+    assert all((parameter == parameters[0]).all() for parameters in by_label.values() for parameter in parameters)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -145,10 +145,10 @@ def test_mirrored_is_a_mirror_image_and_then_its_opposite(variant: str) -> None:
 
 def test_sides_are_read_off_the_geometry() -> None:
     names = nao().controlled
-    found = {(names[left], names[right]): sign for left, right, sign in pairs(nao())}
+    signs_seen = {(names[left], names[right]): sign for left, right, sign in pairs(nao())}
     signs = {"HipRoll": -1, "HipPitch": 1, "KneePitch": 1, "AnklePitch": 1, "AnkleRoll": -1}
     signs |= {"ShoulderPitch": 1, "ShoulderRoll": -1}
-    assert found == {(f"L{joint}", f"R{joint}"): sign for joint, sign in signs.items()}
+    assert signs_seen == {(f"L{joint}", f"R{joint}"): sign for joint, sign in signs.items()}
     inner = dict(zip(names, inwards(nao(), {}), strict=True))
     assert (inner["LHipRoll"], inner["RHipRoll"], inner["LKneePitch"]) == (-1.0, 1.0, 0.0)
     assert pairs(pendulum()) == () and not inwards(pendulum(), {}).any()
@@ -185,7 +185,7 @@ def test_a_good_servo_follows(motion: str) -> None:
 def test_collect_plays_the_programme_and_says_which_episode_is_which(tmp_path: Path) -> None:
     done(*SMALL, "role=sim", folder=tmp_path)
     batch = read(tmp_path / "runs/x/collect_sim/trajectories.parquet", joints=nao().controlled)
-    assert [(one["policy"], one["motion"], one["variant"]) for one in batch.metadata["episodes"]] == [
+    assert [(episode["policy"], episode["motion"], episode["variant"]) for episode in batch.metadata["episodes"]] == [
         ("triangle_slow_a", "triangle_slow", "a"),
         ("triangle_slow_b", "triangle_slow", "b"),
     ]

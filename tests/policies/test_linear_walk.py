@@ -58,8 +58,8 @@ def test_a_joint_that_the_world_lacks_is_named() -> None:
 
 def test_distance_is_paid_at_the_end_and_a_fall_costs_what_it_should() -> None:
     seen = [np.zeros(LAYOUT.size) for _ in range(4)]
-    for tick, one in enumerate(seen):
-        one[LAYOUT["base.position"].start] = 1.0 + 0.1 * tick
+    for tick, observation in enumerate(seen):
+        observation[LAYOUT["base.position"].start] = 1.0 + 0.1 * tick
     task = Distance(duration=0.06)
 
     def values(role: str, fall_at: int) -> list[float]:

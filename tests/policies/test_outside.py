@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from commands import done, gsl, refused
 
-from gsl.core.described import describe, rebuilt
+from gsl.core.described import describe, restore
 from gsl.core.layout import Layout
 from gsl.errors import ConfigError, GslError
 from gsl.policies.function import FunctionPolicy
@@ -32,8 +32,8 @@ POLE = Layout(("0",), {"state": 4}, 0.02, choices=2)
 SEEN = np.array([0.1, 0.2, 1.0, 2.0, 0.3, 0.4, 0.5, 0.0, 0.0, np.sin(0.5), np.cos(0.5), 1.0, 0.0, 0.0])
 
 
-def terms(*given: dict[str, Any]) -> tuple[Term, ...]:
-    return tuple(Term(**one) for one in given)
+def terms(*entries: dict[str, Any]) -> tuple[Term, ...]:
+    return tuple(Term(**entry) for entry in entries)
 
 
 def test_a_network_sees_signals_in_its_own_order_scaled_and_from_the_pose() -> None:
@@ -141,13 +141,13 @@ def answer(network: Any, seen: np.ndarray) -> float:
 
 
 def test_torchscript_acts_as_the_module_does_and_offsets_are_added(network: Any, tmp_path: Path) -> None:
-    policy = TorchScriptPolicy(file=str(tmp_path / "net.pt")).sized(CART)
+    policy = TorchScriptPolicy(file=str(tmp_path / "net.pt")).size_for(CART)
     assert policy.names == ("offset.0",)
     seen = np.array([0.1, -0.2, 0.3, 0.4])
     plain, shifted = (policy.start(np.array([offset]), CART).act(seen)[0] for offset in (0.0, 0.25))
     assert plain == pytest.approx(answer(network, seen) / 3.0, rel=1e-5)
     assert shifted == pytest.approx(plain + 0.25)
-    again = rebuilt(describe(policy))
+    again = restore(describe(policy))
     assert describe(again) == describe(policy)
 
 
@@ -158,11 +158,11 @@ def test_onnx_acts_as_the_module_does(network: Any, tmp_path: Path) -> None:
     import torch
 
     torch.onnx.export(network, (torch.zeros(1, 4),), str(tmp_path / "net.onnx"), dynamo=False)
-    policy = OnnxPolicy(file=str(tmp_path / "net.onnx")).sized(CART)
+    policy = OnnxPolicy(file=str(tmp_path / "net.onnx")).size_for(CART)
     seen = np.array([0.1, -0.2, 0.3, 0.4])
     assert policy.start(policy.initial, CART).act(seen)[0] == pytest.approx(answer(network, seen) / 3.0, rel=1e-5)
     with pytest.raises(ConfigError, match="but the network takes 4"):
-        policy.sized(BODY)
+        policy.size_for(BODY)
 
 
 def test_a_module_with_a_memory_begins_anew_in_every_episode(tmp_path: Path) -> None:
@@ -182,7 +182,7 @@ def test_a_module_with_a_memory_begins_anew_in_every_episode(tmp_path: Path) -> 
             self.count.zero_()
 
     torch.jit.script(Counter()).save(str(tmp_path / "memory.pt"))
-    policy = TorchScriptPolicy(file=str(tmp_path / "memory.pt"), wiring=Wiring(scale=0.3)).sized(CART)
+    policy = TorchScriptPolicy(file=str(tmp_path / "memory.pt"), wiring=Wiring(scale=0.3)).size_for(CART)
     for _ in range(2):
         run = policy.start(policy.initial, CART)
         assert [run.act(np.zeros(4))[0] for _ in range(3)] == pytest.approx([0.1, 0.2, 0.3])
@@ -214,7 +214,7 @@ def test_a_function_acts_and_a_class_has_a_memory(tmp_path: Path, monkeypatch: p
     monkeypatch.syspath_prepend(str(tmp_path))
 
     def run(name: str) -> Any:
-        policy = FunctionPolicy(function=f"policies_there:{name}").sized(CART)
+        policy = FunctionPolicy(function=f"policies_there:{name}").size_for(CART)
         return policy.start(policy.initial, CART)
 
     assert run("act").act(np.array([0.0, 0.0, 0.6, 0.0]))[0] == pytest.approx(-0.2)

@@ -73,8 +73,8 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
 def _rest(folder: Path, request: str) -> str:
     """Return a foreign log of the last two episodes: joints in another order, no word of the request."""
     done("rehearse", f"request={request}", "world=nao_worn", f"out={folder / 'elsewhere'}", folder=folder)
-    found = dict(csv_episodes(folder / "elsewhere" / ANSWER, read_request(folder / request)))
-    write(folder / "foreign.parquet", _turned([found[name] for name in ("neighbour_01", "neighbour_02")]))
+    answers = dict(csv_episodes(folder / "elsewhere" / ANSWER, read_request(folder / request)))
+    write(folder / "foreign.parquet", _turned([answers[name] for name in ("neighbour_01", "neighbour_02")]))
     return "foreign.parquet"
 
 
@@ -82,13 +82,13 @@ def _turned(episodes: list[Trajectory]) -> Batch:
     joints = ExternalRobot(robot="nao").layout.joints
     turned = tuple(
         replace(
-            one,
-            action=one.action[:, ::-1],
-            position=one.position[:, ::-1],
-            velocity=one.velocity[:, ::-1],
-            sensors={name: values for name, values in one.sensors.items() if name != "stopped"},
+            episode,
+            action=episode.action[:, ::-1],
+            position=episode.position[:, ::-1],
+            velocity=episode.velocity[:, ::-1],
+            sensors={name: values for name, values in episode.sensors.items() if name != "stopped"},
         )
-        for one in episodes
+        for episode in episodes
     )
     return Batch(turned, joints[::-1], 0.02, {"robot": "nao", "role": "imported"})
 
@@ -101,22 +101,22 @@ def test_the_loop_over_files_comes_to_what_the_surrogate_itself_would_have_come_
         assert (folder / FIRST / file).read_bytes() == (direct / FIRST / file).read_bytes(), file
     ours, theirs = (read(place / FIRST / "collect_real/trajectories.parquet") for place in (folder, direct))
     assert ours.metadata["episodes"] == theirs.metadata["episodes"]
-    for one, other in zip(ours.episodes, theirs.episodes, strict=True):
-        assert one.sensors.keys() == other.sensors.keys()
+    for episode, other in zip(ours.episodes, theirs.episodes, strict=True):
+        assert episode.sensors.keys() == other.sensors.keys()
         for name in ("time", "action", "position", "velocity", "reward", "fell"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+            np.testing.assert_array_equal(getattr(episode, name), getattr(other, name), err_msg=name)
 
 
 def test_the_robot_is_asked_four_times_in_a_round(loop: tuple[Path, list[str]]) -> None:
     _, asked = loop
     places = ["collect_real.request", *(f"evaluate.request/{name}" for name in ("choice", "check_*", "report"))]
-    assert len(asked) == 4 and all(Path(one).match(place) for one, place in zip(asked, places, strict=True))
+    assert len(asked) == 4 and all(Path(folder).match(place) for folder, place in zip(asked, places, strict=True))
 
 
 def test_what_was_answered_is_the_parent_of_what_was_made_of_it(loop: tuple[Path, list[str]]) -> None:
     folder, _ = loop
     made = json.loads((folder / FIRST / "collect_real/manifest.json").read_text())
-    roles = {one["role"] for one in made["parents"]}
+    roles = {parent["role"] for parent in made["parents"]}
     assert roles == {"answer.day_1/answer.csv", "answer.day_2/answer.parquet"}
     text = done("show", "loop/iteration_01/collect_real", folder=folder).out
     assert "answer.day_2/answer.parquet" in text and "the same" in text
@@ -137,9 +137,9 @@ def test_a_tape_measure_gives_the_same_values_as_a_log_of_the_base(
     ours = json.loads((folder / "runs/loop/evaluate/evaluation.json").read_text())
     theirs = json.loads((direct / FIRST / "evaluate/evaluation.json").read_text())
     for phase in ("policies", "check", "confirmation"):
-        for one, other in zip(ours[phase], theirs[phase], strict=True):
-            assert one["values"] == pytest.approx(other["values"], rel=1e-9)
-            assert one["outcome"] == pytest.approx(other["outcome"], rel=1e-9)
+        for row, other in zip(ours[phase], theirs[phase], strict=True):
+            assert row["values"] == pytest.approx(other["values"], rel=1e-9)
+            assert row["outcome"] == pytest.approx(other["outcome"], rel=1e-9)
 
 
 COLLECT = ("collect", *SMALL, "world=robot", "name=one", "recipe.spread=0.02")
@@ -214,7 +214,10 @@ def _changed(lines: list[str], column: str, value: str, row: int = 5) -> list[st
 def _stretched(lines: list[str], factor: float) -> list[str]:
     """Return the lines of an answer as if time had gone faster."""
     at, cells = lines[1].strip().split(",").index("time"), [line.rstrip("\n").split(",") for line in lines[2:]]
-    return [*lines[:2], *(",".join([*one[:at], repr(factor * float(one[at])), *one[at + 1 :]]) + "\n" for one in cells)]
+    return [
+        *lines[:2],
+        *(",".join([*cell[:at], repr(factor * float(cell[at])), *cell[at + 1 :]]) + "\n" for cell in cells),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -313,8 +316,8 @@ def test_an_answer_from_elsewhere_is_refused_in_one_line(place: Path, words: tup
 def test_a_table_with_fewer_names_than_episodes_is_refused_in_one_line(place: Path) -> None:
     done("answer", f"request={ASKED}", f"logs=runs/elsewhere/{ANSWER}", "out=runs/table", folder=place)
     batch = read(place / "runs/table/answer.parquet")
-    told = {**batch.metadata, "episodes": batch.metadata["episodes"][:2]}
-    write(place / ASKED / "answer_mine.parquet", replace(batch, metadata=told))
+    metadata = {**batch.metadata, "episodes": batch.metadata["episodes"][:2]}
+    write(place / ASKED / "answer_mine.parquet", replace(batch, metadata=metadata))
     assert "holds 6 episodes, but 2 are named" in refused(*COLLECT, folder=place)
 
 
@@ -332,14 +335,15 @@ def test_what_is_logged_after_a_fall_is_cut_off(place: Path) -> None:
 def test_a_sense_with_blanks_that_nobody_asked_for_is_left_out(place: Path) -> None:
     lines = _lines(place)
     more = [
-        ",".join([line[:-1], told]) + "\n" for line, told in zip(lines[1:], ["voltage", "21.5"] * 999, strict=False)
+        ",".join([line[:-1], voltage]) + "\n"
+        for line, voltage in zip(lines[1:], ["voltage", "21.5"] * 999, strict=False)
     ]
     more = [line.replace(",21.5\n", ",\n") if number % 3 else line for number, line in enumerate(more)]
     more = [line.replace(",voltage\n", ",20\n") if number else line for number, line in enumerate(more)]
     (place / ASKED / ANSWER).write_text("".join([lines[0], *more]))
     done(*COLLECT, folder=place)
-    (one, *_) = read(place / "runs/one/collect_real/trajectories.parquet").episodes
-    assert "voltage" not in one.sensors and "gyro.x" in one.sensors
+    (episode, *_) = read(place / "runs/one/collect_real/trajectories.parquet").episodes
+    assert "voltage" not in episode.sensors and "gyro.x" in episode.sensors
 
 
 def test_an_answer_to_another_request_is_not_taken_in_and_a_part_is_known_by_its_numbers(place: Path) -> None:

@@ -54,16 +54,16 @@ def test_a_browser_shows_a_diagnosis_at_any_width(kind: str, tmp_path: Path) -> 
 
 
 def test_long_records_of_many_joints_stay_small() -> None:
-    found = made.document(tuple(f"joint_{index}" for index in range(25)))
-    found["replays"] = [one | {key: one[key] * 40 for key in ("time", "command", "real", "before", "after")}
-                        for one in found["replays"] * 9]  # fmt: skip
-    assert len(report_html(found).encode()) < 400_000
+    document = made.document(tuple(f"joint_{index}" for index in range(25)))
+    document["replays"] = [record | {key: record[key] * 40 for key in ("time", "command", "real", "before", "after")}
+                        for record in document["replays"] * 9]  # fmt: skip
+    assert len(report_html(document).encode()) < 400_000
 
 
 def test_a_cause_that_is_not_sure_is_called_probable() -> None:
-    found = {**made.document(causes=1), "sure": False}
-    assert "Probable cause: servo gain of LKneePitch" in words(report_html(found)).split("Caveats")[0]
-    unlikely = {**found, "doubt": "possibly"}
+    probable = {**made.document(causes=1), "sure": False}
+    assert "Probable cause: servo gain of LKneePitch" in words(report_html(probable)).split("Caveats")[0]
+    unlikely = {**probable, "doubt": "possibly"}
     assert "Possible cause: servo gain of LKneePitch" in words(report_html(unlikely)).split("Caveats")[0]
 
 
@@ -79,7 +79,7 @@ def test_the_first_screen_answers_everything() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "told"),
+    ("kind", "phrases"),
     [
         ("no_gap", ("No gap beyond the noise", "No joint stands out", "1.02 × the noise floor", "grounding=none")),
         (
@@ -95,26 +95,26 @@ def test_the_first_screen_answers_everything() -> None:
         ("nothing", ("No verdict", "Not measured")),
     ],
 )
-def test_every_verdict_is_told(kind: str, told: tuple[str, ...]) -> None:
-    found = words(report_html(DOCUMENTS[kind]()))
-    assert [one for one in told if one not in found] == []
+def test_every_verdict_is_told(kind: str, phrases: tuple[str, ...]) -> None:
+    text = words(report_html(DOCUMENTS[kind]()))
+    assert [entry for entry in phrases if entry not in text] == []
 
 
 def test_what_was_given_to_do_is_what_is_told() -> None:
-    given = made.document() | {"commands": [{"why": "Do this.", "command": "gsl this\ngsl that"}]}
-    assert [one.command for one in steps(given)] == ["gsl this\ngsl that"]
-    assert "gsl optimize" not in report_html(given)
+    document = made.document() | {"commands": [{"why": "Do this.", "command": "gsl this\ngsl that"}]}
+    assert [step.command for step in steps(document)] == ["gsl this\ngsl that"]
+    assert "gsl optimize" not in report_html(document)
 
 
 def test_a_command_is_safe_to_paste() -> None:
-    found = made.document()
-    found["next_experiment"]["file"] = "a b; rm -rf ~"
-    found["command"] += " sim=$(ls) name=before"
-    assert steps(found)[1].command.splitlines() == [
+    document = made.document()
+    document["next_experiment"]["file"] = "a b; rm -rf ~"
+    document["command"] += " sim=$(ls) name=before"
+    assert steps(document)[1].command.splitlines() == [
         "gsl collect task=excite 'policy.file=a b; rm -rf ~' name=next",
         "gsl diagnose real=next/collect_real sim=nao_ideal 'sim=$(ls)' name=next",
     ]
-    assert steps(found | {"command": "gsl 'diagnose"})[1].command.endswith(
+    assert steps(document | {"command": "gsl 'diagnose"})[1].command.endswith(
         "gsl diagnose real=next/collect_real name=next"
     )
 
@@ -133,12 +133,12 @@ def test_commands_for_a_robot_of_ones_own_name_it() -> None:
 
 
 def test_the_corrected_world_is_trained_in_by_its_folder_and_name() -> None:
-    found = made.document()
-    told = "gsl optimize --config-dir runs/worn/diagnose world=diagnosed grounding=none name=diagnosed"
-    assert steps(found)[0].command == told
-    here = steps(found | {"world_file": "world/diagnosed.yaml"})[0]
+    document = made.document()
+    command = "gsl optimize --config-dir runs/worn/diagnose world=diagnosed grounding=none name=diagnosed"
+    assert steps(document)[0].command == command
+    here = steps(document | {"world_file": "world/diagnosed.yaml"})[0]
     assert "--config-dir . world=diagnosed" in here.command and "in the folder of this report" in here.why
-    assert steps(found | {"world_file": None})[0].command == ""
+    assert steps(document | {"world_file": None})[0].command == ""
 
 
 def test_a_cause_is_named_with_what_was_chosen_of_it() -> None:
@@ -152,17 +152,17 @@ def test_a_cause_is_named_with_what_was_chosen_of_it() -> None:
 
 
 def test_what_a_learned_residual_leaves_is_a_share_of_squares() -> None:
-    found = {"before": 3.0, "after": 1.0, "fraction": 1.0, "ceiling_fraction": 0.625}  # 9 - 0.625 (9 - 1) = 2²
-    assert "learned residual, no cause named 3.00 × 1.00 × 2.00 ×, 62 %" in words(report_html({"shrinkage": found}))
+    shrinkage = {"before": 3.0, "after": 1.0, "fraction": 1.0, "ceiling_fraction": 0.625}  # 9 - 0.625 (9 - 1) = 2²
+    assert "learned residual, no cause named 3.00 × 1.00 × 2.00 ×, 62 %" in words(report_html({"shrinkage": shrinkage}))
 
 
 def poisoned(document: Any, key: str = "") -> Any:
     """The document with every string of people's, and every name of a joint or parameter, hostile."""
     if isinstance(document, dict):
         named = key in ("rms", "sd", "parameters")
-        return {f"{HOSTILE}{name}" if named else name: poisoned(one, name) for name, one in document.items()}
+        return {f"{HOSTILE}{name}" if named else name: poisoned(entry, name) for name, entry in document.items()}
     if isinstance(document, list):
-        return [poisoned(one, key) for one in document]
+        return [poisoned(entry, key) for entry in document]
     return f"{HOSTILE}{document}" if isinstance(document, str) and key not in ("verdict", "source") else document
 
 
@@ -171,8 +171,8 @@ def test_no_name_is_markup(kind: str) -> None:
     plain, text = report_html(DOCUMENTS[kind]()), report_html(poisoned(DOCUMENTS[kind]()))
     before, after = Page(plain), Page(text)
     assert set(after.tags) <= set(before.tags)
-    assert {one[:2] for one in after.attributes} <= {one[:2] for one in before.attributes}
-    assert not [one for one in after.attributes if "alert" in one[2]]
+    assert {attribute[:2] for attribute in after.attributes} <= {attribute[:2] for attribute in before.attributes}
+    assert not [attribute for attribute in after.attributes if "alert" in attribute[2]]
     assert "<script>alert(1)</script>" in after.text  # as text
     text.encode("utf-8")
 
@@ -192,44 +192,47 @@ def test_whatever_is_missing_the_rest_is_told(absent: bool) -> None:
     drawn = {"policy_gap", "shrinkage", "ranking", "replays", "horizon"}
     for *path, last in {(place[0], place[-1]): place for place in paths(whole)}.values():
         first = (*path, last)[0]
-        found = copy.deepcopy({key: value for key, value in whole.items() if key == first or key not in drawn})
-        place: Any = found
+        damaged = copy.deepcopy({key: value for key, value in whole.items() if key == first or key not in drawn})
+        place: Any = damaged
         for key in path:
             place = place[key]
         if absent:
             del place[last]
         else:
             place[last] = None
-        assert UNSAID.search(Page(report_html(found)).text) is None, (*path, last)
-        assert UNSAID.search(str([told._replace(caption=told.caption or "") for told in summary_lines(found)])) is None
+        assert UNSAID.search(Page(report_html(damaged)).text) is None, (*path, last)
+        assert (
+            UNSAID.search(str([table._replace(caption=table.caption or "") for table in summary_lines(damaged)]))
+            is None
+        )
 
 
 def test_empty_lists_make_no_sections() -> None:
-    found = {key: [] if isinstance(one, list) else one for key, one in made.document().items()}
-    found |= dict.fromkeys(("horizon", "shrinkage", "floor", "policy_gap", "self_test", "next_experiment"))
-    page = Page(report_html(found | {"verdict": "no_gap"}))
+    emptied = {key: [] if isinstance(entry, list) else entry for key, entry in made.document().items()}
+    emptied |= dict.fromkeys(("horizon", "shrinkage", "floor", "policy_gap", "self_test", "next_experiment"))
+    page = Page(report_html(emptied | {"verdict": "no_gap"}))
     assert page.tags["section"] == 1  # how it was measured
 
 
 def test_the_map_frames_the_named_cells_and_greys_the_rest() -> None:
-    found = made.document()
-    classes = Page(report_html(found)).classes()
-    named = sum(cell["named"] for cell in found["where"])
+    document = made.document()
+    classes = Page(report_html(document)).classes()
+    named = sum(cell["named"] for cell in document["where"])
     assert classes["named"] == named
-    assert classes["noise"] == len(found["where"]) - named
-    found["where"] = [cell for cell in found["where"] if cell["named"] or cell["regime"] == "all"]
-    shown = {cell["regime"] for cell in found["where"]}
-    assert Page(report_html(found)).classes()["noise"] == len(made.NAO) * len(shown) - named
+    assert classes["noise"] == len(document["where"]) - named
+    document["where"] = [cell for cell in document["where"] if cell["named"] or cell["regime"] == "all"]
+    shown = {cell["regime"] for cell in document["where"]}
+    assert Page(report_html(document)).classes()["noise"] == len(made.NAO) * len(shown) - named
 
 
 def test_replays_are_in_degrees_with_their_distances() -> None:
-    one = {"record": "r", "joint": "Knee", "time": [0.0, 1.0], "real": [0.0, 0.0], "command": None}
-    found = words(report_html({"replays": [one | {"before": [0.1, 0.1], "after": [0.01, 0.01]}]}))
-    assert "Knee in r: 5.7° from the robot as it was, 0.57° with the effects" in found
+    record = {"record": "r", "joint": "Knee", "time": [0.0, 1.0], "real": [0.0, 0.0], "command": None}
+    text = words(report_html({"replays": [record | {"before": [0.1, 0.1], "after": [0.01, 0.01]}]}))
+    assert "Knee in r: 5.7° from the robot as it was, 0.57° with the effects" in text
 
 
 def test_numbers_are_told_as_people_read_them() -> None:
-    assert [short(one) for one in (0, 0.57, 12.34, 123456.0, -0.00213, None)] == [
+    assert [short(number) for number in (0, 0.57, 12.34, 123456.0, -0.00213, None)] == [
         "0", "0.570", "12.3", "123456", "−0.00213", "–"]  # fmt: skip
     assert (share(0.974), share(-0.0001), share(None)) == ("97 %", "0 %", "–")
     assert (probability(1.0), probability(0.0), probability(0.5)) == (">99 %", "<1 %", "50 %")
@@ -266,8 +269,8 @@ def test_where_speaks_of_regimes_if_no_joint_stands_out_as_a_whole() -> None:
     cell = {"joint": "Knee", "regime": "high_load", "share": 0.4, "rms": 5.2, "named": True}
     whole = {"joint": "Knee", "regime": "all", "share": 0.1, "rms": 1.1, "named": False}
     hip = {"joint": "Hip", "regime": "all", "share": 0.01, "named": False}
-    told = where_sentence({"where": [cell, whole, hip]})
-    assert told == (
+    sentence = where_sentence({"where": [cell, whole, hip]})
+    assert sentence == (
         "No joint stands out as a whole. Surely beyond the noise only at times: Knee when asked for much torque, "
         "5.20 ×. The others are not surely beyond the noise."
     )
@@ -286,76 +289,74 @@ def test_a_place_is_told_with_the_figures_of_the_whole_joint() -> None:
 
 
 def test_an_explanation_that_costs_less_says_why_it_is_not_the_verdict() -> None:
-    one = {"effects": ["backlash"], "scopes": ["all"], "gain": {"value": 0.9}, "behind": -300.0}
-    told = words(report_html({"ranking": [{**one, "passed_over": "not surely better"}], "least_gain": 2800.0}))
+    hypothesis = {"effects": ["backlash"], "scopes": ["all"], "gain": {"value": 0.9}, "behind": -300.0}
+    text = words(report_html({"ranking": [{**hypothesis, "passed_over": "not surely better"}], "least_gain": 2800.0}))
     assert (
-        "backlash of all joints 90 % −300 passed over: not surely better" in told
-        and "has to save 2,800 over calibration alone" in told
+        "backlash of all joints 90 % −300 passed over: not surely better" in text
+        and "has to save 2,800 over calibration alone" in text
     )
 
 
 def test_the_verdict_is_marked_among_the_explanations() -> None:
-    found = made.document()
-    for ranking in (found["ranking"], found["ranking"][::-1]):
+    document = made.document()
+    for ranking in (document["ranking"], document["ranking"][::-1]):
         rows = re.findall(
-            r'<th scope="row">([^<]*)<span[^\n]*<td>the verdict</td>', report_html({**found, "ranking": ranking})
+            r'<th scope="row">([^<]*)<span[^\n]*<td>the verdict</td>', report_html({**document, "ranking": ranking})
         )
         assert rows == ["servo gain of LKneePitch + command latency of all joints"]
 
 
 def test_a_side_is_worse_only_where_it_is_more_than_noise_and_chance() -> None:
     rows = [("Knee", 4.0, 1.1, 0.01), ("Hip", 0.5, 0.1, 0.01), ("Ankle", 4.0, 3.0, 0.4)]
-    found = words(report_html({"sides": [dict(zip(("pair", "left", "right", "p"), row, strict=True)) for row in rows]}))
-    assert "Knee 4.00 × 1.10 × 1 % worse on the left" in found
-    assert "Hip 0.50 × 0.10 × 1 % both within the noise" in found
-    assert "Ankle 4.00 × 3.00 × 40 % alike" in found
+    text = words(report_html({"sides": [dict(zip(("pair", "left", "right", "p"), row, strict=True)) for row in rows]}))
+    assert "Knee 4.00 × 1.10 × 1 % worse on the left" in text
+    assert "Hip 0.50 × 0.10 × 1 % both within the noise" in text
+    assert "Ankle 4.00 × 3.00 × 40 % alike" in text
 
 
 def test_policies_are_told_in_the_unit_of_their_task() -> None:
-    found = words(report_html(made.document()))
+    text = words(report_html(made.document()))
     assert (
-        "policy simulator [cm/s] 95 % interval diagnosed [cm/s] 95 % interval real [cm/s] 95 % interval falls" in found
+        "policy simulator [cm/s] 95 % interval diagnosed [cm/s] 95 % interval real [cm/s] 95 % interval falls" in text
     )
-    assert "generation_05 31.0 30.0 to 32.0 21.0 19.0 to 23.0 16.0 0 of 5, 1 of 5, 1 of 5" in found
-    assert "3 policies: returns are 6.70 (2.00 to 15.0) cm/s from real in the simulator, 2.00 (0.400 to 5.00)" in found
-    assert (
-        "Rank correlation with real: −0.50 (−1.0 to 1.0) in the simulator, 1.0 (1.0 to 1.0) in the diagnosed" in found
-    )
-    assert "25 policies were measured" in found
+    assert "generation_05 31.0 30.0 to 32.0 21.0 19.0 to 23.0 16.0 0 of 5, 1 of 5, 1 of 5" in text
+    assert "3 policies: returns are 6.70 (2.00 to 15.0) cm/s from real in the simulator, 2.00 (0.400 to 5.00)" in text
+    assert "Rank correlation with real: −0.50 (−1.0 to 1.0) in the simulator, 1.0 (1.0 to 1.0) in the diagnosed" in text
+    assert "25 policies were measured" in text
     none = made.document() | {"policy_gap": None}
     assert "Policies" not in words(report_html(none))
-    assert [told for told in summary_lines(none) if "Rank" in str(told)] == []
+    assert [table for table in summary_lines(none) if "Rank" in str(table)] == []
 
 
 @pytest.mark.parametrize("kind", DOCUMENTS)
 def test_a_terminal_shows_it_in_some_lines(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
-    found = DOCUMENTS[kind]()
-    for told in summary_lines(found):
-        Console().table(*told)
+    document = DOCUMENTS[kind]()
+    for table in summary_lines(document):
+        Console().table(*table)
     lines = [line for line in capsys.readouterr().out.splitlines() if line.strip()]
-    assert lines[0] == headline(found)
+    assert lines[0] == headline(document)
     assert len(lines) <= 25
     assert max(map(len, lines)) <= 130
 
 
 def test_a_terminal_shows_names_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
-    for told in summary_lines(made.document(("[red]Knee",), causes=1)):
-        Console().table(*told)
+    for table in summary_lines(made.document(("[red]Knee",), causes=1)):
+        Console().table(*table)
     assert "servo gain of [red]Knee" in capsys.readouterr().out
 
 
 def test_a_corrected_simulator_is_not_for_what_it_does_not_explain() -> None:
-    found = {**made.document(causes=1), "unexplained": [{"part": "fast"}, {"part": "Jaw"}]}
-    assert steps(found)[0].why.endswith("not where it is still far from the robot: fast, Jaw.")
+    document = {**made.document(causes=1), "unexplained": [{"part": "fast"}, {"part": "Jaw"}]}
+    assert steps(document)[0].why.endswith("not where it is still far from the robot: fast, Jaw.")
 
 
 def test_an_unsure_cause_comes_with_what_would_tell() -> None:
-    found = made.document(causes=1)
-    (cause,) = found["causes"]
+    document = made.document(causes=1)
+    (cause,) = document["causes"]
     confused = {**cause, "probability": 0.46, "confused": "kp; two weights tell them apart"}
-    unsure = {**found, "causes": [confused], "sure": False, "next_experiment": None}
-    told = steps(unsure)[-1].why
-    assert told.startswith("To be surer of ") and told.endswith(
+    unsure = {**document, "causes": [confused], "sure": False, "next_experiment": None}
+    reason = steps(unsure)[-1].why
+    assert reason.startswith("To be surer of ") and reason.endswith(
         "which is confused with kp; two weights tell them apart."
     )
-    assert [one.why for one in steps({**unsure, "causes": [cause]})] == [steps(unsure)[0].why]
+    assert [step.why for step in steps({**unsure, "causes": [cause]})] == [steps(unsure)[0].why]

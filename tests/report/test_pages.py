@@ -93,7 +93,7 @@ def test_each_joint_can_be_chosen_and_only_our_script_runs(tmp_path: Path) -> No
     text = joint_page(tmp_path, "LKneePitch", "RKneePitch")
     page = Page(text)
     assert page.tags["option"] == 2 and page.tags["select"] == 1
-    assert [one[2] for one in page.attributes if one[1] == "data-of"] == ["LKneePitch", "RKneePitch"]
+    assert [attribute[2] for attribute in page.attributes if attribute[1] == "data-of"] == ["LKneePitch", "RKneePitch"]
     allowed = base64.b64encode(hashlib.sha256(page.script.encode()).digest()).decode()
     assert f"script-src 'sha256-{allowed}'" in text
     check_alone(text)
@@ -102,7 +102,7 @@ def test_each_joint_can_be_chosen_and_only_our_script_runs(tmp_path: Path) -> No
 def test_a_hostile_name_is_shown_and_never_markup(tmp_path: Path) -> None:
     plain, hostile = Page(joint_page(tmp_path, "knee")), Page(joint_page(tmp_path, HOSTILE))
     assert hostile.tags == plain.tags
-    assert [one[:2] for one in hostile.attributes] == [one[:2] for one in plain.attributes]
+    assert [attribute[:2] for attribute in hostile.attributes] == [attribute[:2] for attribute in plain.attributes]
     assert hostile.script == plain.script and HOSTILE in hostile.text
 
 

@@ -154,14 +154,16 @@ def test_trials_that_came_out_alike_are_all_seen() -> None:
 def test_a_method_has_one_colour_in_all_figures() -> None:
     from matplotlib.colors import to_hex
 
-    one = [mean_interval([1.0, 2.0])] * 2
-    budget = budget_curve_figure({"p": {name: Line((1, 2), one) for name in ("sgat", "gat")}}, {}, "t").axes[0]
-    noise = noise_curve_figure({name: Curve((0.1, 0.2), one) for name in ("gat", "sgat")}, {}, "t").axes[0]
+    intervals = [mean_interval([1.0, 2.0])] * 2
+    budget = budget_curve_figure({"p": {name: Line((1, 2), intervals) for name in ("sgat", "gat")}}, {}, "t").axes[0]
+    noise = noise_curve_figure({name: Curve((0.1, 0.2), intervals) for name in ("gat", "sgat")}, {}, "t").axes[0]
     values = {name: [(1.0, 0.1)] for name in ("gat", "sgat")}
     bars = noise_bars_figure({"w": Bars(("0.5",), values)}, "none", title="t", along="noise").axes[0]
     drawn = [line.get_color() for axes in (budget, noise) for line in axes.lines if line.get_marker() == "o"]
     assert drawn == [SGAT, GAT, GAT, SGAT]
-    assert [to_hex(one.patches[0].get_facecolor()) for one in bars.containers if hasattr(one, "patches")] == [GAT, SGAT]
+    assert [
+        to_hex(container.patches[0].get_facecolor()) for container in bars.containers if hasattr(container, "patches")
+    ] == [GAT, SGAT]
 
 
 def test_bars_tell_widths_of_noise_apart() -> None:

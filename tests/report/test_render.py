@@ -154,6 +154,6 @@ def test_render_refuses_in_one_line(
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     assert call(["render", f"{toy}/evaluate", *words]) == 2
-    told = capsys.readouterr().err.strip().splitlines()[-1]
-    assert problem in told
+    line = capsys.readouterr().err.strip().splitlines()[-1]
+    assert problem in line
     assert not list(tmp_path.iterdir())

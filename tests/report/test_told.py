@@ -48,11 +48,11 @@ def evaluation(*figures: float) -> Artifact:
     ],
 )
 def test_a_value_is_never_its_gain(figures: tuple[float, ...], end: str) -> None:
-    told = describe_choice(metrics(*figures), Unit())
-    assert told.startswith(
+    sentence = describe_choice(metrics(*figures), Unit())
+    assert sentence.startswith(
         f"generation_01 is returned: on fresh episodes {figures[1]:.1f}, no falls in 10; π0 -6.0; gain "
     )
-    assert told.endswith(end)
+    assert sentence.endswith(end)
 
 
 def test_the_verdict_says_which_iteration_is_returned_and_why_there_are_no_more() -> None:
@@ -68,12 +68,12 @@ def test_an_iteration_that_ends_at_its_grounding_costs_what_it_collected() -> No
     rounds = Rounds(OwnReward())
     rounds.add(evaluation(-20.0, -14.6, 3.0, 8.0), 10)
     spent = rounds.metrics()["real_episodes"]
-    row = rounds.refused("it is no nearer", 7)
-    found = rounds.metrics()
+    row = rounds.add_refusal("it is no nearer", 7)
+    metrics = rounds.metrics()
     assert (row[0], row[1], row[-1], len(row)) == ("2", "grounding refused", "7", len(rounds.columns))
-    assert rounds.rows[-1] == row and found["returned_iteration"] == 1
-    assert "The grounding of iteration 2 was refused: it is no nearer." in found["verdict"]
-    assert (found["real_episodes"], found["learned_from"], found["stopped_by_itself"]) == (spent + 7, 17, True)
+    assert rounds.rows[-1] == row and metrics["returned_iteration"] == 1
+    assert "The grounding of iteration 2 was refused: it is no nearer." in metrics["verdict"]
+    assert (metrics["real_episodes"], metrics["learned_from"], metrics["stopped_by_itself"]) == (spent + 7, 17, True)
 
 
 def test_a_value_that_somebody_wrote_down_stands_beside_a_log() -> None:
@@ -81,15 +81,15 @@ def test_a_value_that_somebody_wrote_down_stands_beside_a_log() -> None:
     for done in ([logged, written], [written, logged]):
         assert summary(done)["outcome"] == {} and summary(done)["value"] == pytest.approx(0.25)
     assert summary([logged, logged])["outcome"] == {"speed [cm/s]": 20.0}
-    one = {**summary([logged, written]), "value_sim": None}
-    assert cells(one, "pi0", Unit(), ["speed [cm/s]"])[-1] == ""
+    row = {**summary([logged, written]), "value_sim": None}
+    assert cells(row, "pi0", Unit(), ["speed [cm/s]"])[-1] == ""
 
 
 def test_where_pi0_is_returned_nothing_is_gained() -> None:
     rounds = Rounds(OwnReward())
     rounds.add(evaluation(-20.0, -21.0, -3.0, 1.0), 10)
-    assert (found := rounds.metrics())["returned"] == measured(-20.0) and found["returned_iteration"] == 0
-    assert found["gain"] == {"value": 0.0, "interval": [0.0, 0.0], "share": None}
+    assert (metrics := rounds.metrics())["returned"] == measured(-20.0) and metrics["returned_iteration"] == 0
+    assert metrics["gain"] == {"value": 0.0, "interval": [0.0, 0.0], "share": None}
     rounds = Rounds(OwnReward())
     rounds.add(evaluation(-20.0, -14.6, 3.0, 8.0), 10)
     assert rounds.metrics()["gain"] == {"value": -14.6 + 20.0, "interval": [3.0, 8.0], "share": None}
@@ -124,7 +124,7 @@ def test_an_environment_that_ends_has_not_fallen() -> None:
     assert "falls" not in environment.columns and "(95 %), 10 fresh episodes." in environment.verdict
     assert [row[5] for row in robot.rows] == ["0 of 10"] * 2
     assert [row[5] for row in environment.rows] == ["10"] * 2
-    assert Unit.of(OwnReward).ended(measured(1.0)) == "10 episodes"
+    assert Unit.of(OwnReward).describe_ends(measured(1.0)) == "10 episodes"
 
 
 def test_a_gain_over_nothing_has_no_share() -> None:
@@ -133,11 +133,11 @@ def test_a_gain_over_nothing_has_no_share() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "told"),
+    ("value", "text"),
     [(0.0, "+0.0"), (-17.23, "-17.2"), (0.06, "+0.06"), (0.643, "+0.64"), (-0.0082, "-0.0082"), (5000.0, "+5000.0")],
 )
-def test_values_of_an_environment_are_told_whatever_their_size(value: float, told: str) -> None:
-    assert Unit.of(OwnReward()).bare(value, sign=True) == told
+def test_values_of_an_environment_are_told_whatever_their_size(value: float, text: str) -> None:
+    assert Unit.of(OwnReward()).bare(value, sign=True) == text
     assert Unit.of(Walk()).bare(0.0043) == "0.4"  # cm/s, whose size is known
 
 
@@ -148,7 +148,7 @@ def test_a_gain_below_one_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("checked", "told"),
+    ("checked", "remark"),
     [
         ({}, ""),
         ({"grounding_acceptable": True}, ""),
@@ -160,8 +160,8 @@ def test_a_gain_below_one_is_told() -> None:
         ),
     ],
 )
-def test_a_search_says_how_its_grounding_was_checked(checked: dict[str, Any], told: str) -> None:
+def test_a_search_says_how_its_grounding_was_checked(checked: dict[str, Any], remark: str) -> None:
     metrics = {"best_value_sim": 0.25, "generations": 2, **checked}
     manifest = SimpleNamespace(kind="optimize", unit=Unit.of(Walk())._asdict())
     artifact = cast(Artifact, SimpleNamespace(metrics=metrics, manifest=manifest))
-    assert headline(artifact) == f"2 generations, best 25.0 cm/s in simulation{told}"
+    assert headline(artifact) == f"2 generations, best 25.0 cm/s in simulation{remark}"

@@ -26,8 +26,8 @@ PERIODS = {"pendulum": 0.005, "so101": 0.02, "go2": 0.005}
 @pytest.mark.parametrize("gain", GAINS)
 def test_the_pendulums_servo_is_the_firmwares_law(gain: int) -> None:
     """But at full duty against the motion, where ours lacks the motor's own braking."""
-    one = robot(f"gsl.robots.pendulum.xl330_{gain}")
-    servo, stall, no_load = nominal(one).servo, bench.Xl330().stall, bench.Xl330().no_load
+    body = robot(f"gsl.robots.pendulum.xl330_{gain}")
+    servo, stall, no_load = nominal(body).servo, bench.Xl330().stall, bench.Xl330().no_load
     e = (4096 / (2 * math.pi)) / (256 * 885)
     for error in np.linspace(-1.5, 1.5, 13):
         for speed in (0.0, 0.5, 4.0):
@@ -39,12 +39,12 @@ def test_the_pendulums_servo_is_the_firmwares_law(gain: int) -> None:
 
 
 def test_the_pendulum_hangs_down_and_weighs_what_its_mass_says() -> None:
-    one = robot("pendulum")
+    body = robot("pendulum")
     for angle in (-2.0, 0.0, 0.3, 1.5):
         weight = (0.49 + 0.5 * bench.ARM_MASS) * 9.81 * 0.1 * math.sin(angle)
-        assert holding(one, {"joint": angle}) == pytest.approx([weight], abs=1e-12)
+        assert holding(body, {"joint": angle}) == pytest.approx([weight], abs=1e-12)
     rod = bench.ARM_MASS * 0.1**2 / 3.0
-    assert mass_matrix(lump(one), {})[6, 6] == pytest.approx(0.49 * 0.1**2 + rod, rel=1e-6)
+    assert mass_matrix(lump(body), {})[6, 6] == pytest.approx(0.49 * 0.1**2 + rod, rel=1e-6)
 
 
 def test_the_xl330_is_as_strong_and_fast_as_its_maker_says() -> None:

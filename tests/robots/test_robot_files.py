@@ -41,14 +41,14 @@ def test_what_is_written_is_read_back(name: str, tmp_path: Path) -> None:
     ours, file = robot(name), tmp_path / "it.urdf"
     file.write_text(urdf(ours))
     back = robot(str(file))
-    one, other = lump(ours), lump(back)
-    assert [*one.links] == [*other.links] and set(back.motors) == set(ours.motors)
-    for link in one.links:
-        assert other.links[link].mass == pytest.approx(one.links[link].mass, rel=1e-11)
-        np.testing.assert_allclose(other.links[link].com, one.links[link].com, atol=1e-11)
-        np.testing.assert_allclose(other.links[link].inertia, one.links[link].inertia, rtol=1e-6, atol=1e-12)
-    for joint in one.motors:
-        mine, theirs = one.joint(joint), other.joint(joint)
+    first, second = lump(ours), lump(back)
+    assert [*first.links] == [*second.links] and set(back.motors) == set(ours.motors)
+    for link in first.links:
+        assert second.links[link].mass == pytest.approx(first.links[link].mass, rel=1e-11)
+        np.testing.assert_allclose(second.links[link].com, first.links[link].com, atol=1e-11)
+        np.testing.assert_allclose(second.links[link].inertia, first.links[link].inertia, rtol=1e-6, atol=1e-12)
+    for joint in first.motors:
+        mine, theirs = first.joint(joint), second.joint(joint)
         np.testing.assert_allclose([*theirs.axis, *theirs.origin], [*mine.axis, *mine.origin], atol=1e-11)
         limits = [(at.lower, at.upper, at.effort, at.max_velocity) for at in (mine, theirs)]
         np.testing.assert_allclose(limits[1], limits[0], rtol=1e-11)
@@ -87,11 +87,11 @@ def test_what_is_left_open_is_derived_and_what_is_left_out_is_told() -> None:
     elbow = ours.joint("elbow")
     assert elbow.armature == pytest.approx(0.02 * 2.0 / 6.0) and ours.gains["elbow"][0] == pytest.approx(2.0 / 0.2)
     assert ours.joint("turn").upper == pytest.approx(2.0 * np.pi)
-    told = " | ".join(ours.remarks)
+    remarks = " | ".join(ours.remarks)
     assert (
-        "column.stl" in told
-        and "<dynamics> is friction, and the world's (elbow)" in told
-        and "slide is held at 0.01 m" in told
+        "column.stl" in remarks
+        and "<dynamics> is friction, and the world's (elbow)" in remarks
+        and "slide is held at 0.01 m" in remarks
     )
 
 
@@ -130,7 +130,7 @@ def test_a_file_beside_it_chooses_joints_and_says_what_is_known(written: Callabl
     assert (ours.gains["elbow"], elbow.armature, elbow.effort) == ((7.0, 0.1), 0.003, 1.5)
     assert ours.ranges["servo_gain"]["kp"][0] == pytest.approx(0.2 / 0.9)  # the shoulder's
     assert ours.joint("shoulder").effort == 3.0
-    latency = next(one for one in library(ours) if one.effect == "command_latency")
+    latency = next(candidate for candidate in library(ours) if candidate.effect == "command_latency")
     np.testing.assert_allclose(latency.documented[:, 0], [0.0, 0.12])
     whole = robot(str(EXAMPLE))
     for pose in poses(ours):
@@ -153,8 +153,8 @@ def test_a_file_beside_it_chooses_joints_and_says_what_is_known(written: Callabl
 )
 def test_what_looks_wrong_in_a_urdf_is_a_remark(old: str, new: str, remark: str | None, tmp_path: Path) -> None:
     (tmp_path / "it.urdf").write_text(but(old, new))
-    told = robot(str(tmp_path / "it.urdf")).remarks
-    assert told == () if remark is None else told[0].startswith(remark)
+    remarks = robot(str(tmp_path / "it.urdf")).remarks
+    assert remarks == () if remark is None else remarks[0].startswith(remark)
 
 
 def test_a_robot_without_shapes_has_no_picture(tmp_path: Path) -> None:
@@ -169,7 +169,11 @@ def test_servos_without_a_body_turn_loads_of_their_own(written: Callable[[str], 
     inertia = mass_matrix(lump(ours), {})[6:, 6:]
     np.testing.assert_allclose(inertia, np.diag([ours.joint("a").armature, 0.02]), atol=1e-15)
     np.testing.assert_allclose(holding(ours, {"a": 0.3, "b": -1.0}), 0.0, atol=1e-12)
-    load = next(one for one in library(ours) if one.effect == "centre_of_mass" and one.fixed["link"] == "b_load")
+    load = next(
+        candidate
+        for candidate in library(ours)
+        if candidate.effect == "centre_of_mass" and candidate.fixed["link"] == "b_load"
+    )
     assert load.documented[1].max() * 9.81 == pytest.approx(0.5 * 2.0)  # of the greatest torque
 
 

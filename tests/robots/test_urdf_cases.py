@@ -70,20 +70,25 @@ MIMIC = "<mimic joint='{}' multiplier='{}' offset='{}'/>"
 
 
 def test_a_follower_without_limits_has_those_of_its_leader(tmp_path: Path) -> None:
-    told = of(tmp_path, joint("j1", "a", LIMIT), joint("j2", "b", MIMIC.format("j1", 1, 0)))
-    assert (told.controlled, dict(told.coupled)) == (("j1",), {"j2": "j1"})
-    one, other = told.joint("j1"), told.joint("j2")
-    assert (other.lower, other.upper, other.effort, other.max_velocity) == (-1.0, 1.0, one.effort, one.max_velocity)
-    assert told.remarks == ("joint j2 follows j1 and takes over its range, effort, velocity",)
+    body = of(tmp_path, joint("j1", "a", LIMIT), joint("j2", "b", MIMIC.format("j1", 1, 0)))
+    assert (body.controlled, dict(body.coupled)) == (("j1",), {"j2": "j1"})
+    first, second = body.joint("j1"), body.joint("j2")
+    assert (second.lower, second.upper, second.effort, second.max_velocity) == (
+        -1.0,
+        1.0,
+        first.effort,
+        first.max_velocity,
+    )
+    assert body.remarks == ("joint j2 follows j1 and takes over its range, effort, velocity",)
 
 
 def test_a_follower_keeps_the_limits_that_it_has(tmp_path: Path) -> None:
     own = "<limit lower='-0.5' upper='2' effort='0' velocity='7'/>"
-    told = of(tmp_path, joint("j1", "a", LIMIT), joint("j2", "b", own + MIMIC.format("j1", -1, 0.5)))
-    other = told.joint("j2")
+    body = of(tmp_path, joint("j1", "a", LIMIT), joint("j2", "b", own + MIMIC.format("j1", -1, 0.5)))
+    other = body.joint("j2")
     assert (other.lower, other.upper, other.effort, other.max_velocity) == (-1.5, 1.0, 3.0, 7.0)
-    np.testing.assert_allclose([limits(told).lower, limits(told).upper], [[-1.0], [1.0]])
-    assert told.remarks == ("joint j2 follows j1 and takes over its effort",)
+    np.testing.assert_allclose([limits(body).lower, limits(body).upper], [[-1.0], [1.0]])
+    assert body.remarks == ("joint j2 follows j1 and takes over its effort",)
 
 
 def test_a_follower_of_a_follower_turns_as_bullet_turns_it(tmp_path: Path) -> None:
@@ -93,21 +98,21 @@ def test_a_follower_of_a_follower_turns_as_bullet_turns_it(tmp_path: Path) -> No
         joint("j3", "c", LIMIT + MIMIC.format("j2", 0.5, -0.3), parent="base"),
     )
     file = written(tmp_path, *chain)
-    told = robot(file)
-    assert dict(told.coupled) == {"j3": "j1"}  # j2 goes twice as far, which no servo of ours does
+    body = robot(file)
+    assert dict(body.coupled) == {"j3": "j1"}  # j2 goes twice as far, which no servo of ours does
     at = 0.4
-    frames = forward_kinematics(lump(told), {"j1": at, "j3": at})
+    frames = forward_kinematics(lump(body), {"j1": at, "j3": at})
     angle = 0.5 * (-2.0 * at + 0.2) - 0.3
     expected = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
-    com = lump(told).links["c"].com
+    com = lump(body).links["c"].com
     np.testing.assert_allclose(frames.turn["c"] @ com, expected @ [0.0, 0.0, 0.05], atol=1e-12)
     place = -2.0 * 0.0 + 0.2  # where it follows to while its leader is at 0
     assert f"joint j2 is held at {place:g} rad (follows j1 by a factor of -2; only 1 and -1 can be driven)" in (
-        told.remarks
+        body.remarks
     )
     with as_bullet_reads(Path(file)) as bullets:
         theirs = bullets.holding({"j1": at, "j2": place, "j3": angle})
-    ours = dict(zip(told.motors, holding(told, {"j1": at, "j3": at}), strict=True))
+    ours = dict(zip(body.motors, holding(body, {"j1": at, "j3": at}), strict=True))
     assert ours["j3"] == pytest.approx(-theirs["j3"], abs=1e-9) and ours["j1"] == pytest.approx(theirs["j1"], abs=1e-6)
 
 
@@ -122,20 +127,20 @@ def test_followers_in_a_circle_and_of_nobody_are_told(tmp_path: Path) -> None:
     circle = (joint("j1", "a", MIMIC.format("j2", 1, 0)), joint("j2", "b", MIMIC.format("j1", 1, 0)))
     line = "joints.j1: follows itself (<mimic>); one of these joints has to lead"
     assert refused("robot", written(tmp_path, *circle, joint("j3", "c", LIMIT)), folder=tmp_path).endswith(line)
-    told = of(tmp_path, joint("j1", "a", LIMIT), joint("j2", "b", MIMIC.format("j9", 1, 0)))
-    assert told.remarks == ("joint j2 is held at 0 rad (follows j9, which does not exist)",)
+    body = of(tmp_path, joint("j1", "a", LIMIT), joint("j2", "b", MIMIC.format("j9", 1, 0)))
+    assert body.remarks == ("joint j2 is held at 0 rad (follows j9, which does not exist)",)
 
 
 def test_commands_keep_soft_limits_and_the_body_can_go_beyond(tmp_path: Path) -> None:
     file = written(tmp_path, joint("j1", "a", LIMIT + SOFT.format(-0.3, 0.3)))
-    told = robot(file)
-    assert (told.joint("j1").lower, told.joint("j1").upper) == (-1.0, 1.0)
-    assert "keep the soft limits of its <safety_controller>: -0.3 and 0.3 rad" in told.remarks[0]
+    body = robot(file)
+    assert (body.joint("j1").lower, body.joint("j1").upper) == (-1.0, 1.0)
+    assert "keep the soft limits of its <safety_controller>: -0.3 and 0.3 rad" in body.remarks[0]
     done("collect", "world=urdf", f"world.robot={file}", *SHORT, "name=x", folder=tmp_path)
-    asked = [one.action for one in read(tmp_path / "runs/x/collect_real/trajectories.parquet").episodes]
+    asked = [episode.action for episode in read(tmp_path / "runs/x/collect_real/trajectories.parquet").episodes]
     assert 0.2 < np.abs(np.concatenate(asked)).max() <= 0.3 + 1e-12
-    (tmp_path / "back.urdf").write_text(urdf(told))
-    assert robot(str(tmp_path / "back.urdf")).soft == told.soft
+    (tmp_path / "back.urdf").write_text(urdf(body))
+    assert robot(str(tmp_path / "back.urdf")).soft == body.soft
     space = BulletWorld(robot=file, effects={}, floating=False).make().action_space
     np.testing.assert_allclose([space.low, space.high], [[-0.3], [0.3]])
 
@@ -147,15 +152,15 @@ def test_commands_keep_soft_limits_and_the_body_can_go_beyond(tmp_path: Path) ->
 def test_the_narrower_of_hard_and_soft_limits_counts(
     soft: tuple[float, float], kept: tuple[float, float], tmp_path: Path
 ) -> None:
-    told = of(tmp_path, joint("j1", "a", LIMIT + SOFT.format(*soft)))
-    assert told.commanded("j1") == kept and told.remarks
+    body = of(tmp_path, joint("j1", "a", LIMIT + SOFT.format(*soft)))
+    assert body.bound_commands("j1") == kept and body.remarks
 
 
 def test_soft_limits_of_a_follower_are_those_of_its_leader_turned_round(tmp_path: Path) -> None:
     follower = joint("j2", "b", LIMIT + MIMIC.format("j1", -1, 0.1) + SOFT.format(-0.2, 0.5))
-    told = of(tmp_path, joint("j1", "a", LIMIT), follower)
-    np.testing.assert_allclose(told.commanded("j2"), [-0.4, 0.3])
-    np.testing.assert_allclose([limits(told).lower[0], limits(told).upper[0]], [-0.4, 0.3])
+    body = of(tmp_path, joint("j1", "a", LIMIT), follower)
+    np.testing.assert_allclose(body.bound_commands("j2"), [-0.4, 0.3])
+    np.testing.assert_allclose([limits(body).lower[0], limits(body).upper[0]], [-0.4, 0.3])
 
 
 def test_soft_limits_that_leave_nothing_are_refused(tmp_path: Path) -> None:
@@ -182,8 +187,8 @@ def test_limits_that_stand_for_none_are_placeholders(old: str, new: str, problem
 
 def test_a_continuous_joint_needs_no_range_and_believes_no_placeholder(tmp_path: Path) -> None:
     for ends in ("", "lower='0' upper='0'", "lower='-1e16' upper='1e16'"):
-        told = of(tmp_path, joint("j1", "a", LIMIT.replace("lower='-1' upper='1'", ends), kind="continuous"))
-        np.testing.assert_allclose(told.commanded("j1"), [-2.0 * np.pi, 2.0 * np.pi])
+        body = of(tmp_path, joint("j1", "a", LIMIT.replace("lower='-1' upper='1'", ends), kind="continuous"))
+        np.testing.assert_allclose(body.bound_commands("j1"), [-2.0 * np.pi, 2.0 * np.pi])
 
 
 def test_a_placeholder_in_a_robot_file_is_one_as_well(tmp_path: Path) -> None:
@@ -196,7 +201,7 @@ def test_a_missing_range_can_be_told_to_init(tmp_path: Path) -> None:
     done("init", f"urdf={file}", "name=arm", "lower=-0.7", "upper=0.9", folder=tmp_path)
     said = gsl("collect", "--config-dir", "arm", "world=arm", *SHORT, "name=x", folder=tmp_path)
     assert said.code == 0, said.err
-    assert robot(str(tmp_path / "arm/robot.yaml")).commanded("j1") == (-0.7, 0.9)
+    assert robot(str(tmp_path / "arm/robot.yaml")).bound_commands("j1") == (-0.7, 0.9)
 
 
 def test_friction_of_a_file_becomes_effects_of_the_world_that_init_writes(tmp_path: Path) -> None:
@@ -213,7 +218,7 @@ def test_friction_of_a_file_becomes_effects_of_the_world_that_init_writes(tmp_pa
 
 def test_a_floating_joint_is_the_base_that_a_world_may_free(tmp_path: Path) -> None:
     free = joint("free", "trunk", "", parent="base", kind="floating")
-    told = of(tmp_path, free, joint("j1", "a", LIMIT, parent="trunk"))
+    body = of(tmp_path, free, joint("j1", "a", LIMIT, parent="trunk"))
     rigid = of(tmp_path, free.replace("floating", "fixed"), joint("j1", "a", LIMIT, parent="trunk"))
-    assert told.controlled == ("j1",) and lump(told).links.keys() == lump(rigid).links.keys()
-    assert any("joint free is rigid here (floating)" in remark for remark in told.remarks)
+    assert body.controlled == ("j1",) and lump(body).links.keys() == lump(rigid).links.keys()
+    assert any("joint free is rigid here (floating)" in remark for remark in body.remarks)

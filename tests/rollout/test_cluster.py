@@ -65,8 +65,8 @@ def played(cluster: Cluster | None, function: Callable[[bytes, Job], Any] = para
     start, scale = scenario.policy.initial, scenario.policy.scale
     jobs = [Job(start + 0.02 * scale * rng.standard_normal(len(start)), 10 + k) for k in range(6)]
     with executing(cluster), QUIET.progress(len(jobs), "") as progress:
-        found = parallel.in_parallel(function, scenario, jobs, 1, progress)
-    return [one.position.tobytes() + one.velocity.tobytes() + one.reward.tobytes() for one in found]
+        trajectories = parallel.in_parallel(function, scenario, jobs, 1, progress)
+    return [entry.position.tobytes() + entry.velocity.tobytes() + entry.reward.tobytes() for entry in trajectories]
 
 
 def _dies_once(marker: Path, frozen: bytes, job: Job) -> Any:

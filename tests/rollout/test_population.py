@@ -31,8 +31,8 @@ def _jobs(scenario: Scenario, count: int = 4) -> list[Job]:
     return [Job(start + 0.02 * scenario.policy.scale * rng.standard_normal(len(start)), 10 + k) for k in range(count)]
 
 
-def _bytes(found: list[Trajectory]) -> list[bytes]:
-    return [one.position.tobytes() + one.velocity.tobytes() + one.reward.tobytes() for one in found]
+def _bytes(trajectories: list[Trajectory]) -> list[bytes]:
+    return [entry.position.tobytes() + entry.velocity.tobytes() + entry.reward.tobytes() for entry in trajectories]
 
 
 def _run(scenario: Scenario, jobs: list[Job], workers: int) -> list[Trajectory]:
@@ -59,7 +59,9 @@ def test_an_episode_is_the_summary_of_its_trajectory() -> None:
     with QUIET.progress(2, "") as progress:
         short = episodes(scenario, jobs, workers=1, progress=progress)
     long = _run(scenario, jobs, 1)
-    assert [(one.value, one.fell, one.steps) for one in short] == [(t.value, t.ended_in_a_fall, len(t)) for t in long]
+    assert [(episode.value, episode.fell, episode.steps) for episode in short] == [
+        (t.value, t.ended_in_a_fall, len(t)) for t in long
+    ]
 
 
 def test_a_rollout_after_a_very_short_one_is_the_same() -> None:

@@ -13,7 +13,7 @@ import pytest
 from omegaconf import OmegaConf
 from robots_elsewhere import requested, run
 
-from gsl.core.described import describe, rebuilt
+from gsl.core.described import describe, restore
 from gsl.core.interfaces import Policy
 from gsl.core.seeds import grounding_generator
 from gsl.errors import ArtifactError, ConfigError, GslError
@@ -60,7 +60,7 @@ print(json.dumps({"acted": told, "strange": strange}))
 def _policy(name: str) -> Policy:
     if name == "excitation":
         return Excitation(robot="nao", motions=("steps_large", "chirp"), duration=1.5)
-    return rebuilt(OmegaConf.to_container(OmegaConf.load(CONF / f"policy/{name}.yaml")))
+    return restore(OmegaConf.to_container(OmegaConf.load(CONF / f"policy/{name}.yaml")))
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
@@ -78,15 +78,15 @@ def test_the_runner_acts_as_the_policy_does_to_the_bit(name: str, noise: float, 
         [sys.executable, "-I", "-c", ACTS, str(folder)],
         input=json.dumps(seen.tolist()), capture_output=True, text=True, timeout=60, check=True,
     )  # fmt: skip
-    told = json.loads(done.stdout)
-    assert told["strange"] == []
+    document = json.loads(done.stdout)
+    assert document["strange"] == []
     for index, theta in enumerate(thetas.values()):
         run = policy.start(theta, layout)
         own = ActionNoise(sd=noise).start(layout, grounding_generator(index))
         actions = np.array([run.act(observation) for observation in seen])
         sent = np.array([own.transform(seen[0], action) for action in actions])
-        np.testing.assert_array_equal(np.array(told["acted"][index])[:, 0], actions)
-        np.testing.assert_array_equal(np.array(told["acted"][index])[:, 1], sent)
+        np.testing.assert_array_equal(np.array(document["acted"][index])[:, 0], actions)
+        np.testing.assert_array_equal(np.array(document["acted"][index])[:, 1], sent)
 
 
 def test_a_policy_that_needs_more_than_numpy_is_refused() -> None:
@@ -141,13 +141,13 @@ def test_the_guard_refuses_and_says_which_joint(joint: int, value: float, proble
 
 
 def test_the_guard_refuses_what_is_too_fast_for_too_long() -> None:
-    guard, told = _guard(), ""
+    guard, problem = _guard(), ""
     for tick in range(1, 20):
-        told = guard.refusal(np.full(15, 0.14 * tick * (np.arange(15) == 3)), PERIOD * tick)
-        if told:
+        problem = guard.refusal(np.full(15, 0.14 * tick * (np.arange(15) == 3)), PERIOD * tick)
+        if problem:
             break
         guard.take(np.full(15, 0.14 * tick * (np.arange(15) == 3)), PERIOD * tick)
-    assert told == "LKneePitch: the target moves 1.4 rad in 0.2 s, more than the 1.28 rad allowed"
+    assert problem == "LKneePitch: the target moves 1.4 rad in 0.2 s, more than the 1.28 rad allowed"
 
 
 def test_the_guard_refuses_another_number_of_joints() -> None:
@@ -165,7 +165,7 @@ def test_a_ramp_begins_gently_ends_where_it_should_and_keeps_its_speed() -> None
 def test_after_a_fall_no_more_of_a_policy_is_due_where_that_is_said() -> None:
     episodes = [{"name": f"{policy}{n}", "policy": policy} for policy in "ab" for n in range(3)]
     left = {
-        stop: [one["name"] for one in due({"until_fall": stop, "episodes": episodes}, {"a0", "a1"}, {"a1"})]
+        stop: [episode["name"] for episode in due({"until_fall": stop, "episodes": episodes}, {"a0", "a1"}, {"a1"})]
         for stop in (True, False)
     }
     assert left == {True: ["b0", "b1", "b2"], False: ["a2", "b0", "b1", "b2"]}
@@ -337,8 +337,8 @@ class Slow(PerfectRobot):
 
     def read(self) -> dict:
         self._time.until(self._time.now() + self._takes[len(self.sent) % len(self._takes)])
-        told = super().read()
-        return {**told, "position": told["position"] + self._shift}
+        batch = super().read()
+        return {**batch, "position": batch["position"] + self._shift}
 
     def send(self, targets: np.ndarray) -> None:
         super().send(targets)
@@ -387,15 +387,15 @@ def test_a_policy_that_fails_is_told_in_one_line(walk: Path) -> None:
 
 def test_the_guard_judges_speed_by_the_time_that_passed() -> None:
     step = 0.1 * (np.arange(15) == 3)
-    told = {}
+    problems = {}
     for period in (PERIOD, 0.5 * PERIOD):
         guard = _guard()
         for tick in range(1, 20):
             if problem := guard.refusal(step * tick, period * tick):
-                told[period] = problem
+                problems[period] = problem
                 break
             guard.take(step * tick, period * tick)
-    assert list(told) == [0.5 * PERIOD] and "in 0.2 s" in told[0.5 * PERIOD]
+    assert list(problems) == [0.5 * PERIOD] and "in 0.2 s" in problems[0.5 * PERIOD]
 
 
 def test_a_robot_that_does_not_arrive_is_not_let_go(walk: Path) -> None:
@@ -547,13 +547,13 @@ def test_the_first_fault_is_told_before_where_the_robot_was_left(walk: Path, tmp
     [(10, 0.1, ""), (1, -0.5, "b: is 0.5 rad off its targets"), (25, 0.0, "b: stands still, though it was sent 0.25")],
 )
 def test_a_joint_may_be_late_but_not_far_off(behind: int, off: float, problem: str) -> None:
-    following, told = Following(("a", "b"), 0.2), ""
+    following, answer = Following(("a", "b"), 0.2), ""
     way = np.outer(np.arange(100) * 0.05, [0.0, 1.0])  # rad, 2.5 rad/s
     following.start(way[0], 0.0)
     for tick in range(100):
-        told = told or following.problem(way[max(0, tick - behind)] + [0.0, off], PERIOD * tick)
-        following.sent(way[tick], PERIOD * tick)
-    assert told.startswith(problem) and bool(told) == bool(problem)
+        answer = answer or following.problem(way[max(0, tick - behind)] + [0.0, off], PERIOD * tick)
+        following.note(way[tick], PERIOD * tick)
+    assert answer.startswith(problem) and bool(answer) == bool(problem)
 
 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGINT"])
@@ -665,8 +665,8 @@ def test_a_sense_that_is_missing_at_times_is_blank_and_a_new_one_is_refused(walk
     log, reads = tmp_path / "answer.csv", "reads, plain = 0, read\ndef read():\n    global reads\n    reads += 1\n"
     some = reads + "    return {**plain(), **({'voltage': 21.5} if reads % 3 == 1 else {})}\n"
     assert run(walk, _fails(tmp_path, some), f"--log={log}", "--yes", "--unpaced").returncode == 0
-    told = {row["voltage"] for row in journal.table(log)[1]}
-    assert told == {"", "21.5"}
+    volts = {row["voltage"] for row in journal.table(log)[1]}
+    assert volts == {"", "21.5"}
     for more, problem in (
         ("'temperature': [30] * 15", "has no column temperature.LHipYawPitch, which the robot tells now"),
         ("'gyro': [1, 2, 3], 'base.position': [0, 0, 0]", "has no column base.position.x, which the robot tells now"),

@@ -30,7 +30,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     log = read(place / "runs/good/collect_real/trajectories.parquet")
     for name, factors in (("turned", np.array([1.0, -1.0])), ("degrees", np.array([57.3, 57.3]))):
         side = ("position",) if name == "turned" else ("position", "action")
-        episodes = [replace(one, **{key: factors * getattr(one, key) for key in side}) for one in log.episodes]
+        episodes = [
+            replace(episode, **{key: factors * getattr(episode, key) for key in side}) for episode in log.episodes
+        ]
         write(place / f"{name}.parquet", replace(log, episodes=tuple(episodes)))
     return place
 
@@ -80,10 +82,10 @@ def test_an_import_says_what_it_sees_and_mends_what_it_is_asked_to(tmp_path: Pat
     assert "position.a" in said.out and "mapping.unwrap=true" in said.out
     assert "position.b, episode 0, row 100" in said.out
     done("import", "source=log.csv", "mapping.unwrap=true", "mapping.glitches=mend", "name=log", folder=tmp_path)
-    (one,) = read(tmp_path / "runs/log/import/trajectories.parquet").episodes
-    assert np.ptp(one.position[:, 0] - wave) < 1e-6
-    assert np.abs(one.position[:, 1] - 0.4 * np.sin(2.0 * time)).max() < 0.01
-    assert np.abs(one.velocity).max() < 10.0
+    (episode,) = read(tmp_path / "runs/log/import/trajectories.parquet").episodes
+    assert np.ptp(episode.position[:, 0] - wave) < 1e-6
+    assert np.abs(episode.position[:, 1] - 0.4 * np.sin(2.0 * time)).max() < 0.01
+    assert np.abs(episode.velocity).max() < 10.0
 
 
 @pytest.mark.parametrize("stage", ["audit", "diagnose"])

@@ -121,7 +121,7 @@ def test_every_algorithm_is_told_by_its_file_acts_alike_and_goes_on(kind: str, t
         )
     )
     assert len(learned) == 2 and not np.array_equal(learned[0], policy.initial)
-    assert sum(steps) <= optimizer.taken
+    assert sum(steps) <= optimizer.steps_taken
 
 
 def test_parameters_are_the_actors_weights_alone(tmp_path: Path) -> None:

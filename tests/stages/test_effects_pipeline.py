@@ -49,8 +49,12 @@ def test_iterate_names_what_the_simulator_lacks_and_what_it_cost(air: tuple[Path
     measured = loaded(folder / FIRST / "evaluate/metrics.json")["real_episodes"]
     assert (metrics["learned_from"], metrics["real_episodes"]) == (0, measured + 5)
     table = (folder / "runs/air/iterate/table.md").read_text()
-    for told in ("Diagnosis: causes. ", "Switched on in the simulator: command_latency.", f"{measured} + 5 in the air"):
-        assert told in said.out and told in table
+    for sentence in (
+        "Diagnosis: causes. ",
+        "Switched on in the simulator: command_latency.",
+        f"{measured} + 5 in the air",
+    ):
+        assert sentence in said.out and sentence in table
     spent = f"5 motions in the air (8 s) to diagnose, 0 episodes to learn from, {measured} to measure"
     assert f"real data: {spent}, {measured + 5} in all\n" in said.out
 
@@ -59,7 +63,7 @@ def test_every_link_is_there_and_nothing_is_done_twice(air: tuple[Path, Said]) -
     folder, _ = air
     links = {"collect_excitation", "diagnose", "optimize", "evaluate"}
     assert {path.name for path in (folder / FIRST).iterdir()} >= links
-    assert [one["role"] for one in loaded(folder / FIRST / "optimize/manifest.json")["parents"]] == [
+    assert [parent["role"] for parent in loaded(folder / FIRST / "optimize/manifest.json")["parents"]] == [
         "grounding.diagnosis"
     ]
     assert "(unchanged)" in done(*LINE, "grounding=effects", folder=folder).out.splitlines()[-1]
@@ -71,7 +75,7 @@ def test_a_transformation_inside_learns_from_the_diagnosed_simulator(air: tuple[
     assert any(line.startswith(f"{FIRST}/diagnose: ") and "(unchanged)" in line for line in said.lines)
     assert "command_latency" in loaded(folder / FIRST / "collect_sim/config.yaml")["world"]["effects"]
     models = [loaded(folder / FIRST / f"{stage}/config.yaml")["model"] for stage in ("train_inverse", "train_forward")]
-    assert [one["horizon"] for one in models] == [3, 3]  # an action is a tick late there
+    assert [model["horizon"] for model in models] == [3, 3]  # an action is a tick late there
     assert loaded(folder / FIRST / "optimize/metrics.json")["effects"] == ["command_latency"]
     assert 0.0 < loaded(folder / FIRST / "optimize/metrics.json")["alpha"] <= 1.0
     assert (folder / "runs/air/with_gat/joint_trace.png").is_file()
@@ -79,14 +83,14 @@ def test_a_transformation_inside_learns_from_the_diagnosed_simulator(air: tuple[
 
 def test_the_world_file_and_the_grounding_are_one_simulator_and_the_terminal_says_how(air: tuple[Path, Said]) -> None:
     folder, _ = air
-    told = done("show", "air/iteration_01/diagnose", folder=folder).out
+    output = done("show", "air/iteration_01/diagnose", folder=folder).out
     chosen = ("--config-dir", f"{FIRST}/diagnose", "world=diagnosed")
-    assert f"gsl optimize {' '.join(chosen)} grounding=none" in told
+    assert f"gsl optimize {' '.join(chosen)} grounding=none" in output
     line = ("optimize", *SMALL, "optimizer.generations=1")
     done(*line, "name=file", *chosen, "grounding=none", folder=folder)
     done(*line, "name=grounded", "grounding=effects", f"grounding.diagnosis={FIRST}/diagnose", folder=folder)
-    one, other = (read_policies(folder / f"runs/{name}/optimize/policies.json") for name in ("file", "grounded"))
-    assert one.records == other.records
+    first, second = (read_policies(folder / f"runs/{name}/optimize/policies.json") for name in ("file", "grounded"))
+    assert first.records == second.records
 
 
 def test_the_next_experiment_can_be_played_and_has_a_repeat(air: tuple[Path, Said]) -> None:
@@ -96,7 +100,7 @@ def test_the_next_experiment_can_be_played_and_has_a_repeat(air: tuple[Path, Sai
     file = f"{FIRST}/diagnose/next_experiment.json"
     done("collect", "task=excite", "workers=1", "name=next", f"policy.file={file}", folder=folder)
     batch = read(folder / "runs/next/collect_real/trajectories.parquet")
-    labels = [one["policy"] for one in batch.metadata["episodes"]]
+    labels = [episode["policy"] for episode in batch.metadata["episodes"]]
     assert labels == [f"{report['excitation']}_{variant}" for variant in ("a", "b", "a")]
     assert file in done("show", "air/iteration_01/diagnose", folder=folder).out
 
@@ -106,7 +110,7 @@ def test_compare_sets_effects_beside_the_others(tmp_path: Path) -> None:
     chosen = [f"~methods.{name}" for name in left] + ["~worlds.nao_weak", "trials=1", "preset=toy"]
     small = ("iterate.task.duration=1.6", "iterate.workers=1", "worlds.nao_worn.effects={command_latency:{delay:0.02}}")
     done("compare", *chosen, *small, "name=c", folder=tmp_path)
-    trials = {one["method"]: one for one in loaded(tmp_path / "runs/c/compare/trials.json")}
+    trials = {trial["method"]: trial for trial in loaded(tmp_path / "runs/c/compare/trials.json")}
     assert list(trials) == ["effects", "effects_gat"]
     home = tmp_path / "runs/c/nao_worn"
     for method, learned in {"effects": 0, "effects_gat": 6}.items():
@@ -119,9 +123,9 @@ def test_identification_fits_the_same_log_without_a_verdict(air: tuple[Path, Sai
     folder, _ = air
     said = done(*LINE, "grounding=identified", "out=runs/air/identified", folder=folder)
     assert any(line.startswith(f"{FIRST}/collect_excitation: ") and "(unchanged)" in line for line in said.lines)
-    found = loaded(folder / FIRST / "identify/report.json")
-    assert 0.01 < found["effects"]["command_latency"][0]["delay"] < 0.025
-    assert found["shrinkage"]["after"] < 0.6 * found["shrinkage"]["before"]
+    document = loaded(folder / FIRST / "identify/report.json")
+    assert 0.01 < document["effects"]["command_latency"][0]["delay"] < 0.025
+    assert document["shrinkage"]["after"] < 0.6 * document["shrinkage"]["before"]
     assert "Diagnosis: identified. 18 parameters of 17 effects were fitted at once: held out, " in said.out
 
 
@@ -130,25 +134,25 @@ def test_what_a_plan_leaves_out_is_no_candidate(tmp_path: Path) -> None:
     plan = DiagnosisPlan(played, duels=0, nulls=0, evaluations=16, without=("command_latency",))
     world = BulletWorld("nao", {})  # without a gap nothing is searched
     for method in ("diagnose", "identify"):
-        made = plan.carried_out(world, world, method, tmp_path, workers=1, seed=1, console=Silent())
+        made = plan.carry_out(world, world, method, tmp_path, workers=1, seed=1, console=Silent())
         assert (made.manifest.kind, made.config["without"]) == (method, ["command_latency"])
 
 
 @pytest.mark.parametrize("stage", [Diagnose, Identify, CrossValidate, DiagnosisPlan])
 def test_no_stage_leaves_out_an_effect_that_there_is_none_of(stage: type) -> None:
     needed = {"real": "log", "sim": BulletWorld("nao", {}), "excitation": Excitation("nao"), "by": "gain"}
-    given = {name: value for name, value in needed.items() if name in settings_of(stage)}
+    settings = {name: value for name, value in needed.items() if name in settings_of(stage)}
     where = r"^plan\.without = .*: latency: no effect of this name; did you mean command_latency\?$"
     with pytest.raises(ConfigError, match=where):
-        make(stage, {**given, "without": ["latency"]}, where="plan")
+        make(stage, {**settings, "without": ["latency"]}, where="plan")
 
 
 def test_an_identification_that_finds_nothing_better_leaves_the_simulator_as_it_is(air: tuple[Path, Said]) -> None:
     folder, _ = air
     line = ("identify", f"real={FIRST}/collect_excitation", "sim=nao_ideal", "evaluations=16", "name=short")
     done(*line, folder=folder)
-    found = loaded(folder / "runs/short/identify/report.json")
-    assert found["shrinkage"]["after"] == pytest.approx(found["shrinkage"]["before"], rel=1e-6)
+    document = loaded(folder / "runs/short/identify/report.json")
+    assert document["shrinkage"]["after"] == pytest.approx(document["shrinkage"]["before"], rel=1e-6)
 
 
 @pytest.mark.parametrize(("grounding", "predicts"), [("sgat", "mixture"), ("gat_gated", "point"), ("randomised", "")])

@@ -32,10 +32,13 @@ FALLING = _theta(com_offset=-0.09)
 
 
 def _evaluated(
-    tmp_path: Path, found: dict[str, np.ndarray], place: tuple[Any, Any, Any] = (GROUND, TASK, WALK), **settings: object
+    tmp_path: Path,
+    thetas: dict[str, np.ndarray],
+    place: tuple[Any, Any, Any] = (GROUND, TASK, WALK),
+    **settings: object,
 ) -> tuple[dict, dict]:
     file, (_, task, policy) = tmp_path / "candidates.json", place
-    write_policies(file, policies(policy, task, [record(policy, name, theta) for name, theta in found.items()]))
+    write_policies(file, policies(policy, task, [record(policy, name, theta) for name, theta in thetas.items()]))
     sizes = {"episodes": 2, "check": 2, "confirmation": 3, **settings}
     metrics = Evaluate(*place, str(file), workers=1, **sizes).run(tmp_path, QUIET)
     return dict(metrics), json.loads((tmp_path / "evaluation.json").read_text())
@@ -50,12 +53,14 @@ def three(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, dict, Path]:
 def test_the_best_stable_policy_is_returned(three: tuple[dict, dict, Path]) -> None:
     metrics, table, folder = three
     assert metrics["best"] == "fast"
-    assert [one.name for one in read_policies(folder / "policies.json").records] == ["fast"]
+    assert [record.name for record in read_policies(folder / "policies.json").records] == ["fast"]
     assert metrics["gain"]["value"] == pytest.approx(metrics["returned"]["value"] - metrics["baseline"]["value"])
     assert metrics["gain"]["value"] > 0.0
     assert (metrics["stable_policies"], metrics["improving_policies"], metrics["policies"]) == (1, 1, 2)
     fresh = table["confirmation"][0]["values"]  # of π0, which the choice did not pick for being slow
-    assert sum(not one["falls"] and np.mean(one["values"]) > np.mean(fresh) for one in table["policies"][1:]) == 1
+    assert (
+        sum(not policy["falls"] and np.mean(policy["values"]) > np.mean(fresh) for policy in table["policies"][1:]) == 1
+    )
 
 
 def test_a_policy_that_falls_costs_no_further_episode_and_is_worth_nothing(three: tuple[dict, dict, Path]) -> None:
@@ -115,7 +120,7 @@ def test_where_falls_are_tolerated_a_check_has_to_be_ahead_of_the_baseline(
     numbers = {name: np.array([float(k)]) for k, name in enumerate(walks)}
     metrics, table = _evaluated(tmp_path, numbers, place, tolerated=tolerated, episodes=3, check=6)
     assert (metrics["best"], metrics["failed_check"]) == (best, failed)
-    assert [one["name"] for one in table["check"]] == ["pi0", "fast", "other"][: 2 + len(failed) // 2]
+    assert [row["name"] for row in table["check"]] == ["pi0", "fast", "other"][: 2 + len(failed) // 2]
 
 
 def test_one_episode_is_no_check_of_a_policy_that_may_fall(tmp_path: Path) -> None:

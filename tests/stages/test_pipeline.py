@@ -30,7 +30,7 @@ def test_every_stage_leaves_a_complete_artifact(chain: Path) -> None:
         assert {"config.yaml", "metrics.json", "log.txt"} < files
         assert there == files | {"manifest.json"}
     stored = json.loads((chain / "runs/chain/optimize/manifest.json").read_text())
-    assert {one["role"] for one in stored["parents"]} == {"grounding.forward_model", "grounding.inverse_model"}
+    assert {parent["role"] for parent in stored["parents"]} == {"grounding.forward_model", "grounding.inverse_model"}
 
 
 def test_nothing_half_written_is_left_behind(chain: Path) -> None:
@@ -75,7 +75,7 @@ def test_show_tells_where_an_artifact_comes_from_and_what_it_holds(chain: Path) 
     text = done("show", "chain/evaluate", folder=chain).out
     parent = json.loads((chain / "runs/chain/evaluate/manifest.json").read_text())["parents"][0]
     metrics = json.loads((chain / "runs/chain/evaluate/metrics.json").read_text())
-    for told in (
+    for phrase in (
         "runs/chain/evaluate: evaluate",
         "gsl evaluate name=chain preset=toy",
         f"runs/chain/optimize   {parent['hash'][:12]}   the same",
@@ -86,7 +86,7 @@ def test_show_tells_where_an_artifact_comes_from_and_what_it_holds(chain: Path) 
         "evaluation.json",
         "all files are as they were made",
     ):
-        assert told in text
+        assert phrase in text
     shown = json.loads(done("show", "chain/evaluate", "--json", folder=chain).out)
     assert shown["manifest"]["kind"] == "evaluate"
 
@@ -163,7 +163,7 @@ def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[
         assert " ".join(cell for line in row.split("|") if (cell := line.strip())) in said
     assert metrics["verdict"] in said.replace("\xa0", " ")
     seen = Page(pages["iterate"])
-    assert len([one for one in seen.attributes if one[1] == "data-of"]) == seen.tags["option"] > 1
+    assert len([attribute for attribute in seen.attributes if attribute[1] == "data-of"]) == seen.tags["option"] > 1
     for section in ("Learning curves", "What grounding changes", "Joint by joint", "Footfalls", "Real data", "Lineage"):
         assert section in said
     assert "../iteration_01/evaluate" in said and "gsl iterate" in said
@@ -220,9 +220,9 @@ def test_an_unchanged_iteration_shows_its_table_again(whole: tuple[Path, Said]) 
 def test_models_of_two_joints_ground_no_others(grounding: str, tmp_path: Path) -> None:
     line = ("experiment=arm", "preset=toy", f"grounding={grounding}", "grounding.x=auto", "accept=true", "workers=1")
     done("iterate", *line, "forward_model.epochs=5", "task.duration=1.2", folder=tmp_path)
-    found = next(tmp_path.rglob("optimize/metrics.json"))
-    assert set(json.loads(found.read_text())["x"]) <= {"LShoulderPitch", "RShoulderPitch"}
-    assert json.loads((found.parent / "grounding.json").read_text())["reachability"]["by_joint"].keys() == {
+    metrics = next(tmp_path.rglob("optimize/metrics.json"))
+    assert set(json.loads(metrics.read_text())["x"]) <= {"LShoulderPitch", "RShoulderPitch"}
+    assert json.loads((metrics.parent / "grounding.json").read_text())["reachability"]["by_joint"].keys() == {
         "LShoulderPitch",
         "RShoulderPitch",
     }

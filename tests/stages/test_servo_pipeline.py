@@ -49,8 +49,8 @@ def test_iterate_learns_the_servo_by_itself_and_reports_the_gap(air: tuple[Path,
     assert metrics["excitation"]["episodes"] == 5
     screened = loaded(folder / FIRST / "optimize/metrics.json")["screened"]
     assert screened.keys() == {"generation_01", "generation_02"}
-    told = f"from {servo['floors_before']:.1f} to {servo['floors_after']:.2f} noise floors"
-    assert told in said.out and told in (folder / "runs/air/iterate/table.md").read_text()
+    sentence = f"from {servo['floors_before']:.1f} to {servo['floors_after']:.2f} noise floors"
+    assert sentence in said.out and sentence in (folder / "runs/air/iterate/table.md").read_text()
     parents = loaded(folder / FIRST / "optimize/manifest.json")["parents"]
     assert [parent["role"] for parent in parents] == ["grounding.servo"]
 
@@ -112,8 +112,8 @@ def test_compare_and_effects_servo_share_the_flight(air: tuple[Path, Said]) -> N
     worlds = [f"~worlds.{name}" for name in ("nao_weak",)]
     methods = [f"~methods.{name}" for name in ("none", "ane_01", "ane_02", "gat", "gat_005", "effects_gat")]
     said = done(*line, *worlds, *methods, "+grounding@methods.effects_servo=effects_servo", folder=folder)
-    found = loaded(folder / "runs/both/compare/metrics.json")
-    assert {one["method"] for one in found["summaries"]} == {"effects", "effects_servo"}
+    document = loaded(folder / "runs/both/compare/metrics.json")
+    assert {summary["method"] for summary in document["summaries"]} == {"effects", "effects_servo"}
     below = next((folder / "runs/both").rglob("diagnosis")) / "trial_01"
     assert {path.name for path in below.iterdir()} == {"collect_excitation", "diagnose", "train_servo_on_effects"}
     on_effects = loaded(below / "train_servo_on_effects/config.yaml")["sim"]["effects"]
@@ -122,7 +122,7 @@ def test_compare_and_effects_servo_share_the_flight(air: tuple[Path, Said]) -> N
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "problem"),
     [
         (("real=nowhere",), "nowhere"),
         ((f"sim.servo={FIRST}/train_servo",), "learned servo already"),
@@ -131,13 +131,13 @@ def test_compare_and_effects_servo_share_the_flight(air: tuple[Path, Said]) -> N
         (("tolerance=-1",), "tolerance"),
     ],
 )
-def test_bad_input_gets_one_line(air: tuple[Path, Said], changes: tuple[str, ...], told: str) -> None:
+def test_bad_input_gets_one_line(air: tuple[Path, Said], changes: tuple[str, ...], problem: str) -> None:
     folder, _ = air
     if not (folder / "runs/ground").exists():
         done("collect", "role=real", *SMALL, "episodes=1", "neighbours=0", "name=ground", folder=folder)
     changed = {change.partition("=")[0] for change in changes}
     line = [word for word in TRAIN if word.partition("=")[0] not in changed]
-    assert told in refused(*line, *changes, "name=refused", folder=folder)
+    assert problem in refused(*line, *changes, "name=refused", folder=folder)
 
 
 def test_walks_bring_walks_nearer_and_a_further_member_is_as_near(air: tuple[Path, Said]) -> None:

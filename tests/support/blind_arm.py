@@ -15,4 +15,4 @@ def arm() -> Robot:
         Joint("elbow", "upper", "lower", np.array([0.0, 0.0, -0.12]), along, -1.5, 1.5, 6.0, 3.0, 0.005),
     )
     gains = {"shoulder": (40.0, 1.0), "elbow": (40.0, 1.0)}
-    return Robot("arm", {one.name: one for one in links}, joints, tuple(gains), gains=gains, encoder_step=0.0015)
+    return Robot("arm", {link.name: link for link in links}, joints, tuple(gains), gains=gains, encoder_step=0.0015)

@@ -61,14 +61,10 @@ def _files(folder: Path) -> list[Path]:
 
 
 @contextlib.contextmanager
-def started(*arguments: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
-    """Start a command line as a process that leads a session of its own; its workers end with the block."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "gsl", *arguments], cwd=folder, env=ENVIRONMENT, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+def ending(process: subprocess.Popen[str]) -> Iterator[None]:
+    """End a process that leads a session, and its workers, with the block."""
     try:
-        yield process
+        yield
     finally:
         for number in session(process.pid):
             with contextlib.suppress(ProcessLookupError):
@@ -76,15 +72,26 @@ def started(*arguments: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
+@contextlib.contextmanager
+def started(*arguments: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """Start a command line as a process that leads a session of its own; its workers end with the block."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "gsl", *arguments], cwd=folder, env=ENVIRONMENT, start_new_session=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    with ending(process):
+        yield process
+
+
 def session(leader: int) -> list[int]:
     """Return the processes of a session that are still running, zombies left out."""
-    found = []
+    processes = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
             state, *_, owner = path.read_text().rpartition(")")[2].split()[:4]
             if int(owner) == leader and state != "Z":
-                found.append(int(path.parent.name))
-    return found
+                processes.append(int(path.parent.name))
+    return processes
 
 
 def eventually(condition: Callable[[], object], *, seconds: float = 60.0) -> bool:

@@ -18,7 +18,7 @@ TIME = np.arange(0.0, 3.0, 0.02)
 
 def where(joints: tuple[str, ...], worst: dict[str, float]) -> list[dict[str, Any]]:
     """Cells of a map; the shares of the worst joints are spread over regimes, the rest is noise."""
-    rng, found = np.random.default_rng(0), []
+    rng, cells = np.random.default_rng(0), []
     spread = dict(zip(REGIMES, (1.0, 0.05, 0.2, 0.65, 0.3, 0.4, 0.0, 0.34, 0.36), strict=True))
     for joint in joints:
         for regime in REGIMES:
@@ -26,8 +26,8 @@ def where(joints: tuple[str, ...], worst: dict[str, float]) -> list[dict[str, An
             named = joint in worst and spread[regime] > 0.1
             bounds = {"low": 0.85 * share - 0.01, "high": 1.15 * share + 0.01}
             rms = 1.0 + (7.0 * share if named else 0.05 * rng.random())
-            found.append({"joint": joint, "regime": regime, "share": share, **bounds, "rms": rms, "named": named})
-    return found
+            cells.append({"joint": joint, "regime": regime, "share": share, **bounds, "rms": rms, "named": named})
+    return cells
 
 
 def horizon(joints: tuple[str, ...], worst: dict[str, float]) -> dict[str, Any]:
@@ -116,10 +116,16 @@ def policy_gap() -> dict[str, Any]:
         {
             "name": name,
             "sim": {"value": sim, "low": sim - 0.01, "high": sim + 0.01, "falls": 0, "episodes": 5},
-            "diagnosed": {"value": told, "low": told - 0.02, "high": told + 0.02, "falls": falls, "episodes": 5},
+            "diagnosed": {
+                "value": diagnosed,
+                "low": diagnosed - 0.02,
+                "high": diagnosed + 0.02,
+                "falls": falls,
+                "episodes": 5,
+            },
             "real": {"value": real, "low": None if falls else 0.2, "high": 0.28, "falls": falls, "episodes": 5},
         }
-        for name, (sim, told, real, falls) in returns.items()
+        for name, (sim, diagnosed, real, falls) in returns.items()
     ]
     return {
         "unit": "cm/s",
@@ -149,7 +155,7 @@ def document(joints: tuple[str, ...] = NAO, *, causes: int = 2) -> dict[str, Any
         causes: How many were found, 1 or 2.
     """
     knee = joints[min(2, len(joints) - 1)]
-    worst = dict(zip((knee, *[one for one in joints if one != knee][:2]), (0.6, 0.22, 0.08), strict=False))
+    worst = dict(zip((knee, *[joint for joint in joints if joint != knee][:2]), (0.6, 0.22, 0.08), strict=False))
     return {
         "verdict": "causes",
         "summary": f"{knee} is soft: its servo pulls with 57 % of the gain that the simulator has.",
@@ -215,9 +221,9 @@ def document(joints: tuple[str, ...] = NAO, *, causes: int = 2) -> dict[str, Any
 
 def no_gap() -> dict[str, Any]:
     """A diagnosis of a robot that is as its simulator."""
-    found = document()
+    report = document()
     whole = {"floor": 1.0, "before": 1.02, "after": None, "fraction": None, "low": None, "high": None}
-    return found | {
+    return report | {
         "verdict": "no_gap",
         "summary": "The simulator is within the noise of the robot in every joint.",
         "causes": [],
@@ -235,9 +241,9 @@ def no_gap() -> dict[str, Any]:
 
 def inseparable() -> dict[str, Any]:
     """A diagnosis that ends with two explanations."""
-    found = document(causes=1)
+    report = document(causes=1)
     summary = "A zero offset and a sensor's bias look alike in the air; the robot's stance would tell them apart."
-    return found | {
+    return report | {
         "verdict": "inseparable",
         "summary": summary,
         "causes": [zero_offset()],
@@ -247,11 +253,11 @@ def inseparable() -> dict[str, Any]:
 
 def unknown() -> dict[str, Any]:
     """A diagnosis that finds a gap and no cause."""
-    found = document()
-    shrinkage = found["shrinkage"] | {"after": 2.1, "fraction": 0.5, "low": 0.42, "high": 0.57}
-    ranking = copy.deepcopy(found["ranking"])[1:]
+    report = document()
+    shrinkage = report["shrinkage"] | {"after": 2.1, "fraction": 0.5, "low": 0.42, "high": 0.57}
+    ranking = copy.deepcopy(report["ranking"])[1:]
     summary = "The gap is far above the noise, and the best effect explains half of what a learned residual explains."
-    return found | {
+    return report | {
         "verdict": "unknown",
         "summary": summary,
         "causes": [],

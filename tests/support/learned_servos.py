@@ -24,9 +24,9 @@ EVERYTHING = {
 """All that a servo can have, by its fields."""
 
 
-def with_fields(robot: Robot, given: Mapping[str, float]) -> Plant:
+def with_fields(robot: Robot, fields: Mapping[str, float]) -> Plant:
     """The nominal plant whose servos all have the given fields."""
-    return nominal(robot).with_servo(**{name: np.full(len(robot.motors), value) for name, value in given.items()})
+    return nominal(robot).with_servo(**{name: np.full(len(robot.motors), value) for name, value in fields.items()})
 
 
 def with_effects(effects: Mapping[str, Any]) -> Plant:
@@ -61,9 +61,9 @@ def log(plant: Plant, *, ticks: int = 80, swing: float = 0.15, warm_up: int = 5,
     m = len(middle)
     sines = np.sin(2.0 * np.pi * np.outer(time, rng.uniform(0.5, 1.5, m)) + rng.uniform(0.0, 6.0, m))
     targets = (middle + swing * sines)[:, robot.drive]
-    told = Held.of(plant, STEP, PERIOD).play([targets], [targets[0]], settle=30)[0][:, :m]
+    position = Held.of(plant, STEP, PERIOD).play([targets], [targets[0]], settle=30)[0][:, :m]
     assert n >= m
-    record = Record("sines", targets, told, slope(told, PERIOD))
+    record = Record("sines", targets, position, slope(position, PERIOD))
     return cut_pieces([record], robot, PERIOD, warm_up=warm_up, scored=scored)
 
 

@@ -24,7 +24,7 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags[tag] += 1
-        self.attributes += [(tag, key, given or "") for key, given in attrs]
+        self.attributes += [(tag, key, value or "") for key, value in attrs]
         if tag not in VOID:
             self.open.append(tag)
 
@@ -38,7 +38,7 @@ class Page(HTMLParser):
             self.text += data + " "
 
     def classes(self) -> Counter[str]:
-        return Counter(one for _, key, given in self.attributes if key == "class" for one in given.split())
+        return Counter(word for _, key, value in self.attributes if key == "class" for word in value.split())
 
 
 def words(text: str) -> str:
@@ -50,7 +50,11 @@ def check_alone(text: str) -> None:
     """Fail if a page asks for anything outside of itself."""
     page = Page(text)
     assert page.tags["link"] == page.tags["img"] == 0
-    assert not [one for one in page.attributes if one[1] in ("src", "srcset") or one[1].startswith("on")]
-    assert all(one[2].startswith("#") for one in page.attributes if one[1] == "href")  # a mark that is drawn twice
+    assert not [
+        attribute for attribute in page.attributes if attribute[1] in ("src", "srcset") or attribute[1].startswith("on")
+    ]
+    assert all(
+        attribute[2].startswith("#") for attribute in page.attributes if attribute[1] == "href"
+    )  # a mark that is drawn twice
     assert "http" not in text.replace("http-equiv", "") and "@import" not in text
     assert re.search(r"url\((?!#)", text) is None

@@ -77,9 +77,9 @@ def commands(page: Path) -> Iterator[Command]:
             if not typed or typed.startswith("#"):
                 continue
             script = f"{RECORD}\ncd() {{ :; }}\n{typed}"
-            told = subprocess.run(
+            result = subprocess.run(
                 ["bash", "-euo", "pipefail", "-c", f"exec 3>&1 1>/dev/null; {script}"], capture_output=True, text=True
             )
-            assert told.returncode == 0, f"{page.name}: {typed}: {told.stderr}"
-            for record in told.stdout.splitlines():
+            assert result.returncode == 0, f"{page.name}: {typed}: {result.stderr}"
+            for record in result.stdout.splitlines():
                 yield Command(page.relative_to(ROOT).as_posix(), typed, tuple(record.split("\x1f")[:-1]))

@@ -20,7 +20,7 @@ def holding(body: Robot, angles: dict[str, float]) -> np.ndarray:
     return total
 
 
-class Told:
+class BulletReading:
     """A URDF as Bullet reads it, its base fixed."""
 
     def __init__(self, bullet, client: int, path: Path) -> None:
@@ -45,13 +45,13 @@ class Told:
 
 
 @contextmanager
-def as_bullet_reads(path: Path) -> Iterator[Told]:
+def as_bullet_reads(path: Path) -> Iterator[BulletReading]:
     with quiet():
         import pybullet
 
         client = pybullet.connect(pybullet.DIRECT)
-        told = Told(pybullet, client, path)
+        reading = BulletReading(pybullet, client, path)
     try:
-        yield told
+        yield reading
     finally:
         pybullet.disconnect(client)

@@ -73,9 +73,9 @@ def run(
     inertia = LINK + parameters.rows[OUTPUT_ARMATURE]
 
     def note() -> None:
-        told = np.empty((2, n))
-        encoder_motion(parameters, state, motion, STEP, told)
-        rows.append((told[0], motion[0].copy(), torque.copy()))
+        encoders = np.empty((2, n))
+        encoder_motion(parameters, state, motion, STEP, encoders)
+        rows.append((encoders[0], motion[0].copy(), torque.copy()))
 
     note()
     for tick, target in enumerate(paths):
@@ -91,8 +91,8 @@ def run(
         state.clock[0] += PERIOD
         if not every_step:
             note()
-    told, true, torques = (np.array(column)[1 if every_step else 0 :] for column in zip(*rows, strict=True))
-    return Log(*(each[:, 0] if n == 1 else each for each in (told, true, torques)))
+    logged, true, torques = (np.array(column)[1 if every_step else 0 :] for column in zip(*rows, strict=True))
+    return Log(*(each[:, 0] if n == 1 else each for each in (logged, true, torques)))
 
 
 def held(angle: float, seconds: float) -> np.ndarray:

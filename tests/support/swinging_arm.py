@@ -42,7 +42,7 @@ def arm() -> Robot:
 
 def motions() -> dict[str, np.ndarray]:
     """Steps, triangles, a chirp and poses, two variants of each, shape (T, 2)."""
-    time, found = PERIOD * np.arange(150), {}
+    time, paths = PERIOD * np.arange(150), {}
     for variant, (size, phase) in {"a": (1.0, 0.0), "b": (0.8, 1.0)}.items():
         wave = [np.sin(2 * np.pi * 0.6 * time + phase + k) for k in range(2)]
         stairs = [np.repeat(np.random.default_rng([k, ord(variant)]).uniform(-1, 1, 6), 25) for k in range(2)]
@@ -50,8 +50,8 @@ def motions() -> dict[str, np.ndarray]:
         poses = [np.repeat([0.3, -0.9, 0.9], 50) * (-1) ** k for k in range(2)]
         shapes = {"steps": 0.4, "triangle": 0.7, "chirp": 0.3, "poses": 0.8}
         for (name, share), columns in zip(shapes.items(), (stairs, wave, chirp, poses), strict=True):
-            found[f"{name}_{variant}"] = share * size * np.array(columns).T * np.minimum(1.0, time / 0.3)[:, None]
-    return found
+            paths[f"{name}_{variant}"] = share * size * np.array(columns).T * np.minimum(1.0, time / 0.3)[:, None]
+    return paths
 
 
 def log(effects: Mapping[str, Any], seed: int = 1, *, jitter: float = 1.0, noise: float = NOISE) -> Batch:

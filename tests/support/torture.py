@@ -116,7 +116,7 @@ def _apart(place: Path, of: Slice, seed: int) -> dict[str, Any]:
 def peak() -> float:
     """Return the most memory that this process or one it waited for had [bytes]."""
     whose = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    return 1024.0 * max(resource.getrusage(one).ru_maxrss for one in whose)
+    return 1024.0 * max(resource.getrusage(usage).ru_maxrss for usage in whose)
 
 
 def chain(place: Path) -> Path:

@@ -85,7 +85,7 @@ def kill_workers(folder: Path, rng: np.random.Generator, counts: Counter[str], *
         assert eventually(lambda: len(session(process.pid)) > 3), "no workers"
         for _ in range(3):
             time.sleep(rng.uniform(1.0, 4.0))
-            workers = [one for one in session(process.pid) if one != process.pid and _is_worker(one)]
+            workers = [worker for worker in session(process.pid) if worker != process.pid and _is_worker(worker)]
             if workers and process.poll() is None:
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(workers[rng.integers(len(workers))], signal.SIGKILL)
@@ -132,9 +132,9 @@ def kill_scheduler(folder: Path, rng: np.random.Generator, counts: Counter[str])
         counts["! lost scheduler not said"] += process.returncode != 1 or at not in said.splitlines()[-1] or took > SOON
         again(folder, MANY, wanted, counts)
     finally:
-        for one in (scheduler, worker):
-            one.kill()
-            one.wait()
+        for victim in (scheduler, worker):
+            victim.kill()
+            victim.wait()
 
 
 def damage_progress(folder: Path, rng: np.random.Generator, counts: Counter[str]) -> None:
@@ -153,18 +153,18 @@ def damage_compiled(folder: Path, rng: np.random.Generator, counts: Counter[str]
     """Flip bits in compiled code: it is compiled again, and a line says so."""
     words, cache = ("collect", "name=k", "role=real", *SMALL), folder / "numba"
     environment = {**ENVIRONMENT, "NUMBA_CACHE_DIR": str(cache)}
-    found = []
+    files = []
     for _ in range(2):
         process = subprocess.run(
             [sys.executable, "-m", "gsl", *words], cwd=folder, env=environment, capture_output=True, text=True
         )
         judge(Said(process.returncode, "", process.stderr), words, counts)
-        found.append(payloads(folder / "runs/k"))
+        files.append(payloads(folder / "runs/k"))
         shutil.rmtree(folder / "runs/k", ignore_errors=True)
         for path in [path for path in cache.rglob("*.nbc")]:
             path.write_bytes(_flipped(path.read_bytes(), rng))
     counts["! damaged code not said"] += "compiled code is damaged" not in process.stderr
-    counts["! another payload"] += found[0] != found[1] or not found[0]
+    counts["! another payload"] += files[0] != files[1] or not files[0]
     shutil.rmtree(cache)
 
 

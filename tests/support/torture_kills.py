@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
-import os
 import shutil
 import subprocess
 import sys
@@ -14,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from commands import ENVIRONMENT, SMALL, eventually, gsl, session
+from commands import ENVIRONMENT, SMALL, ending, eventually, gsl, session
 
 from gsl.effects.effect import names
 from gsl.runner.preflight import LOCK
@@ -119,9 +118,9 @@ def again(folder: Path, words: tuple[str, ...], wanted: dict[str, str], counts: 
         path.unlink() if path.is_file() else shutil.rmtree(path, ignore_errors=True)
 
 
-def _bad(wrong: bool, words: tuple[str, ...], told: str) -> bool:
+def _bad(wrong: bool, words: tuple[str, ...], problem: str) -> bool:
     if wrong:
-        sys.stderr.write(f"! {' '.join(words)[:200]}: {told[-400:]}\n")
+        sys.stderr.write(f"! {' '.join(words)[:200]}: {problem[-400:]}\n")
     return wrong
 
 
@@ -163,10 +162,5 @@ def _started(words: tuple[str, ...], at: int, folder: Path) -> Iterator[subproce
         [sys.executable, killer, str(at), str(folder / "writes"), *words], cwd=folder, env=ENVIRONMENT, text=True,
         start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
-    try:
+    with ending(process):
         yield process
-    finally:
-        for number in session(process.pid):
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(number, 9)
-        process.communicate()

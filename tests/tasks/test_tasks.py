@@ -66,7 +66,7 @@ def test_the_episode_ends_when_one_arm_is_above_the_goal() -> None:
 def test_the_distance_reported_is_the_last_one() -> None:
     position = np.array([arm(0.0, 0.0)[LAYOUT["position"]], arm(41.0, 42.0)[LAYOUT["position"]]])
     trajectory = Trajectory(np.array([0.0, 0.02]), position[:1], position, 0.0 * position)
-    found = Arm().outcome(LAYOUT, trajectory)
-    assert found["distance [deg]"] == pytest.approx(5.0)
-    assert found["mean distance [deg]"] == pytest.approx(0.5 * (5.0 + 45.0 * 2.0**0.5))
-    assert found["above [share]"] == 0.0
+    outcome = Arm().outcome(LAYOUT, trajectory)
+    assert outcome["distance [deg]"] == pytest.approx(5.0)
+    assert outcome["mean distance [deg]"] == pytest.approx(0.5 * (5.0 + 45.0 * 2.0**0.5))
+    assert outcome["above [share]"] == 0.0

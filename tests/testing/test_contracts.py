@@ -151,7 +151,7 @@ def test_an_effect_of_ones_own_keeps_the_contract() -> None:
         (Wordless(width=0.02), "extra does not say what it means"),
         (Hooked(), "returns no torque for each motor"),
     ],
-    ids=lambda one: type(one).__name__ if not isinstance(one, str) else "",
+    ids=lambda value: type(value).__name__ if not isinstance(value, str) else "",
 )
 def test_what_an_effect_breaks_is_named(effect: Any, promise: str) -> None:
     with pytest.raises(AssertionError, match=promise) as caught:
@@ -320,7 +320,7 @@ class Learned(Trainable):
     model: Annotated[str, setting("path or run of train-grounding")] = ""
 
     def learn(self, evidence: Any, seed: int) -> Mapping[str, np.ndarray]:
-        return {"mean": np.mean([one.position.mean(axis=0) for one in evidence.real.episodes], axis=0)}
+        return {"mean": np.mean([episode.position.mean(axis=0) for episode in evidence.real.episodes], axis=0)}
 
     def load(self, arrays: Mapping[str, np.ndarray]) -> Any:
         return NoGrounding()

@@ -183,7 +183,7 @@ def test_an_iteration_trains_checks_and_searches_with_both(iterated: Path) -> No
     report = json.loads((first / "optimize/grounding.json").read_text())
     assert set(report["errors"]["pi0"]) == {"grounded", "ungrounded", "no_change"}
     generations = [json.loads(line) for line in (first / "optimize/generations.jsonl").read_text().splitlines()]
-    assert [len(one["values"]) for one in generations] == [3, 3]
+    assert [len(generation["values"]) for generation in generations] == [3, 3]
 
 
 def test_what_is_held_out_is_not_learned_from(iterated: Path) -> None:
@@ -308,8 +308,8 @@ def test_what_is_no_array_is_refused(returned: str, said: str, iterated: Path, h
                                      f"    def learn(self, evidence, seed):\n        return {returned}\n")  # fmt: skip
     (home / f"mine/grounding/{name}.yaml").write_text(f"_target_: {name}.Wrong\nmodel: ''\n")
     data = ("real=runs/own/iteration_01/collect_real", "sim=runs/own/iteration_01/collect_sim")
-    told = gsl("train-grounding", *OWN, f"grounding={name}", *data, f"name={name}", folder=home)
-    assert (told.code, told.lines[-1]) == (2, f"gsl train-grounding: {said}")
+    result = gsl("train-grounding", *OWN, f"grounding={name}", *data, f"name={name}", folder=home)
+    assert (result.code, result.lines[-1]) == (2, f"gsl train-grounding: {said}")
 
 
 def test_after_an_edit_of_ones_class_it_learns_anew(iterated: Path, home: Path) -> None:
@@ -345,9 +345,11 @@ def test_what_an_optimiser_asks_for_is_checked(
     text = OPTIMISER.replace("[self.best + step for step in steps]", asked)
     (home / f"own_bad_{number}.py").write_text(text)
     (home / f"mine/optimizer/bad_{number}.yaml").write_text(f"_target_: own_bad_{number}.RandomSearch\n")
-    told = gsl("optimize", *OWN, *SMALL, "grounding=none", f"optimizer=bad_{number}", f"name=bad_{number}", folder=home)
-    assert told.code in (1, 2)
-    assert told.lines[-1].startswith(f"gsl optimize: {said}")
+    result = gsl(
+        "optimize", *OWN, *SMALL, "grounding=none", f"optimizer=bad_{number}", f"name=bad_{number}", folder=home
+    )
+    assert result.code in (1, 2)
+    assert result.lines[-1].startswith(f"gsl optimize: {said}")
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -355,6 +357,6 @@ def test_own_code_that_fails_in_a_rollout_is_one_line(workers: int, home: Path) 
     (home / "own_fault.py").write_text(PLAIN.replace("action + 0.7", "action + np.ones(3)"))
     (home / "mine/grounding/fault.yaml").write_text("_target_: own_fault.TooFar\n")
     sizes = ("preset=toy", "task.duration=1.6", f"workers={workers}")
-    told = gsl("optimize", *OWN, *sizes, "grounding=fault", "accept=true", f"name=fault_{workers}", folder=home)
+    result = gsl("optimize", *OWN, *sizes, "grounding=fault", "accept=true", f"name=fault_{workers}", folder=home)
     fault = "own_fault.TooFar.transform failed (own_fault.py, line 12): NameError: name 'np' is not defined"
-    assert told.code == 1 and fault in told.lines[-1] and "internal" not in told.err
+    assert result.code == 1 and fault in result.lines[-1] and "internal" not in result.err

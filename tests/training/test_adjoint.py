@@ -50,7 +50,7 @@ NAMES = (*FACTORS, "delay", "coulomb", "viscous", "deadband", "armature", "offse
 
 
 @pytest.fixture(scope="module")
-def told() -> Pieces:
+def pieces() -> Pieces:
     return log(with_fields(NAO, TRUTH), ticks=40, warm_up=1, scored=3)
 
 
@@ -71,9 +71,9 @@ def off(slope: np.ndarray, direction: np.ndarray, cost: Callable[[np.ndarray], f
 
 
 @pytest.mark.parametrize("name", BASES)
-def test_derivatives_by_the_law_are_those_of_differences(name: str, told: Pieces) -> None:
+def test_derivatives_by_the_law_are_those_of_differences(name: str, pieces: Pieces) -> None:
     plant, rng = with_fields(NAO, BASES[name]), np.random.default_rng(1)
-    added, data = some_law(plant), freeze(plant, told, FLOOR, PERIOD)
+    added, data = some_law(plant), freeze(plant, pieces, FLOOR, PERIOD)
     gradient = gradient_of(plant, data, added)[1]
     for field in Gradient._fields[1:]:
         values = getattr(added, field)
@@ -86,10 +86,10 @@ def test_derivatives_by_the_law_are_those_of_differences(name: str, told: Pieces
 
 
 @pytest.mark.parametrize("name", BASES)
-def test_derivatives_by_the_numbers_are_those_of_differences(name: str, told: Pieces) -> None:
+def test_derivatives_by_the_numbers_are_those_of_differences(name: str, pieces: Pieces) -> None:
     """Rounded targets jump with the delay, and dry friction or a deadband has no derivative where there is none."""
     plant, rng = with_fields(NAO, BASES[name]), np.random.default_rng(2)
-    added, data = some_law(plant), freeze(plant, told, FLOOR, PERIOD)
+    added, data = some_law(plant), freeze(plant, pieces, FLOOR, PERIOD)
     gradient = gradient_of(plant, data, added)[1]
     dry = {"coulomb", "stribeck", "load_friction"} & set(BASES[name])
     left_out = (["delay"] if "quantum" in BASES[name] else []) + ([] if dry else ["coulomb"])
@@ -110,14 +110,14 @@ def test_derivatives_by_the_numbers_are_those_of_differences(name: str, told: Pi
 
 
 @pytest.mark.parametrize("name", ["nominal", "command"])
-def test_commands_beside_the_targets_are_part_of_the_derivatives(name: str, told: Pieces) -> None:
+def test_commands_beside_the_targets_are_part_of_the_derivatives(name: str, pieces: Pieces) -> None:
     plant, rng = with_fields(NAO, BASES[name] | {"delay": 0.013}), np.random.default_rng(4)
     wide = np.concatenate(
-        [told.windows.commands, rng.standard_normal((*told.windows.commands.shape[:2], 2 * N))], axis=2
+        [pieces.windows.commands, rng.standard_normal((*pieces.windows.commands.shape[:2], 2 * N))], axis=2
     )
     added, data = (
         some_law(plant),
-        freeze(plant, replace(told, windows=told.windows._replace(commands=wide)), FLOOR, PERIOD),
+        freeze(plant, replace(pieces, windows=pieces.windows._replace(commands=wide)), FLOOR, PERIOD),
     )
     gradient = gradient_of(plant, data, added)[1]
     for number in ("kp", "kd", "delay", "viscous"):
@@ -130,15 +130,15 @@ def test_commands_beside_the_targets_are_part_of_the_derivatives(name: str, told
         assert off(gradient.numbers[NAMES.index(number)], rng.standard_normal(N), cost) < 2e-4, number
 
 
-def test_windows_add_up_and_each_counts_as_alone(told: Pieces) -> None:
+def test_windows_add_up_and_each_counts_as_alone(pieces: Pieces) -> None:
     plant = with_fields(NAO, BASES["friction"])
-    added, data = some_law(plant), freeze(plant, told, FLOOR, PERIOD)
-    assert len(told) > LANES
+    added, data = some_law(plant), freeze(plant, pieces, FLOOR, PERIOD)
+    assert len(pieces) > LANES
     whole = gradient_of(plant, data, added)
-    alone = [gradient_of(plant, part(data, np.array([w])), added) for w in range(len(told))]
+    alone = [gradient_of(plant, part(data, np.array([w])), added) for w in range(len(pieces))]
     np.testing.assert_allclose(whole[0], sum(cost for cost, _ in alone), rtol=1e-12)
     for field, total in whole[1]._asdict().items():
-        parts = np.sum([getattr(one, field) for _, one in alone], axis=0)
+        parts = np.sum([getattr(gradient, field) for _, gradient in alone], axis=0)
         np.testing.assert_allclose(total, parts, rtol=1e-8, atol=1e-10 * np.abs(parts).max())
 
 
@@ -148,14 +148,14 @@ def part(data: Frozen, index: np.ndarray) -> Frozen:
 
 
 @pytest.mark.parametrize("speed", [1e300, 1e4])
-def test_a_window_that_runs_away_has_a_finite_cost_and_no_derivative(speed: float, told: Pieces) -> None:
+def test_a_window_that_runs_away_has_a_finite_cost_and_no_derivative(speed: float, pieces: Pieces) -> None:
     plant = nominal(NAO)
-    added, data = some_law(plant), freeze(plant, told, FLOOR, PERIOD)
+    added, data = some_law(plant), freeze(plant, pieces, FLOOR, PERIOD)
     motion = data.motion.copy()
     motion[0, 1] = speed
     cost, gradient = gradient_of(plant, data._replace(motion=motion), added)
-    rest = gradient_of(plant, part(data, np.arange(1, len(told))), added)
-    scored = JOINTS * (told.real.shape[1] - told.warm_up)
+    rest = gradient_of(plant, part(data, np.arange(1, len(pieces))), added)
+    scored = JOINTS * (pieces.real.shape[1] - pieces.warm_up)
     np.testing.assert_allclose(cost - rest[0], scored * ROBUST**2 * np.log1p((LOST / ROBUST) ** 2), rtol=1e-9)
     for field, total in gradient._asdict().items():
         parts = getattr(rest[1], field)
@@ -177,18 +177,18 @@ def test_frozen_links_move_as_the_chain_does_where_the_replay_is_right(name: str
     assert np.sqrt(cost / chain.size) < 0.1
 
 
-def test_frozen_terms_are_those_of_the_mass_matrix(told: Pieces) -> None:
+def test_frozen_terms_are_those_of_the_mass_matrix(pieces: Pieces) -> None:
     plant = nominal(NAO)
-    data = freeze(plant, told, FLOOR, PERIOD)
-    path = np.concatenate([data.motion[:, :1], told.real[:, :, NAO.drive]], axis=1)
+    data = freeze(plant, pieces, FLOOR, PERIOD)
+    path = np.concatenate([data.motion[:, :1], pieces.real[:, :, NAO.drive]], axis=1)
     middle = 0.5 * (path[3, 1] + path[3, 2])
     inertia = mass_matrix(NAO, dict(zip(NAO.motors, middle, strict=True)))[6:, 6:] + np.diag(plant.servo.armature)
     np.testing.assert_allclose(data.mobility[3, 1] @ inertia, np.eye(N), atol=1e-9)
 
 
-def test_heavier_windows_are_those_of_a_plant_with_more_armature(told: Pieces) -> None:
+def test_heavier_windows_are_those_of_a_plant_with_more_armature(pieces: Pieces) -> None:
     plant, more = nominal(NAO), np.random.default_rng(0).uniform(0.0, 0.01, N)
     heavy = plant.with_servo(armature=plant.servo.armature + more)
-    got, want = heavier(freeze(plant, told, FLOOR, PERIOD), more), freeze(heavy, told, FLOOR, PERIOD)
+    got, want = heavier(freeze(plant, pieces, FLOOR, PERIOD), more), freeze(heavy, pieces, FLOOR, PERIOD)
     np.testing.assert_allclose(got.mobility, want.mobility, rtol=1e-8, atol=1e-9 * want.mobility.max())
     np.testing.assert_allclose(got.free, want.free, rtol=1e-8, atol=1e-9 * np.abs(want.free).max())

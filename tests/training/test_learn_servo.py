@@ -109,10 +109,10 @@ def test_a_servo_is_learned_beneath_which_other_commands_act() -> None:
 
 
 def test_a_report_says_what_held_out_motions_say(slow: LearnedServo) -> None:
-    told = document(slow)
-    assert told["floors_before"] == slow.before["all"]
-    assert told["floors_after"] == slow.after["all"]
-    assert told["learned"] and told["whole_motions"]
+    report = document(slow)
+    assert report["floors_before"] == slow.before["all"]
+    assert report["floors_after"] == slow.after["all"]
+    assert report["learned"] and report["whole_motions"]
 
 
 def test_neither_time_nor_threads_change_a_bit(slow: LearnedServo) -> None:
@@ -159,22 +159,22 @@ def test_a_torque_hook_is_refused_where_it_would_be_left_out() -> None:
 
 def test_a_network_learns_what_no_number_says() -> None:
     exp = cut_log(played_by_bullet(replace(nominal(ROBOT), hook=pushed)), ROBOT)
-    found = learned(exp)
-    assert found.model.network["last"].any()
-    assert found.before["all"] > 10.0
-    assert found.after["all"] < 0.25 * found.before["all"]
+    servo = learned(exp)
+    assert servo.model.network["last"].any()
+    assert servo.before["all"] > 10.0
+    assert servo.after["all"] < 0.25 * servo.before["all"]
 
 
 def test_a_group_that_gets_worse_keeps_its_servo() -> None:
     """The motions that are held out come from another robot than those that are fitted."""
     fitted, held = log(real({"servo_gain": {"kp": 0.5}})), log(real({}), seed=1)
-    labels = [{**one, "robot": name} for name, batch in (("soft", fitted), ("plain", held)) for one in about(batch)]
+    labels = [{**label, "robot": name} for name, batch in (("soft", fitted), ("plain", held)) for label in about(batch)]
     both = replace(fitted, episodes=(*fitted.episodes, *held.episodes), metadata={"episodes": labels})
     exp = cut_log(both, ROBOT, held_out={"robot": "plain"})
-    found = learn_servo(exp, nominal(ROBOT), STEP, labelled=True, seed=1, threads=1)
-    assert found.after == found.before
-    assert not any(values.any() for values in found.model.numbers.values())
-    assert not document(found)["learned"]
+    servo = learn_servo(exp, nominal(ROBOT), STEP, labelled=True, seed=1, threads=1)
+    assert servo.after == servo.before
+    assert not any(values.any() for values in servo.model.numbers.values())
+    assert not document(servo)["learned"]
 
 
 def about(batch: Batch) -> list[dict[str, Any]]:
@@ -187,22 +187,22 @@ def test_known_conditions_are_no_news() -> None:
     soft = {"servo_gain": {"kp": 0.5}}
     late = {"command_latency": {"delay": 0.03}}
     first, second = log(real(late), motions=6), log(real(late | soft), motions=6, seed=1)
-    labels = [*about(first), *({**one, "conditions": soft} for one in about(second))]
+    labels = [*about(first), *({**label, "conditions": soft} for label in about(second))]
     both = replace(first, episodes=(*first.episodes, *second.episodes), metadata={"episodes": labels})
-    found = learned(cut_log(both, ROBOT))
-    assert found.after["all"] < 1.3 < found.before["all"]
-    assert found.model.numbers["delay"][0] == pytest.approx(0.03, abs=0.005)
-    assert found.model.numbers["kp"][0] == pytest.approx(0.0, abs=0.1)
+    servo = learned(cut_log(both, ROBOT))
+    assert servo.after["all"] < 1.3 < servo.before["all"]
+    assert servo.model.numbers["delay"][0] == pytest.approx(0.03, abs=0.005)
+    assert servo.model.numbers["kp"][0] == pytest.approx(0.0, abs=0.1)
 
 
 def at_gains(*friction: float) -> Batch:
     """What one robot logs at three firmware gains, with another friction at each [N·m]."""
     parts, labels = [], []
     for k, (kp, torque) in enumerate(zip((0.5, 1.0, 2.0), friction, strict=True)):
-        known = {"servo_gain": {"kp": kp}}
-        parts.append(log(real(known | {"coulomb_friction": {"torque": torque}}), motions=4, seed=k))
-        labels += [{**one, "conditions": known, "kp": kp} for one in about(parts[-1])]
-    episodes = tuple(one for part in parts for one in part.episodes)
+        gains = {"servo_gain": {"kp": kp}}
+        parts.append(log(real(gains | {"coulomb_friction": {"torque": torque}}), motions=4, seed=k))
+        labels += [{**label, "conditions": gains, "kp": kp} for label in about(parts[-1])]
+    episodes = tuple(episode for part in parts for episode in part.episodes)
     return replace(parts[0], episodes=episodes, metadata={"episodes": labels})
 
 
@@ -210,18 +210,18 @@ def at_gains(*friction: float) -> Batch:
 def test_what_does_not_hold_at_a_gain_that_is_left_out_is_not_learned(
     friction: tuple[float, float, float], holds: bool
 ) -> None:
-    found = learned(cut_log(at_gains(*friction), ROBOT))
-    assert document(found)["learned"] is holds
+    servo = learned(cut_log(at_gains(*friction), ROBOT))
+    assert document(servo)["learned"] is holds
 
 
 def test_each_condition_is_left_out_in_turn() -> None:
     exp = cut_log(at_gains(0.0, 0.0, 0.0), ROBOT)
     parts = split(exp, labelled=False)
     folds = leave_out(exp, parts)
-    known = [{exp.records[k].conditions["servo_gain"]["kp"] for k in exp.pieces.record[one.test]} for one in folds]
-    assert sorted(known, key=min) == [{0.5}, {1.0}, {2.0}]
-    for one in folds:
-        assert sorted(np.concatenate([one.train, one.judge, one.test])) == list(range(len(exp.pieces)))
+    gains = [{exp.records[k].conditions["servo_gain"]["kp"] for k in exp.pieces.record[fold.test]} for fold in folds]
+    assert sorted(gains, key=min) == [{0.5}, {1.0}, {2.0}]
+    for fold in folds:
+        assert sorted(np.concatenate([fold.train, fold.judge, fold.test])) == list(range(len(exp.pieces)))
     labelled = cut_log(at_gains(0.0, 0.0, 0.0), ROBOT, held_out={"kp": 2.0})
     last = leave_out(labelled, split(labelled, labelled=False))[2]
     assert last.judge.size
@@ -233,22 +233,22 @@ def test_slow_and_fast_logs_are_learned_from(period: float) -> None:
     """A step of 2 ms divides neither 5 ms nor 1 ms: replays take the nearest that does, or time would run wrong."""
     seconds, motions = (6.0, 8) if period > 0.01 else (2.5, 6)
     exp = prepared({"servo_gain": {"kp": 0.6}}, period=period, seconds=seconds, motions=motions)
-    found = learned(exp)
-    assert found.after["all"] < 0.5 * found.before["all"]
-    assert found.model.numbers["kp"][0] == pytest.approx(np.log(0.6), abs=0.05)
+    servo = learned(exp)
+    assert servo.after["all"] < 0.5 * servo.before["all"]
+    assert servo.model.numbers["kp"][0] == pytest.approx(np.log(0.6), abs=0.05)
 
 
 def test_a_delay_stays_within_what_servos_remember() -> None:
     exp = prepared({"servo_gain": {"kp": 0.6}}, period=0.001, seconds=2.5, motions=6)
-    found = learned(exp, step=0.001)
-    assert found.model.numbers["delay"].max() <= 15 * 0.001 + 1e-12
+    servo = learned(exp, step=0.001)
+    assert servo.model.numbers["delay"].max() <= 15 * 0.001 + 1e-12
 
 
 def test_members_differ_by_what_the_log_leaves_open() -> None:
-    found = learn_servo(prepared(SLOW), nominal(ROBOT), STEP, labelled=False, seed=1, threads=1, members=3)
+    servo = learn_servo(prepared(SLOW), nominal(ROBOT), STEP, labelled=False, seed=1, threads=1, members=3)
     for name, values in learned(prepared(SLOW)).model.arrays().items():  # the first is what it is by itself
-        np.testing.assert_array_equal(found.model.arrays()[name], values)
-    gains = [float(one.numbers["kp"][0]) for one in (found.model, *(member.model for member in found.further))]
+        np.testing.assert_array_equal(servo.model.arrays()[name], values)
+    gains = [float(model.numbers["kp"][0]) for model in (servo.model, *(member.model for member in servo.further))]
     assert len(set(gains)) == 3
     assert gains == pytest.approx([np.log(0.7)] * 3, abs=0.1)
 
@@ -262,13 +262,13 @@ def test_a_joint_that_shakes_is_learned_from_or_left_alone() -> None:
     """A stiff servo that measures late swings at rest; what is learned of its gain must not be worse than nothing."""
     exp = prepared({"sensor_delay": {"delay": 0.02}, "servo_gain": {"kp": 0.6}}, motions=6, rests=True)
     assert exp.comparison.shaking.all()
-    found = learned(exp)
-    assert found.after["all"] <= found.before["all"]
+    servo = learned(exp)
+    assert servo.after["all"] <= servo.before["all"]
 
 
 def test_one_motion_alone_is_learned_from() -> None:
-    found = learned(prepared(SLOW, motions=1, seconds=30.0))
-    assert found.after["all"] <= found.before["all"]
+    servo = learned(prepared(SLOW, motions=1, seconds=30.0))
+    assert servo.after["all"] <= servo.before["all"]
 
 
 def test_a_motor_of_several_groups_is_of_the_smallest() -> None:

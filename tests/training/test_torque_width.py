@@ -48,8 +48,8 @@ def log(effects: dict[str, Any], count: int = 16) -> Log:
     return cut_log(Batch(tuple(episodes), nao().controlled, PERIOD, metadata), nao())
 
 
-def widths(effects: dict[str, Any], known: dict[str, Any] | None = None) -> dict[str, tuple[float, float]]:
-    both = measure_widths(log(effects), apply_all(nominal(nao()), build(known or {})), step=0.002)
+def widths(effects: dict[str, Any], conditions: dict[str, Any] | None = None) -> dict[str, tuple[float, float]]:
+    both = measure_widths(log(effects), apply_all(nominal(nao()), build(conditions or {})), step=0.002)
     return {group: tuple(width) for group, width in both.items()}
 
 

@@ -151,9 +151,9 @@ def test_the_chain_makes_a_quick_simulator_move_like_the_slow_robot(
 
 
 def test_models_of_the_joints_of_interest_see_nothing_of_the_others(real: str, sim: str, tmp_path: Path) -> None:
-    one = replace(LINEAR, variables=("LKneePitch",), rested=True)
-    metrics = TrainForward(data=real, model=one).run(tmp_path, QUIET)
-    TrainInverse(data=sim, model=one, method="solve").run(tmp_path, QUIET)
+    partial = replace(LINEAR, variables=("LKneePitch",), rested=True)
+    metrics = TrainForward(data=real, model=partial).run(tmp_path, QUIET)
+    TrainInverse(data=sim, model=partial, method="solve").run(tmp_path, QUIET)
     f = read_forward_model(str(tmp_path / "forward_model.safetensors"))
     f_inverse = read_inverse_model(str(tmp_path / "inverse_model.safetensors"))
     assert f.joints == f_inverse.joints == ("LKneePitch",)
@@ -194,12 +194,12 @@ def test_a_residual_of_which_nothing_is_known_leaves_the_simulator(
         (tmp_path / name).mkdir()
         model = replace(LINEAR, ridge=ridge, likelihood=likelihood)
         TrainForward(real, model, residual_to=inverse).run(tmp_path / name, QUIET)
-        found = read_forward_model(str(tmp_path / name / "forward_model.safetensors"))
-        assert found.base is not None and found.base.joints == simulator.joints
-        apart = np.abs(found.effects(windows) - simulator.effects(windows)).max()
+        residual = read_forward_model(str(tmp_path / name / "forward_model.safetensors"))
+        assert residual.base is not None and residual.base.joints == simulator.joints
+        apart = np.abs(residual.effects(windows) - simulator.effects(windows)).max()
         assert (apart < 1e-2) == near
-        np.testing.assert_allclose(found.effect(windows[0]), found.effects(windows)[0], atol=1e-6)
-    assert found.effects(windows) == pytest.approx(rows.change, abs=1e-3)
+        np.testing.assert_allclose(residual.effect(windows[0]), residual.effects(windows)[0], atol=1e-6)
+    assert residual.effects(windows) == pytest.approx(rows.change, abs=1e-3)
 
 
 def test_what_cannot_be_corrected_is_refused(real: str, sim: str, inverse: str, tmp_path: Path) -> None:
@@ -250,10 +250,10 @@ def test_a_gaussian_ensemble_is_trained_by_likelihood_and_knows_what_it_has_seen
     model = ModelConfig(family="linear", ridge=1e-6, likelihood="gaussian", members=3)
     measured = TrainForward(data=real, model=model).run(tmp_path, QUIET)["heldout"]["off_pi0"]
     assert measured["nll"] < -5.0
-    found = read_forward_model(str(tmp_path / "forward_model.safetensors"))
-    assert isinstance(found, Ensemble)
-    assert len(found.members) == 3
-    assert found.judged(np.full(found.history.size(2), 50.0))[1].min() > 3.0
+    ensemble = read_forward_model(str(tmp_path / "forward_model.safetensors"))
+    assert isinstance(ensemble, Ensemble)
+    assert len(ensemble.members) == 3
+    assert ensemble.judge(np.full(ensemble.history.size(2), 50.0))[1].min() > 3.0
 
 
 def test_auto_takes_the_history_that_predicts_best_and_says_what_it_tried(real: str, sim: str, tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ def test_a_grounding_that_does_nothing_replays_as_no_grounding_whatever_noise_is
 
 def test_what_is_expected_has_neither_noise_nor_draws() -> None:
     grounding = replace(a_transformation(0.2), alpha=0.5)
-    assert replace(grounding, noise=0.1, draws=True).expected == grounding
+    assert replace(grounding, noise=0.1, draws=True).deterministic == grounding
 
 
 class Watching:
@@ -141,24 +141,26 @@ def _first(episode: Trajectory, steps: int) -> Trajectory:
 
 def _without(group: str) -> Batch:
     episodes = [
-        replace(one, sensors={name: values for name, values in one.sensors.items() if not name.startswith(group)})
-        for one in heldout().episodes
+        replace(
+            episode, sensors={name: values for name, values in episode.sensors.items() if not name.startswith(group)}
+        )
+        for episode in heldout().episodes
     ]
     return replace(heldout(), episodes=tuple(episodes))
 
 
 def test_a_body_that_is_farther_is_remarked_on_whatever_its_joints_are() -> None:
     def apart(joints: float, pitch: float, forward: float) -> dict[int, Deviations]:
-        found = Deviations(np.full((3, 2), joints), np.full(3, pitch), np.full(3, forward))
-        return dict.fromkeys((1, TICKS), found)
+        deviations = Deviations(np.full((3, 2), joints), np.full(3, pitch), np.full(3, forward))
+        return dict.fromkeys((1, TICKS), deviations)
 
     def report(joints: float, pitch: float, forward: float) -> GroundingReport:
         sims = {GROUNDED: apart(joints, pitch, forward), BARE: apart(0.1, 0.1, 0.1)}
         return GroundingReport({OFF: sims}, ("a", "b"), 1, 0, np.zeros(1))
 
-    told = "after 10 ticks the body's {} off π0 is farther from the real one"
-    assert report(0.05, 0.2, 0.2).remark == report(0.2, 0.2, 0.2).remark == told.format("pitch and place")
-    assert report(0.05, 0.05, 0.2).remark == told.format("place")
+    remark = "after 10 ticks the body's {} off π0 is farther from the real one"
+    assert report(0.05, 0.2, 0.2).remark == report(0.2, 0.2, 0.2).remark == remark.format("pitch and place")
+    assert report(0.05, 0.05, 0.2).remark == remark.format("place")
     assert report(0.05, 0.05, 0.05).remark == report(0.2, 0.1, 0.1).remark == ""
 
 

@@ -32,7 +32,7 @@ def test_a_grounding_is_trained_the_forward_model_that_it_needs() -> None:
 )
 def test_models_look_over_the_delay_of_a_late_simulator(effects: dict, horizon: int, history: int) -> None:
     extra = extra_ticks(BulletWorld("nao", effects))
-    found = looking_ahead(ModelConfig(), extra)
-    assert (found.horizon, found.history) == (horizon, history)
+    config = looking_ahead(ModelConfig(), extra)
+    assert (config.horizon, config.history) == (horizon, history)
     assert looking_ahead(ModelConfig(history="auto"), extra).history == "auto"
     assert looking_ahead(ModelConfig(horizon=10), extra) == ModelConfig(horizon=10)

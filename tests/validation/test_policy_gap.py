@@ -15,7 +15,7 @@ import yaml
 from commands import done, refused
 from scenarios import AIR, QUIET, REACH
 
-from gsl.core.described import describe, rebuilt
+from gsl.core.described import describe, restore
 from gsl.core.seeds import derive_seed
 from gsl.core.statistics import bootstrap_interval, rank_correlation
 from gsl.effects.effect import names
@@ -47,8 +47,8 @@ def lifting(count: int) -> list[np.ndarray]:
 
 def evaluated(folder: Path, count: int, *overrides: str, run: str = "arm") -> Path:
     """An artifact of evaluate: some policies of the arm in a worn world."""
-    found = [record(REACH, f"lift_{k}", theta) for k, theta in enumerate(lifting(count))]
-    write_policies(folder / f"{run}.json", policies(REACH, TASK, found))
+    chosen = [record(REACH, f"lift_{k}", theta) for k, theta in enumerate(lifting(count))]
+    write_policies(folder / f"{run}.json", policies(REACH, TASK, chosen))
     worn = "world.effects.servo_gain.kp=0.4"
     more = (*HELD, worn, f"task.duration={TASK.duration}", *LOW, *overrides)
     done(
@@ -78,20 +78,20 @@ def gap(folder: Path, after: BulletWorld, monkeypatch: pytest.MonkeyPatch, **set
 
 
 def test_the_world_that_was_measured_predicts_its_returns(arms: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = gap(arms, replace(AIR, effects=WORN), monkeypatch)
-    assert (found["policies"], found["measured"], found["episodes"]) == (4, 4, 2)
-    assert found["gap"]["after"]["value"] < 0.1 * found["gap"]["before"]["value"]
-    assert found["correlation"]["after"]["value"] == pytest.approx(1.0)
-    assert [row["name"] for row in found["rows"]] == [f"lift_{k}" for k in range(4)]
-    assert all(row["real"]["low"] <= row["real"]["value"] <= row["real"]["high"] for row in found["rows"])
-    assert found["caveats"] == []
+    comparison = gap(arms, replace(AIR, effects=WORN), monkeypatch)
+    assert (comparison["policies"], comparison["measured"], comparison["episodes"]) == (4, 4, 2)
+    assert comparison["gap"]["after"]["value"] < 0.1 * comparison["gap"]["before"]["value"]
+    assert comparison["correlation"]["after"]["value"] == pytest.approx(1.0)
+    assert [row["name"] for row in comparison["rows"]] == [f"lift_{k}" for k in range(4)]
+    assert all(row["real"]["low"] <= row["real"]["value"] <= row["real"]["high"] for row in comparison["rows"])
+    assert comparison["caveats"] == []
 
 
 def test_both_simulators_play_the_same_seeds(arms: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = gap(arms, AIR, monkeypatch, named=False)
-    assert all(row["sim"] == row["diagnosed"] for row in found["rows"])
-    assert found["gap"]["before"] == found["gap"]["after"]
-    assert found["simulator"] == "calibrated" and "names no cause" in found["caveats"][0]
+    comparison = gap(arms, AIR, monkeypatch, named=False)
+    assert all(row["sim"] == row["diagnosed"] for row in comparison["rows"])
+    assert comparison["gap"]["before"] == comparison["gap"]["after"]
+    assert comparison["simulator"] == "calibrated" and "names no cause" in comparison["caveats"][0]
 
 
 def test_fresh_episodes_are_the_real_ones_where_there_are_any(arms: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,19 +114,19 @@ def test_episodes_begin_as_the_real_ones_did(arms: Path, monkeypatch: pytest.Mon
 def test_of_many_policies_some_are_taken_that_are_spread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     evaluated(tmp_path, 15, "task.duration=0.1")
     monkeypatch.chdir(tmp_path)
-    found = real_returns("arm", AIR)
-    assert (len(found.policies), found.total) == (MOST, 15)
-    assert (found.policies[0].name, found.policies[-1].name) == ("lift_0", "lift_14")
-    told = policy_gap(found, AIR, AIR, named=True, effort=Effort(1, 1, 1), console=QUIET)
-    assert told["caveats"][0] == "15 policies were measured; these 12 are spread over the list."
-    assert told["rows"][0]["sim"]["low"] is None  # one episode has no interval
+    returns = real_returns("arm", AIR)
+    assert (len(returns.policies), returns.total) == (MOST, 15)
+    assert (returns.policies[0].name, returns.policies[-1].name) == ("lift_0", "lift_14")
+    comparison = policy_gap(returns, AIR, AIR, named=True, effort=Effort(1, 1, 1), console=QUIET)
+    assert comparison["caveats"][0] == "15 policies were measured; these 12 are spread over the list."
+    assert comparison["rows"][0]["sim"]["low"] is None  # one episode has no interval
 
 
 def test_two_policies_have_no_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     evaluated(tmp_path, 2, "task.duration=0.1")
-    found = gap(tmp_path, AIR, monkeypatch)
-    assert found["correlation"] == {"before": None, "after": None} and found["gap"]["before"]["value"] >= 0.0
-    assert "3 policies are the least for a rank correlation." in found["caveats"]
+    comparison = gap(tmp_path, AIR, monkeypatch)
+    assert comparison["correlation"] == {"before": None, "after": None} and comparison["gap"]["before"]["value"] >= 0.0
+    assert "3 policies are the least for a rank correlation." in comparison["caveats"]
 
 
 def test_an_iterate_stands_for_its_evaluations(arms: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -134,11 +134,11 @@ def test_an_iterate_stands_for_its_evaluations(arms: Path, tmp_path: Path, monke
     done("iterate", "name=whole", "grounding=gat", *sizes, folder=tmp_path)
     monkeypatch.chdir(tmp_path)
     assert [path.name for path in list_parents("whole").values()] == ["iterate", "evaluate", "optimize"]
-    assert [one.name for one in real_returns("whole", AIR).policies] == list(NAMES)
+    assert [policy.name for policy in real_returns("whole", AIR).policies] == list(NAMES)
     done("iterate", "name=twice", "iterations=2", "grounding=gat", *sizes, folder=tmp_path)
-    found = real_returns("twice", AIR).policies  # the second begins with what the first has returned
+    policies = real_returns("twice", AIR).policies  # the second begins with what the first has returned
     first, second = ([f"iteration_0{k}/{name}" for name in names] for k, names in ((1, NAMES), (2, NAMES[1:])))
-    assert [one.name for one in found] == [*first, *second]
+    assert [entry.name for entry in policies] == [*first, *second]
 
 
 @pytest.mark.parametrize(("episodes", "stopped"), [(2, False), (1, True)])
@@ -153,22 +153,22 @@ def test_a_policy_that_fell_in_all_its_episodes_was_not_stopped(
     row = next(row for row in table["policies"] if row["name"] not in chosen)
     row |= {"falls": 1, "episodes": episodes, "values": row["values"][:episodes]}  # of 2
     path.write_text(json.dumps(table))
-    assert {one.name: one.stopped for one in real_returns("arm", AIR).policies}[row["name"]] == stopped
+    assert {policy.name: policy.stopped for policy in real_returns("arm", AIR).policies}[row["name"]] == stopped
 
 
 def test_a_policy_that_was_stopped_at_its_fall_is_told_apart(arms: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(arms)
     whole = real_returns("arm", AIR)
     fallen = whole.policies[1]._replace(values=np.array([0.3, 0.0]), falls=1, stopped=True)
-    found = policy_gap(
+    comparison = policy_gap(
         replace(whole, policies=(whole.policies[0], fallen, *whole.policies[2:])), AIR, replace(AIR, effects=WORN),
         named=True, effort=Effort(1, 1, 1), console=QUIET,
     )  # fmt: skip
-    assert found["rows"][1]["real"] == {"value": 0.15, "low": None, "high": None, "falls": 1, "episodes": 2}
-    assert found["never_stopped"]["policies"] == 3
-    assert found["never_stopped"]["gap"]["after"]["value"] < found["gap"]["after"]["value"]
-    assert found["caveats"][0].startswith("1 policy was stopped at the first fall in real")
-    assert "rank correlations" in found["caveats"][0]
+    assert comparison["rows"][1]["real"] == {"value": 0.15, "low": None, "high": None, "falls": 1, "episodes": 2}
+    assert comparison["never_stopped"]["policies"] == 3
+    assert comparison["never_stopped"]["gap"]["after"]["value"] < comparison["gap"]["after"]["value"]
+    assert comparison["caveats"][0].startswith("1 policy was stopped at the first fall in real")
+    assert "rank correlations" in comparison["caveats"][0]
 
 
 # --- the command
@@ -201,13 +201,13 @@ def test_the_diagnosis_tells_of_policies(arms: Path) -> None:
     assert "runs/told/diagnose: was built otherwise (changed: the data of policies" in line
 
 
-def _played_as_written(found: Mapping[str, Any], world: Mapping[str, Any]) -> None:
+def _played_as_written(comparison: Mapping[str, Any], world: Mapping[str, Any]) -> None:
     """The second simulator is the one in the written file, held in the air as the real one was."""
-    second = replace(rebuilt(world), floating=False, settle=0.1, start_noise=0.02)
+    second = replace(restore(world), floating=False, settle=0.1, start_noise=0.02)
     scenario = Scenario(second, TASK, REACH, "real", NoGrounding())
     jobs = [Job(lifting(4)[0], derive_seed(1, "policy_gap", "lift_0", number)) for number in range(2)]
-    values = [one.value for one in episodes(scenario, jobs, workers=1, progress=_Silent())]
-    assert found["rows"][0]["diagnosed"]["value"] == pytest.approx(np.mean(values), rel=1e-12)
+    values = [episode.value for episode in episodes(scenario, jobs, workers=1, progress=_Silent())]
+    assert comparison["rows"][0]["diagnosed"]["value"] == pytest.approx(np.mean(values), rel=1e-12)
 
 
 class _Silent:
@@ -224,8 +224,8 @@ class _Silent:
     ],
 )
 def test_what_holds_no_real_returns_is_refused(reference: str, line: str, arms: Path) -> None:
-    given = ("real=log", f"policies={reference}", "out=runs/refused")
-    assert refused("diagnose", *given, folder=arms).startswith(line)
+    settings = ("real=log", f"policies={reference}", "out=runs/refused")
+    assert refused("diagnose", *settings, folder=arms).startswith(line)
 
 
 def rewritten(folder: Path, name: str, change: tuple[str, str]) -> None:
@@ -279,20 +279,20 @@ def test_policies_that_have_changed_or_gone_since_are_refused(arms: Path) -> Non
 
 def test_a_component_comes_back_from_its_description() -> None:
     for thing in (TASK, REACH, AIR):
-        assert rebuilt(describe(thing)) == thing
-        assert rebuilt(yaml.safe_load(yaml.safe_dump(describe(thing)))) == thing
+        assert restore(describe(thing)) == thing
+        assert restore(yaml.safe_load(yaml.safe_dump(describe(thing)))) == thing
     with pytest.raises(ConfigError, match=r"task\.duration = -1"):
-        rebuilt({"_target_": "gsl.tasks.arm.Arm", "duration": -1}, where="task")
+        restore({"_target_": "gsl.tasks.arm.Arm", "duration": -1}, where="task")
     for name in ("os.system", "gsl.tasks.arm.math", "gsl.tasks.arm.Nothing", "gsl.tasks.arm.Mapping"):
         with pytest.raises(ConfigError, match="_target_"):
-            rebuilt({"_target_": name})
+            restore({"_target_": name})
 
 
 def test_a_bootstrap_interval_holds_its_statistic_and_leaves_out_what_is_none() -> None:
     values = np.array([1.0, 2.0, 3.0, 4.0])
     rng = np.random.default_rng(0)
-    found = bootstrap_interval(lambda chosen: float(values[chosen].mean()), 4, rng)
-    assert found.mean == 2.5 and 1.0 < found.lower < 2.5 < found.upper < 4.0
+    interval = bootstrap_interval(lambda chosen: float(values[chosen].mean()), 4, rng)
+    assert interval.mean == 2.5 and 1.0 < interval.lower < 2.5 < interval.upper < 4.0
     order = bootstrap_interval(lambda chosen: rank_correlation(values[chosen], values[chosen]), 4, rng)
     assert order == pytest.approx((1.0, 1.0, 1.0))  # draws of one value four times over have no order
     assert np.isnan(rank_correlation(values, np.ones(4)))

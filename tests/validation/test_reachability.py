@@ -62,7 +62,7 @@ def test_a_simulator_can_do_what_it_does_and_what_no_servo_can_is_told_joint_by_
     bare.close()
     assert (missed < FLOOR + TOLERANCE * np.sqrt(np.mean(np.square(own), axis=0))).mean() > 0.97
     assert impossible.unreached[KNEE] == 1.0
-    assert "most often in LKneePitch (100 %)" in impossible.told
+    assert "most often in LKneePitch (100 %)" in impossible.sentence
     assert impossible.metrics()["by_joint"]["LKneePitch"] == 1.0
 
 
@@ -74,10 +74,10 @@ def test_a_long_past_is_asked_about_where_there_is_one() -> None:
     weight = np.zeros((n, history.size(n)))
     f = ForwardModel(Network([(weight, np.zeros(n))]), history, JOINTS)
     bare = SIM.make()
-    found = ask_reachability(bare, LoadedTransformation(f, Solver(f, np.eye(n), 1e-9)), [walk], 1)
+    report = ask_reachability(bare, LoadedTransformation(f, Solver(f, np.eye(n), 1e-9)), [walk], 1)
     none = ask_reachability(bare, LoadedTransformation(f, Solver(f, np.eye(n), 1e-9)), [_begun(walk, 25)], 1)
     bare.close()
-    assert found is not None and found.steps == len(range(20, len(walk) - 9, 15)) and none is None
+    assert report is not None and report.steps == len(range(20, len(walk) - 9, 15)) and none is None
 
 
 def test_joints_that_the_models_do_not_know_are_not_asked_about() -> None:
@@ -87,9 +87,9 @@ def test_joints_that_the_models_do_not_know_are_not_asked_about() -> None:
     starts, bare = places([walk], SIM.layout, 4), SIM.make()
     history, knees = History(0), ("LKneePitch", "RKneePitch")
     f = ForwardModel(Network([(np.zeros((2, history.size(2))), np.array([0.8, 0.0]))]), history, knees)
-    found = reachability(bare, LoadedTransformation(f, Solver(f, np.eye(2), 0.1)), starts, 1)
+    report = reachability(bare, LoadedTransformation(f, Solver(f, np.eye(2), 0.1)), starts, 1)
     bare.close()
-    assert found.joints == knees and found.unreached[0] == 1.0 > found.unreached[1]
+    assert report.joints == knees and report.unreached[0] == 1.0 > report.unreached[1]
 
 
 def test_what_a_robot_was_told_at_rest_is_known_before_a_large_step_and_before_a_small_one() -> None:
@@ -109,9 +109,9 @@ def test_a_region_holds_its_own_kind_and_little_else() -> None:
     def samples(count: int) -> np.ndarray:
         return rng.normal(size=(count, 6)) @ mix.T + 3.0
 
-    known = region(samples(2000), samples(2000))
-    assert known.outside(samples(4000)) == pytest.approx(1.0 - INSIDE, abs=0.006)
-    assert known.outside(samples(100) + 20.0) == 1.0
+    ellipsoid = region(samples(2000), samples(2000))
+    assert ellipsoid.outside(samples(4000)) == pytest.approx(1.0 - INSIDE, abs=0.006)
+    assert ellipsoid.outside(samples(100) + 20.0) == 1.0
     still = region(samples(2000) * [0, 1, 1, 1, 1, 1], samples(2000) * [0, 1, 1, 1, 1, 1])
     assert still.outside(samples(4000) * [0, 1, 1, 1, 1, 1] + [1e-6, 0, 0, 0, 0, 0]) < 0.02
 

@@ -121,7 +121,7 @@ def test_an_iteration_whose_grounding_is_refused_leaves_what_the_one_before_foun
     assert "| 2 | grounding refused |  |  |  |  |  | 6 |" in table
     assert "The grounding of iteration 2 was refused: " in table and refused in table
     places = [home / "runs/chain" / name for name in ("iterate", "iteration_01/evaluate")]
-    one, other = ((place / "policies.json").read_text() for place in places)
-    assert one == other and not (home / "runs/chain/iteration_02/optimize").exists()
+    first, second = ((place / "policies.json").read_text() for place in places)
+    assert first == second and not (home / "runs/chain/iteration_02/optimize").exists()
     assert "(unchanged)" in done(*line, folder=home).out
     assert refused in gsl(*line, "grounding.wrong=0", "name=other", folder=home).lines[-1]

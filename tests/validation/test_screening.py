@@ -27,10 +27,12 @@ def test_what_stands_walks_to_the_end_and_what_falls_at_once_walks_no_more() -> 
     bad = good.copy()
     bad[names.index("max_forward")] *= 6.0
     scenario = plain_walk(duration=2.0)
-    found = [screen(scenario, {"good": good, "bad": bad}, 6, 1, workers=workers, console=QUIET) for workers in (1, 2)]
-    assert found[0] == found[1]
-    assert found[0]["good"] == Screened(0, 6)
-    assert found[0]["bad"].falls > 0 and found[0]["bad"].episodes == FIRST
+    screenings = [
+        screen(scenario, {"good": good, "bad": bad}, 6, 1, workers=workers, console=QUIET) for workers in (1, 2)
+    ]
+    assert screenings[0] == screenings[1]
+    assert screenings[0]["good"] == Screened(0, 6)
+    assert screenings[0]["bad"].falls > 0 and screenings[0]["bad"].episodes == FIRST
 
 
 def test_policies_that_never_fell_pass_or_the_one_that_fell_least() -> None:

@@ -152,18 +152,18 @@ def test_pushes_act_as_in_bullet() -> None:
 
 def test_windows_do_not_know_of_each_other() -> None:
     targets, held = sweep(NAO, 60), Held.of(nominal(NAO), STEP, PERIOD)
-    one, other = window(targets[:30]), window(targets[30:])
-    both = Windows(*(np.concatenate(pair) for pair in zip(one, other, strict=True)))
-    np.testing.assert_array_equal(held.replay(both), np.concatenate([held.replay(one), held.replay(other)]))
+    first, second = window(targets[:30]), window(targets[30:])
+    both = Windows(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
+    np.testing.assert_array_equal(held.replay(both), np.concatenate([held.replay(first), held.replay(second)]))
 
 
 def test_what_diverges_is_not_a_number_and_disturbs_no_other_window() -> None:
     n, calm = len(NAO.motors), window(sweep(NAO, 50))
     held = Held.of(nominal(NAO), STEP, PERIOD)
     wild = Windows(calm.commands, np.stack([calm.motion[:, 0], np.full((1, n), 900.0)], axis=1), calm.clock)
-    told = held.replay(Windows(*(np.concatenate(three) for three in zip(calm, wild, calm, strict=True))))
-    assert np.isnan(told[1]).any() and (np.diff(np.isnan(told[1]).astype(int), axis=0) >= 0).all()
-    np.testing.assert_array_equal(told[[0, 2]], np.repeat(held.replay(calm), 2, axis=0))
+    replays = held.replay(Windows(*(np.concatenate(three) for three in zip(calm, wild, calm, strict=True))))
+    assert np.isnan(replays[1]).any() and (np.diff(np.isnan(replays[1]).astype(int), axis=0) >= 0).all()
+    np.testing.assert_array_equal(replays[[0, 2]], np.repeat(held.replay(calm), 2, axis=0))
 
 
 @pytest.mark.parametrize("learned", [False, True])
@@ -176,47 +176,47 @@ def test_lanes_have_the_bits_of_one_robot_alone(count: int, beside: bool, learne
         plant = lawful(plant, some_law(plant))
     many = [window(sweep(NAO, 20) + 0.1 * rng.standard_normal(n)) for _ in range(count)]
     if beside:
-        many = [with_beside(one, 0.1 * rng.standard_normal((*one.commands.shape[:2], 2 * n))) for one in many]
+        many = [with_beside(log, 0.1 * rng.standard_normal((*log.commands.shape[:2], 2 * n))) for log in many]
     held = Held.of(plant, STEP, PERIOD)
-    told = held.replay(Windows(*(np.concatenate(parts) for parts in zip(*many, strict=True))))
-    np.testing.assert_array_equal(told, [alone(held, one) for one in many])
+    replays = held.replay(Windows(*(np.concatenate(parts) for parts in zip(*many, strict=True))))
+    np.testing.assert_array_equal(replays, [alone(held, windows) for windows in many])
 
 
-def with_beside(one: Windows, others: np.ndarray) -> Windows:
+def with_beside(windows: Windows, others: np.ndarray) -> Windows:
     """The window with desired speeds and feed-forward torques beside its targets."""
-    return one._replace(commands=np.concatenate([one.commands, others], axis=2))
+    return windows._replace(commands=np.concatenate([windows.commands, others], axis=2))
 
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_commands_of_zero_beside_the_targets_change_no_bit(learned: bool) -> None:
-    plant, one = with_fields(NAO, EVERYTHING), window(sweep(NAO, 30))
+    plant, log = with_fields(NAO, EVERYTHING), window(sweep(NAO, 30))
     plant = lawful(plant, some_law(plant)) if learned else plant
-    zero = with_beside(one, np.zeros((*one.commands.shape[:2], 2 * len(NAO.motors))))
+    zero = with_beside(log, np.zeros((*log.commands.shape[:2], 2 * len(NAO.motors))))
     for accurate in (False, True):
         held = Held.of(plant, STEP, PERIOD, accurate)
-        assert held.replay(zero).tobytes() == held.replay(one).tobytes()
-    assert alone(held, zero).tobytes() == alone(held, one).tobytes()
+        assert held.replay(zero).tobytes() == held.replay(log).tobytes()
+    assert alone(held, zero).tobytes() == alone(held, log).tobytes()
 
 
-def alone(held: Held, one: Windows) -> np.ndarray:
-    n, motion, told = len(held.bias), one.motion[0].copy(), []
+def alone(held: Held, windows: Windows) -> np.ndarray:
+    n, motion, positions = len(held.bias), windows.motion[0].copy(), []
     state, encoders, torque = (
-        first_state(one.commands[0, one.length :], motion, STEP),
+        first_state(windows.commands[0, windows.length :], motion, STEP),
         np.empty_like(motion),
         np.empty(n),
     )
     work, matrix, substeps = np.zeros((n, COLUMNS)), np.zeros((n, n)), round(PERIOD / STEP)
-    for t in range(one.length):
-        state.commands[:] = one.commands[0, one.length - 1 - t :][:COMMANDS]
+    for t in range(windows.length):
+        state.commands[:] = windows.commands[0, windows.length - 1 - t :][:COMMANDS]
         for k in range(substeps):
             servo_torque(held.servo, state, motion, k * STEP, STEP, substeps * STEP, torque)
             accelerate(held.tree, motion, nothing(), torque, work, matrix)
             motion[1] += STEP * torque
             motion[0] += STEP * motion[1]
         encoder_motion(held.servo, state, motion, STEP, encoders)
-        told.append(encoders[0].copy())
+        positions.append(encoders[0].copy())
         state.clock[0] += substeps * STEP
-    return np.array(told)
+    return np.array(positions)
 
 
 def test_what_diverges_is_not_a_number() -> None:

@@ -17,7 +17,7 @@ from gsl.grounding.states import TableTransformation
 from gsl.models.counts import Counts, count_transitions
 from gsl.worlds.cliff_walking import CliffWalking
 from gsl.worlds.gymnasium import GymnasiumWorld
-from gsl_experiments.table_episodes import played
+from gsl_experiments.table_episodes import play
 
 pytestmark = pytest.mark.slow
 
@@ -37,9 +37,9 @@ def the_cliff(noise: float = 0.0) -> Table:
 @pytest.mark.parametrize("noise", EDGE)
 def test_exact_values_are_those_that_were_measured_beforehand(noise: float) -> None:
     real = the_cliff(noise)
-    along_the_edge = the_cliff().solved(np.full(48, DOWN))
+    along_the_edge = the_cliff().solve(np.full(48, DOWN))
     assert real.value(along_the_edge) == pytest.approx(EDGE[noise], abs=0.01)
-    assert real.value(real.solved(along_the_edge)) == pytest.approx(BEST[noise], abs=0.01)
+    assert real.value(real.solve(along_the_edge)) == pytest.approx(BEST[noise], abs=0.01)
 
 
 def test_the_environment_moves_as_its_table_says() -> None:
@@ -61,10 +61,10 @@ def test_the_environment_moves_as_its_table_says() -> None:
 
 def test_episodes_of_a_table_return_what_it_is_worth() -> None:
     real = the_cliff(0.3)
-    policy = real.solved(np.full(48, DOWN))
-    found = played(real, policy, 20_000, np.random.default_rng(1))
-    assert found.returns.mean() == pytest.approx(real.value(policy), abs=0.6)
-    assert not found.seen[real.terminal].any()
+    policy = real.solve(np.full(48, DOWN))
+    episodes = play(real, policy, 20_000, np.random.default_rng(1))
+    assert episodes.returns.mean() == pytest.approx(real.value(policy), abs=0.6)
+    assert not episodes.seen[real.terminal].any()
 
 
 def test_noise_of_the_world_is_in_its_table() -> None:
@@ -75,13 +75,13 @@ def test_noise_of_the_world_is_in_its_table() -> None:
 
 def test_policy_iteration_keeps_its_action_among_equals() -> None:
     flat = Table(np.full((3, 2, 3), 1 / 3), np.zeros((3, 2, 3)), np.array([False, False, True]), np.eye(3)[0])
-    np.testing.assert_array_equal(flat.solved(np.array([1, 0, 0])), [1, 0, 0])
+    np.testing.assert_array_equal(flat.solve(np.array([1, 0, 0])), [1, 0, 0])
 
 
 def test_a_stochastic_grounding_of_perfect_models_is_the_real_world() -> None:
     sim, real = the_cliff(), the_cliff(0.5)
     grounding = TableTransformation(Counts(real.chances), Counts(sim.chances), draws=True)
-    made = grounding.grounded(sim)
+    made = grounding.ground(sim)
     inside = ~real.terminal
     np.testing.assert_allclose(made.chances[inside], real.chances[inside], atol=1e-12)
     np.testing.assert_allclose(made.rewards[inside], real.rewards[inside], atol=1e-12)
@@ -89,22 +89,22 @@ def test_a_stochastic_grounding_of_perfect_models_is_the_real_world() -> None:
 
 def test_a_deterministic_grounding_hides_the_noise() -> None:
     sim, real = the_cliff(), the_cliff(0.5)
-    made = TableTransformation(Counts(real.chances), Counts(sim.chances)).grounded(sim)
+    made = TableTransformation(Counts(real.chances), Counts(sim.chances)).ground(sim)
     np.testing.assert_allclose(made.chances[~real.terminal], sim.chances[~real.terminal])
 
 
 @pytest.mark.parametrize(("state", "line"), [(48.0, "state 48 is not one of the 48"), (0.5, "state 0.5 is not one")])
 def test_numbers_that_are_no_states_are_refused(state: float, line: str) -> None:
     states, nothing = np.array([[36.0], [state]]), np.zeros((2, 0))
-    one = Trajectory(np.arange(2.0), np.zeros((1, 1)), nothing, nothing, state=states)
+    episode = Trajectory(np.arange(2.0), np.zeros((1, 1)), nothing, nothing, state=states)
     with pytest.raises(InputError, match=line):
-        count_transitions([one], 48, 4)
+        count_transitions([episode], 48, 4)
 
 
 def test_what_was_never_seen_is_left_alone() -> None:
     sim = the_cliff()
     nothing = TableTransformation(Counts(np.zeros((48, 4, 48))), Counts(sim.chances), draws=True)
-    np.testing.assert_array_equal(nothing.sent, np.broadcast_to(np.eye(4), (48, 4, 4)))
+    np.testing.assert_array_equal(nothing.chances, np.broadcast_to(np.eye(4), (48, 4, 4)))
 
 
 def a_toy() -> tuple[Table, Table]:
@@ -125,10 +125,10 @@ def test_in_the_toy_gat_misses_the_real_optimum_and_sgat_finds_it() -> None:
     sim, real = a_toy()
     forward, inverse = Counts(real.chances), Counts(sim.chances)
     grounded = {
-        draws: TableTransformation(forward, inverse, draws).grounded(sim).solved(np.zeros(4, dtype=int))[0]
+        draws: TableTransformation(forward, inverse, draws).ground(sim).solve(np.zeros(4, dtype=int))[0]
         for draws in (False, True)
     }
-    optima = [world.solved(np.zeros(4, dtype=int))[0] for world in (sim, real)]
+    optima = [world.solve(np.zeros(4, dtype=int))[0] for world in (sim, real)]
     assert optima == [2, 1], "a3 is the optimum of the simulator, a2 of the real world"
     assert grounded == {False: 0, True: 1}, "GAT takes a1, whose likeliest end is the best one; SGAT takes a2"
 
@@ -137,10 +137,10 @@ def test_figure_11_is_one_command(tmp_path: Path) -> None:
     said = done("reproduce", "fig11", "preset=toy", "trials=2", "noises=[0.0,0.5]", folder=tmp_path)
     folder = tmp_path / "runs/fig11/reproduce"
     points = json.loads((folder / "points.json").read_text())
-    values = {(one["method"], one["noise"]): one["value"] for one in points}
+    values = {(point["method"], point["noise"]): point["value"] for point in points}
     assert values["sgat", 0.5] > 0.9 * BEST[0.5] > values["gat", 0.5]
     assert values["gat", 0.0] == values["sgat", 0.0] == pytest.approx(EDGE[0.0])
-    assert all(abs(one["estimate"] - one["value"]) < 3.0 for one in points)
+    assert all(abs(point["estimate"] - point["value"]) < 3.0 for point in points)
     assert (folder / "figure_11.png").stat().st_size > 10_000
     assert "real optimum" in said.out
 
@@ -159,6 +159,6 @@ def test_the_chain_of_stages_grounds_the_cliff(tmp_path: Path) -> None:
     few = (*few, "recipe.real_action_noise=0")  # π0 is checked with the noise of its real episodes
     done("iterate", "experiment=cliff_walking", "preset=toy", *few, "name=c", folder=tmp_path)
     report = json.loads((tmp_path / "runs/c/iteration_01/optimize/grounding.json").read_text())
-    values = {name: np.mean(one["values"]) for name, one in report["pi0"].items()}
+    values = {name: np.mean(figures["values"]) for name, figures in report["pi0"].items()}
     assert values["ungrounded"] == pytest.approx(98.7)
     assert values["grounded"] < 80.0

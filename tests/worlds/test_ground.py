@@ -88,11 +88,11 @@ def test_a_seed_starts_alike_on_every_ground() -> None:
 def test_every_episode_has_another_surface(rough: BulletEnv) -> None:
     points = np.array([[0.5, 0.2], [1.0, -0.7], [-0.6, 1.3]])
     rough.reset(seed=0)
-    found = [heights_in_bullet(rough, points)]
+    surfaces = [heights_in_bullet(rough, points)]
     for _ in range(3):
         rough.reset()
-        found.append(heights_in_bullet(rough, points))
-    assert (np.std(found, axis=0) > 1e-4).all()
+        surfaces.append(heights_in_bullet(rough, points))
+    assert (np.std(surfaces, axis=0) > 1e-4).all()
 
 
 @pytest.mark.parametrize("spacing", [0.05, 0.1, 0.2])
@@ -112,8 +112,8 @@ def test_standing_on_bumps_is_quiet_and_the_feet_carry_the_weight(spacing: float
         engine.run(targets)
         readings.append(engine.read())
     engine.close()
-    assert np.mean([sum(one.foot_force) for one in readings]) == pytest.approx(nao().mass * 9.81, rel=0.02)
-    assert np.ptp([one.place[2] for one in readings]) < 1e-4
+    assert np.mean([sum(reading.foot_force) for reading in readings]) == pytest.approx(nao().mass * 9.81, rel=0.02)
+    assert np.ptp([reading.place[2] for reading in readings]) < 1e-4
     low, high = start.reading.place[2] - 1e-3, place[2] + 1e-3
     assert low < readings[-1].place[2] < high
 

@@ -49,8 +49,8 @@ def test_the_same_seed_gives_the_same_bytes_whatever_came_before(grounding: obje
     first = run(env, 1)
     run(env, 2, ACTIONS[:3])
     again, fresh = run(env, 1), run(GroundedEnv(ToyEnv(QUICK), grounding), 1)  # type: ignore[arg-type]
-    for one in (again, fresh):
-        assert [part.tobytes() for part in one] == [part.tobytes() for part in first]
+    for walk in (again, fresh):
+        assert [part.tobytes() for part in walk] == [part.tobytes() for part in first]
 
 
 def test_another_seed_gives_other_noise() -> None:

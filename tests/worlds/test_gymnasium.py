@@ -126,10 +126,10 @@ def episodes(world: GymnasiumWorld, count: int, sd: float = 0.0, role: str = "si
     noise = RandomChoice(sd) if world.layout.choices else ActionNoise(sd=sd)
     scenario = Scenario(world, OwnReward(), policy, role, noise)
     env = scenario.make()
-    found = tuple(rollout(scenario, env, policy.initial, derive_seed(1, role, k)) for k in range(count))
+    trajectories = tuple(rollout(scenario, env, policy.initial, derive_seed(1, role, k)) for k in range(count))
     layout = world.layout
     about = {"robot": world.env_id, "role": role, "cells": layout.cells, "choices": layout.choices}
-    return Batch(found, layout.joints, layout.control_period, about)
+    return Batch(trajectories, layout.joints, layout.control_period, about)
 
 
 def test_actions_are_scaled_and_states_are_vectors() -> None:
@@ -157,12 +157,12 @@ def test_noise_is_drawn_from_the_seed_of_the_episode() -> None:
 def test_a_batch_of_states_makes_the_trip_through_its_file(tmp_path: Path) -> None:
     batch = episodes(CART, 3, 0.2)
     write(tmp_path / "log.parquet", batch)
-    found = read(tmp_path / "log.parquet")
-    assert found.states == 2
-    for one, other in zip(found.episodes, batch.episodes, strict=True):
-        np.testing.assert_array_equal(one.state, other.state)
-        np.testing.assert_array_equal(one.grounded_action, other.grounded_action)
-        np.testing.assert_array_equal(one.sensors["terminated"], other.sensors["terminated"])
+    log = read(tmp_path / "log.parquet")
+    assert log.states == 2
+    for episode, other in zip(log.episodes, batch.episodes, strict=True):
+        np.testing.assert_array_equal(episode.state, other.state)
+        np.testing.assert_array_equal(episode.grounded_action, other.grounded_action)
+        np.testing.assert_array_equal(episode.sensors["terminated"], other.sensors["terminated"])
     import pyarrow.parquet as pq
 
     columns = pq.read_table(tmp_path / "log.parquet").to_pydict()
@@ -198,13 +198,13 @@ def test_noise_on_actions_is_not_the_environments_own() -> None:
 def test_choices_of_a_noisy_world_are_replaced_now_and_then() -> None:
     env = replace(POLE, action_noise=0.5).make()
     env.reset(seed=1)
-    told = []
+    sent = []
     for _ in range(400):
         _, _, ended, _, info = env.step(np.array([1.0]))
-        told.append(info["carried_out"][0])
+        sent.append(info["carried_out"][0])
         if ended:
-            env.reset(seed=len(told))
-    assert 0.15 < np.mean(np.array(told) == 0.0) < 0.35
+            env.reset(seed=len(sent))
+    assert 0.15 < np.mean(np.array(sent) == 0.0) < 0.35
 
 
 def test_the_reward_charges_for_the_action_of_the_agent() -> None:
@@ -230,12 +230,12 @@ def test_the_reward_charges_for_the_action_of_the_agent() -> None:
 def test_a_price_in_the_actuators_own_units_is_charged_in_them() -> None:
     low, high = np.array([0.0, -4.0]), np.array([2.0, 4.0])
     raw = {"sent": np.array([1.5, 1.0]), "agent": np.array([0.5, -2.0])}
-    sent, agent = ((2.0 * one - high - low) / (high - low) for one in raw.values())
-    price = {name: -0.3 * float(one @ one) for name, one in raw.items()}
-    told = Charged(None, low, high).corrected(
+    sent, agent = ((2.0 * action - high - low) / (high - low) for action in raw.values())
+    price = {name: -0.3 * float(action @ action) for name, action in raw.items()}
+    reward = Charged(None, low, high).correct(
         7.0 + price["sent"], agent, sent, {"carried_out": sent, "reward_ctrl": price["sent"]}
     )
-    assert told == pytest.approx(7.0 + price["agent"])
+    assert reward == pytest.approx(7.0 + price["agent"])
 
 
 def test_noise_of_the_world_is_not_charged() -> None:
@@ -308,7 +308,7 @@ def test_a_stochastic_grounding_makes_the_noise_of_the_real_world(tmp_path: Path
         scenario = Scenario(world, OwnReward(), a_policy(CART), "sim", grounding)
         env = scenario.make()
         ends = [rollout(scenario, env, np.array([-1.0, -1.0, 0.0]), k) for k in range(60)]
-        spread.append(np.std([one.state[60, 1] for one in ends if one.state is not None]))
+        spread.append(np.std([episode.state[60, 1] for episode in ends if episode.state is not None]))
     real, stochastic, plain = spread
     assert 0.6 * real < stochastic < 1.6 * real
     assert plain < 0.3 * real
@@ -334,8 +334,8 @@ def test_choices_are_grounded_by_the_nearest_effect(tmp_path: Path) -> None:
     assert isinstance(f_inv, NearestChoice)
     states = np.random.default_rng(0).normal(size=(200, 4)) * [0.1, 0.3, 0.05, 0.3]
     actions = np.random.default_rng(1).integers(2, size=(200, 1)).astype(float)
-    found = f_inv.actions_for(states, f.changes(states, actions))
-    assert (found == actions).mean() > 0.95
+    choices = f_inv.actions_for(states, f.changes(states, actions))
+    assert (choices == actions).mean() > 0.95
 
 
 def test_trpo_learns_and_goes_on_from_what_it_learned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -346,7 +346,7 @@ def test_trpo_learns_and_goes_on_from_what_it_learned(tmp_path: Path, monkeypatc
     trpo = Trpo(steps=8192, generations=2, rollout=1024)
     steps: list[int] = []
     first, second = trpo.learn(simulator, policy, policy.initial, 1, bold=True, advance=steps.append)
-    assert sum(steps) == trpo.taken == 8192
+    assert sum(steps) == trpo.steps_taken == 8192
     assert not list(tmp_path.iterdir())
     scenario = Scenario(CART, OwnReward(), policy, "sim", NoGrounding())
 
@@ -382,7 +382,12 @@ def test_groundings_of_environments_are_compared(tmp_path: Path) -> None:
     collected = (home / "real/data/trial_01/collect_real/config.yaml").read_text()
     assert "initial: runs/e/sim/pretrained/trial_01/best_in_simulation.json" in collected
     trials = json.loads((home / "compare/trials.json").read_text())
-    assert [(one["method"], one["number"]) for one in trials] == [("none", 1), ("gat", 1), ("none", 2), ("gat", 2)]
+    assert [(trial["method"], trial["number"]) for trial in trials] == [
+        ("none", 1),
+        ("gat", 1),
+        ("none", 2),
+        ("gat", 2),
+    ]
     assert trials[0]["start"] == trials[1]["start"]  # the same π0, in the same episodes
     assert "falls" not in said.out and "stable winners" not in said.out
     other = ("+world@worlds.other=gymnasium", "worlds.other.env_id=CartPole-v1")
@@ -403,7 +408,7 @@ def test_the_check_of_pi0_is_with_the_noise_of_the_real_episodes() -> None:
 def test_all_bodies_are_heavier_with_all() -> None:
     pytest.importorskip("mujoco")
     light = GymnasiumWorld(env_id="HalfCheetah-v5")
-    masses = [one.make().unwrapped_env.model.body_mass.sum() for one in (light, replace(light, mass={"all": 2.0}))]
+    masses = [world.make().unwrapped_env.model.body_mass.sum() for world in (light, replace(light, mass={"all": 2.0}))]
     assert masses[1] == pytest.approx(2.0 * masses[0])
 
 
@@ -536,8 +541,8 @@ def test_too_few_episodes_are_refused_before_anything_is_collected(tmp_path: Pat
 
 def test_environments_that_charge_nothing_are_known() -> None:
     pytest.importorskip("mujoco")
-    told = ("InvertedPendulum-v5", "InvertedDoublePendulum-v5", "HalfCheetah-v5", "Pendulum-v1", "examples.cart:Cart")
-    assert [is_uncharged(GymnasiumWorld(env_id=name)) for name in told] == [False, False, False, True, False]
+    names = ("InvertedPendulum-v5", "InvertedDoublePendulum-v5", "HalfCheetah-v5", "Pendulum-v1", "examples.cart:Cart")
+    assert [is_uncharged(GymnasiumWorld(env_id=name)) for name in names] == [False, False, False, True, False]
 
 
 def test_noise_that_may_be_charged_for_is_told_where_a_real_value_is(tmp_path: Path) -> None:
@@ -631,15 +636,15 @@ def test_figure_12_is_one_command(tmp_path: Path) -> None:
     said = done("reproduce", "fig12", "preset=toy", *few, "iterate.budget.episodes=3", *WITHOUT_NOISE, folder=tmp_path)
     folder = tmp_path / "runs/fig12/reproduce"
     points = json.loads((folder / "points.json").read_text())
-    assert [one["method"] for one in points] == ["none", "gat", "sgat", "trained on real"]
-    assert all(one["value"] > 1.0 for one in points)
+    assert [point["method"] for point in points] == ["none", "gat", "sgat", "trained on real"]
+    assert all(point["value"] > 1.0 for point in points)
     assert 0 == points[0]["real_steps"] < points[1]["real_steps"] == points[2]["real_steps"]
     for shared in ("collect_real", "collect_sim", "train_inverse"):
         assert len(list((tmp_path / "runs/fig12").rglob(shared))) == 1
     assert (folder / "figure.png").stat().st_size > 10_000
     assert "trained on real" in said.out
-    known = ("known=runs/fig12/points.json", "name=again", "preset=toy", *few, "iterate.budget.episodes=3")
-    done("reproduce", "fig12", *known, *WITHOUT_NOISE, folder=tmp_path)
+    settings = ("known=runs/fig12/points.json", "name=again", "preset=toy", *few, "iterate.budget.episodes=3")
+    done("reproduce", "fig12", *settings, *WITHOUT_NOISE, folder=tmp_path)
     again = tmp_path / "runs/again/reproduce"
     assert (again / "table.md").read_bytes() == (folder / "table.md").read_bytes()
     assert not list((tmp_path / "runs/again").rglob("trial_01"))
@@ -654,8 +659,10 @@ def test_figure_13_is_one_command(tmp_path: Path) -> None:
     done("reproduce", "fig13", "preset=toy", *few, *left, folder=tmp_path)
     folder = tmp_path / "runs/fig13/reproduce"
     points = json.loads((folder / "points.json").read_text())
-    assert [one["method"] for one in points] == ["none", "gat", "trained on real"]
-    assert all(one["real_steps"] > 0 and np.isfinite(one["promised"]) for one in points if one["method"] != "none")
+    assert [point["method"] for point in points] == ["none", "gat", "trained on real"]
+    assert all(
+        point["real_steps"] > 0 and np.isfinite(point["promised"]) for point in points if point["method"] != "none"
+    )
     table = (folder / "table.md").read_text()
     assert "±" not in table.splitlines()[2] and " -> " in table  # one trial has no standard error
     assert (folder / "figure.png").stat().st_size > 10_000
@@ -675,18 +682,18 @@ def test_rounds_go_on_from_what_the_real_world_chose(tmp_path: Path) -> None:
     runs = tmp_path / "runs/garat"
     points = [Point(**_known(row)) for row in json.loads((runs / "reproduce/points.json").read_text())]
     methods = ["none", "gat", "trained on real"]
-    assert [(one.method, one.round) for one in points] == [*product(methods, (1, 2))]
+    assert [(point.method, point.round) for point in points] == [*product(methods, (1, 2))]
     place = runs / "inverted_pendulum_heavy_0/gat/trial_01"
     first, second = _read(place / "evaluate"), _read(place / "iteration_02/evaluate")
-    _, _, one, two, *_ = points
-    assert one.value == first["returned"]["value"] and two.value == second["returned"]["value"]
+    _, _, first_round, two, *_ = points
+    assert first_round.value == first["returned"]["value"] and two.value == second["returned"]["value"]
     assert second["baseline"]["episodes"] == 3 and second["policies"] == 2
     collected = [runs / "inverted_pendulum_heavy_0/models/trial_01/collect_real", place / "iteration_02/collect_real"]
     steps = [_read(at)["steps"] for at in collected]
-    assert (one.real_steps, two.real_steps) == (steps[0], sum(steps))
-    assert 0 < one.choice_steps < two.choice_steps
-    told = (place / "iteration_02/train_forward/config.yaml").read_text()
-    assert str(collected[0].relative_to(tmp_path)) in told  # aggregate=true
+    assert (first_round.real_steps, two.real_steps) == (steps[0], sum(steps))
+    assert 0 < first_round.choice_steps < two.choice_steps
+    text = (place / "iteration_02/train_forward/config.yaml").read_text()
+    assert str(collected[0].relative_to(tmp_path)) in text  # aggregate=true
     assert str((place / "evaluate").relative_to(tmp_path)) in (place / "iteration_02/optimize/config.yaml").read_text()
     searches = [str(at.parent.relative_to(runs)) for at in runs.rglob("optimize") if "none" in at.parts]
     assert sorted(searches) == ["inverted_pendulum_heavy_0/none/trial_01/iteration_02", "sim/none/trial_01"]
@@ -710,8 +717,8 @@ def test_rounds_are_refused_where_nothing_would_come_of_them(tmp_path: Path) -> 
         ("garat", "~methods.gat", "~methods.sgat"): "iterate.aggregate = true: is for a grounding that learns",
         ("garat", "iterate.budget.tolerated=0.5"): "iterate.budget.check = 1: needs two episodes",
     }.items():
-        told = gsl("reproduce", *asked, folder=tmp_path)
-        assert told.code == 2 and told.lines[-1].startswith(f"gsl reproduce {asked[0]}: {said}")
+        result = gsl("reproduce", *asked, folder=tmp_path)
+        assert result.code == 2 and result.lines[-1].startswith(f"gsl reproduce {asked[0]}: {said}")
     assert not list(tmp_path.iterdir())
 
 
@@ -720,10 +727,10 @@ def test_figure_12_goes_on_with_a_search_instead(tmp_path: Path) -> None:
     pytest.importorskip("sb3_contrib")
     few = ("trials=1", "noises=[0.3]", "workers=1", "iterate.budget.real_episodes=6", "iterate.budget.sim_episodes=8")
     search = ("optimizer@further=cma_es", "further.candidates=4", "further.generations=1", "iterate.budget.rollouts=2")
-    one = (*WITHOUT_NOISE, "~methods.gat", "iterate.policy.hidden=[]", "iterate.budget.episodes=3")
-    said = done("reproduce", "fig12", "preset=toy", *few, *search, *one, folder=tmp_path)
+    settings = (*WITHOUT_NOISE, "~methods.gat", "iterate.policy.hidden=[]", "iterate.budget.episodes=3")
+    said = done("reproduce", "fig12", "preset=toy", *few, *search, *settings, folder=tmp_path)
     points = json.loads((tmp_path / "runs/fig12/reproduce/points.json").read_text())
-    assert [one["real_steps"] is None for one in points] == [False, False, True]
+    assert [point["real_steps"] is None for point in points] == [False, False, True]
     assert "the reference learned from 8 episodes" in (tmp_path / "runs/fig12/reproduce/table.md").read_text()
     assert "trained on real" in said.out
 
@@ -770,8 +777,8 @@ def test_what_is_wrong_in_one_of_two_worlds_is_told_by_its_name(tmp_path: Path) 
 
 
 def test_help_is_of_the_world_that_is_typed(tmp_path: Path) -> None:
-    told = done("iterate", "experiment=gymnasium", "--help", folder=tmp_path).out
-    assert "env_id" in told and "gymnasium*" in told
+    output = done("iterate", "experiment=gymnasium", "--help", folder=tmp_path).out
+    assert "env_id" in output and "gymnasium*" in output
     assert "env_id" not in done("iterate", "--help", "real.no_such=1", folder=tmp_path).out
 
 
@@ -789,12 +796,12 @@ def test_help_is_of_the_world_that_is_typed(tmp_path: Path) -> None:
 def test_a_check_says_whether_a_grounding_is_nearer(real: list[float], grounded: float, line: str) -> None:
     around = np.linspace(-1.0, 1.0, 5)
     values = {"real": np.array(real), "grounded": grounded + around, "ungrounded": around - 20.0}
-    told = ValueReport(values, values).told
-    assert line in told and ("still" in told) == ("still" in line)
+    sentence = ValueReport(values, values).sentence
+    assert line in sentence and ("still" in sentence) == ("still" in line)
 
 
 def test_values_that_are_all_alike_are_not_taken_for_certain() -> None:
     seldom = np.repeat([1.0, 0.0], [5, 195])  # ten zeros are the rule there
-    found = ValueReport(dict.fromkeys(("grounded", "ungrounded"), np.zeros(10)) | {"real": seldom}, {})
-    assert "200 held-out real episodes do not tell" in found.told
-    assert "still" not in found.told
+    report = ValueReport(dict.fromkeys(("grounded", "ungrounded"), np.zeros(10)) | {"real": seldom}, {})
+    assert "200 held-out real episodes do not tell" in report.sentence
+    assert "still" not in report.sentence

@@ -79,9 +79,9 @@ def episode(made: BulletWorld, seed: int) -> np.ndarray:
 
 def test_an_episode_is_a_function_of_its_seed_and_no_other_noise_changes() -> None:
     noise = {"torque_noise": {"step": 0.1, "constant": 0.1}}
-    one, again, other = (episode(world(noise), seed) for seed in (1, 1, 2))
-    np.testing.assert_array_equal(one, again)
-    assert np.abs(one - other).max() > 1e-3
+    first, again, other = (episode(world(noise), seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 1e-3
     log = {"encoder_noise": {"sd": 0.002}}
     silent = {"torque_noise": {"step": 0.0, "constant": 0.0}}
     np.testing.assert_array_equal(episode(held({**log, **silent}), 3), episode(held(log), 3))

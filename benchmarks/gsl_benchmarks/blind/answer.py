@@ -46,17 +46,17 @@ class Question:
         return lump(self.plant.robot)
 
 
-def answered(
+def answer_question(
     question: Question, options: Options, *, known_nulls: Sequence[float] | None, tick: Callable[[str], None]
 ) -> dict[str, Any]:
     """Return the document of a diagnosis with the gains of chance that it measured."""
     options = replace(options, null_gains=tuple(known_nulls or ()))
-    found = diagnose(question.log, question.plant, question.step, options, tick, reference=question.reference)
-    told = document(found, null_gains=list(found.null_gains))
-    return {key: value for key, value in told.items() if key not in BULKY}
+    findings = diagnose(question.log, question.plant, question.step, options, tick, reference=question.reference)
+    report = document(findings, null_gains=list(findings.null_gains))
+    return {key: value for key, value in report.items() if key not in BULKY}
 
 
-def answered_by_baselines(
+def answer_by_baselines(
     question: Question, options: Options, tick: Callable[[str], None]
 ) -> dict[str, tuple[dict[str, Any], float]]:
     """Return what each baseline says and the time it took [s], by name.
@@ -67,15 +67,15 @@ def answered_by_baselines(
     if question.walking:
         return {}
     nominal = Nominal(question.plant, question.step)
-    found = cut_log(question.log, question.robot)
+    log = cut_log(question.log, question.robot)
     if question.reference is not None:
         base = calibrate_on(cut_log(question.reference, question.robot), nominal, options, tick)
-        found, nominal, options = base.take_out(found, nominal, options)
-    arena = nominal.problem(found, options, tick)
+        log, nominal, options = base.take_out(log, nominal, options)
+    arena = nominal.problem(log, options, tick)
     answers = {}
     for name, baseline in BASELINES.items():
         begin = time.perf_counter()
         with np.errstate(all="ignore"):
-            told = baseline(found, arena)
-        answers[name] = told, time.perf_counter() - begin
+            answer = baseline(log, arena)
+        answers[name] = answer, time.perf_counter() - begin
     return answers

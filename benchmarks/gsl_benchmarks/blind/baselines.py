@@ -20,7 +20,7 @@ from gsl.diagnosis.log.records import cut_pieces
 from gsl.diagnosis.search.screening import Ground, Lead, screen_candidates
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.simulator import Bench
-from gsl_benchmarks.blind.rules import ruled
+from gsl_benchmarks.blind.rules import apply_rules
 
 GAIN, SHIFT = 20.0, 0.02  # in units of cost, or as a share of a range: less is nothing
 STEPS = 400  # control periods that a one-step fit looks at
@@ -31,18 +31,18 @@ FAR = 50.0  # floors beyond which it does not look at a residual
 Answer = dict[str, Any]
 
 
-def least_error_one_step(found: Log, arena: Problem) -> Answer:
+def least_error_one_step(log: Log, arena: Problem) -> Answer:
     """Return the effect with which the simulator best predicts one control period from the measured state."""
-    period, robot = found.period, found.robot
-    held = {int(k) for k in found.pieces.record[found.held_out]}
-    kept = [one for k, one in enumerate(found.records) if k not in held] if found.by_record else list(found.records)
+    period, robot = log.period, log.robot
+    held = {int(k) for k in log.pieces.record[log.held_out]}
+    kept = [record for k, record in enumerate(log.records) if k not in held] if log.by_record else list(log.records)
     cut = cut_pieces(kept, robot, period, warm_up=0, scored=1)
     spread = np.unique(np.linspace(0, len(cut) - 1, min(STEPS, len(cut))).round().astype(int))
-    calm = replace(found.comparison, shaking=np.zeros_like(found.comparison.shaking))
+    calm = replace(log.comparison, shaking=np.zeros_like(log.comparison.shaking))
     return _least(Bench(arena.train.simulator, cut.take(spread), calm), arena)
 
 
-def least_training_error(found: Log, arena: Problem) -> Answer:
+def least_training_error(log: Log, arena: Problem) -> Answer:
     """Return the effect whose replays of the training windows are nearest to the log, nuisances free."""
     return _least(arena.train, arena)
 
@@ -56,14 +56,19 @@ def _least(bench: Bench, arena: Problem) -> Answer:
     return _answer("causes", [_cause(arena, leads[0])], ranking)
 
 
-def everything_at_once(found: Log, arena: Problem) -> Answer:
+def everything_at_once(log: Log, arena: Problem) -> Answer:
     """Return the effect that moves furthest in its documented range when all are fitted together, on all joints.
 
     Effects with several parameters have one of them fitted at a time, and stiction, which has no size alone, none.
     """
-    library = [one for one in arena.library if len(one.free) == 1]
-    start, reach = np.array([one.neutral[0] for one in library]), np.array([_reach(one) for one in library])
-    ends = np.sort([(one.documented[:, 0] - one.neutral[0]) / _reach(one) for one in library], axis=1).T
+    library = [candidate for candidate in arena.library if len(candidate.free) == 1]
+    start, reach = (
+        np.array([candidate.neutral[0] for candidate in library]),
+        np.array([_reach(candidate) for candidate in library]),
+    )
+    ends = np.sort(
+        [(candidate.documented[:, 0] - candidate.neutral[0]) / _reach(candidate) for candidate in library], axis=1
+    ).T
     none = no_shifts(arena.train.joints)
 
     def residual(shifted: np.ndarray) -> np.ndarray:
@@ -81,7 +86,7 @@ def everything_at_once(found: Log, arena: Problem) -> Answer:
     if abs(fitted[order[0]]) < SHIFT:
         return _answer("no_gap", [])
     leads = [Lead(library[k], np.array([start[k] + fitted[k] * reach[k]]), none, 0.0) for k in order]
-    return _answer("causes", [_cause(arena, leads[0])], [{"effects": [one.candidate.effect]} for one in leads])
+    return _answer("causes", [_cause(arena, leads[0])], [{"effects": [lead.candidate.effect]} for lead in leads])
 
 
 def _reach(candidate: Candidate) -> float:
@@ -89,9 +94,9 @@ def _reach(candidate: Candidate) -> float:
     return float(ends[np.argmax(np.abs(ends))])
 
 
-def rule_table(found: Log, arena: Problem) -> Answer:
+def rule_table(log: Log, arena: Problem) -> Answer:
     """Return the effect that a table of rules reads off lags, static errors, hysteresis and saturation."""
-    effects, joints = ruled(found, arena)
+    effects, joints = apply_rules(log, arena)
     if not effects:
         return _answer("no_gap", [])
     cause: Answer = {"effect": effects[0], "joints": joints, "fixed": {}, "parameters": {}, "probability": None}

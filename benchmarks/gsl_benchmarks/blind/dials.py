@@ -66,12 +66,12 @@ def visible() -> tuple[str, ...]:
     )
 
 
-def shown_by_walks() -> tuple[str, ...]:
+def list_walk_effects() -> tuple[str, ...]:
     """Return the effects of the library that a walk can show and a replay can repeat."""
     return tuple(name for name in names() if name not in (*UNSEEN, *RANDOM))
 
 
-def drawn(effect: str, robot: Robot, rng: np.random.Generator, *, alone: bool = False, floating: bool = False) -> Dial:
+def draw(effect: str, robot: Robot, rng: np.random.Generator, *, alone: bool = False, floating: bool = False) -> Dial:
     """Draw all of an effect of the library but its strength.
 
     Args:
@@ -82,39 +82,41 @@ def drawn(effect: str, robot: Robot, rng: np.random.Generator, *, alone: bool = 
         floating: On the ground, where it acts on all joints, or on the base.
     """
     target: Any = effect_class(effect)
-    known, hints = list_documented(effect, robot), get_type_hints(target)
+    settings, hints = list_documented(effect, robot), get_type_hints(target)
     fixed: dict[str, Any] = {}
-    if "joints" in known:
+    if "joints" in settings:
         fixed["joints"] = "all" if floating else _scope(robot, rng, alone=alone)
-    if "link" in known:
+    if "link" in settings:
         fixed["link"] = robot.base if floating else str(rng.choice([joint.child for joint in lump(robot).joints]))
     for key, hint in hints.items():
         if get_origin(hint) is Literal:
             fixed[key] = str(rng.choice(get_args(hint)))
-    ranges = {key: one for key, one in known.items() if one.lower is not None and one.upper is not None}
-    dials = {key: start for key, one in ranges.items() if (start := one.neutral) is not None}
-    shapes = {key: _shape(one, rng) for key, one in ranges.items() if key not in dials}
+    ranges = {
+        key: setting for key, setting in settings.items() if setting.lower is not None and setting.upper is not None
+    }
+    dials = {key: start for key, setting in ranges.items() if (start := setting.neutral) is not None}
+    shapes = {key: _shape(setting, rng) for key, setting in ranges.items() if key not in dials}
     chosen = str(rng.choice(list(dials)))
     ends = _ends(ranges[chosen], dials[chosen])
     return Dial(effect, {**fixed, **shapes}, {chosen: dials[chosen]}, {chosen: float(rng.choice(ends))})
 
 
-def drawn_on_foot(effect: str, plant: Plant, rng: np.random.Generator) -> Dial:
+def draw_on_foot(effect: str, plant: Plant, rng: np.random.Generator) -> Dial:
     """Draw all of an effect but its strength where the robot walks; of the ground, what it is now does nothing."""
-    known = settings_of(effect_class(effect))
+    settings = settings_of(effect_class(effect))
     if effect == FRICTION:
         now = plant.contact.foot_friction * plant.contact.ground_friction
-        ends = _ends(known["friction"], now)
+        ends = _ends(settings["friction"], now)
         return Dial(effect, {}, {"friction": now}, {"friction": float(rng.choice(ends))})
     if effect == COMPLIANCE:
-        softest = known["stiffness"].lower
+        softest = settings["stiffness"].lower
         assert softest is not None
-        damping = {"damping": _shape(known["damping"], rng)}
+        damping = {"damping": _shape(settings["damping"], rng)}
         return Dial(effect, damping, {"stiffness": 0.0}, {"stiffness": softest}, inverse=True)
-    return drawn(effect, plant.robot, rng, floating=True)
+    return draw(effect, plant.robot, rng, floating=True)
 
 
-def drawn_extra(name: str, robot: Robot, rng: np.random.Generator) -> Dial:
+def draw_extra(name: str, robot: Robot, rng: np.random.Generator) -> Dial:
     """Draw all of an effect from outside the library but its strength."""
     extra: Extra = EXTRAS[name]
     fixed: dict[str, Any] = {key: float(rng.uniform(*bounds)) for key, bounds in extra.shapes.items()}
@@ -134,10 +136,10 @@ def _scope(robot: Robot, rng: np.random.Generator, *, alone: bool) -> str:
     return str(rng.choice(sorted(robot.groups))) if grouped else "all"
 
 
-def _ends(known: Setting, start: float) -> list[float]:
-    return [end for end in (known.lower, known.upper) if end is not None and abs(end - start) > 1e-12]
+def _ends(setting: Setting, start: float) -> list[float]:
+    return [end for end in (setting.lower, setting.upper) if end is not None and abs(end - start) > 1e-12]
 
 
-def _shape(known: Setting, rng: np.random.Generator) -> float:
-    assert known.lower is not None and known.upper is not None
-    return float(np.exp(rng.uniform(np.log(known.lower), np.log(known.upper))))
+def _shape(setting: Setting, rng: np.random.Generator) -> float:
+    assert setting.lower is not None and setting.upper is not None
+    return float(np.exp(rng.uniform(np.log(setting.lower), np.log(setting.upper))))

@@ -89,7 +89,7 @@ _SHARES = {
     "top-1, strong": _Share(_single(STRONG), lambda m: m.first),
     "wrong name, weak": _Share(_single(WEAK), lambda m: bool(m.named) and not m.second, None, False),
     "two effects: both named": _Share(_kind(TWO), lambda m: m.both, (0.70, 0.50)),
-    "two effects: at least one": _Share(_kind(TWO), lambda m: m.one, (0.95, 0.90)),
+    "two effects: at least one": _Share(_kind(TWO), lambda m: m.some, (0.95, 0.90)),
     "fault of one joint: right joint": _Share(_kind(JOINT), lambda m: bool(m.joint), (0.95, 0.90)),
     "fault of one joint: joint on the map": _Share(lambda m: m.mapped is not None, lambda m: bool(m.mapped)),
     "fault of one joint: top-1": _Share(_kind(JOINT), lambda m: m.first),
@@ -98,7 +98,7 @@ _SHARES = {
     "abstains, effect never in the library": _Share(_kind(ABSENT), lambda m: m.abstained, (0.80, 0.70)),
     "abstains wrongly": _Share(_kind(*KNOWN), lambda m: m.abstained, (0.10, 0.20), False),
     "misses the gap": _Share(_kind(*KNOWN), lambda m: not m.alarmed, None, False),
-    "names more than there is": _Share(lambda m: m.label.kind in KNOWN and m.one, lambda m: m.extra > 0, None, False),
+    "names more than there is": _Share(lambda m: m.label.kind in KNOWN and m.some, lambda m: m.extra > 0, None, False),
 }
 _MEDIANS = {
     "error of parameters": _Median(_errors(loose=False), (0.10, 0.25), False),
@@ -120,20 +120,20 @@ _WALK_MEDIANS = {
 
 def figures(marks: Sequence[Mark]) -> list[Figure]:
     """Return every figure of both generators, those of the cases in the air first: robots that walk count apart."""
-    found = []
+    rows = []
     for place, generator in enumerate((SAME, FOREIGN)):
         own = [mark for mark in marks if mark.label.generator == generator and mark.label.kind != WALK]
-        found += [_share(name, generator, own, rule, place) for name, rule in _SHARES.items()]
+        rows += [_share(name, generator, own, rule, place) for name, rule in _SHARES.items()]
         covers = [held for mark in own for held in mark.covered]
-        found.append(_of_hits("intervals that hold the parameters", generator, covers))
-        found += [_median(name, generator, own, rule, place) for name, rule in _MEDIANS.items()]
+        rows.append(_of_hits("intervals that hold the parameters", generator, covers))
+        rows += [_median(name, generator, own, rule, place) for name, rule in _MEDIANS.items()]
         error, count = calibration_error(own)
         threshold = (0.08, 0.12)[place]
-        found.append(Figure("calibration error (ECE)", generator, error, None, None, count, threshold, least=False))
+        rows.append(Figure("calibration error (ECE)", generator, error, None, None, count, threshold, least=False))
         on_foot = [mark for mark in marks if mark.label.generator == generator and mark.label.kind == WALK]
-        found += [_share(name, generator, on_foot, rule, place) for name, rule in _WALK_SHARES.items()]
-        found += [_median(name, generator, on_foot, rule, place) for name, rule in _WALK_MEDIANS.items()]
-    return found
+        rows += [_share(name, generator, on_foot, rule, place) for name, rule in _WALK_SHARES.items()]
+        rows += [_median(name, generator, on_foot, rule, place) for name, rule in _WALK_MEDIANS.items()]
+    return rows
 
 
 def reliability(marks: Sequence[Mark]) -> list[tuple[float, float, int]]:
@@ -157,7 +157,7 @@ def confusion(marks: Sequence[Mark]) -> dict[str, dict[str, int]]:
     for mark in marks:
         if mark.label.kind != TWO:
             row = table.setdefault(truth_of(mark), {})
-            row[mark.told] = row.get(mark.told, 0) + 1
+            row[mark.answer] = row.get(mark.answer, 0) + 1
     return {name: dict(sorted(row.items(), key=lambda cell: -cell[1])) for name, row in sorted(table.items())}
 
 

@@ -21,7 +21,7 @@ LABELS, SECRET = "labels.json", "secret.txt"  # of the labels
 ANSWERS, BASELINES, SEAL = "answers", "baselines", "seal.json"  # of the answers
 
 
-def found(reference: str, file: str, kind: str) -> Path:
+def find(reference: str, file: str, kind: str) -> Path:
     """Return a file of a folder that anyone wrote, or of the artifact of `kind` that a path or a run stands for."""
     place = Path(reference)
     folder = place if (place / file).is_file() else resolve(reference, kind=kind)

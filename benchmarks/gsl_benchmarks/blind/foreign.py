@@ -53,19 +53,19 @@ def play_foreign(
 
     The arguments are those of `same.play_same`.
     """
-    rows, bias, armature = driven(plant, effects)
-    tree = chain(_embodied(plant, effects), (1.0 - ON_ROTOR) * armature)
+    rows, bias, armature = build_rows(plant, effects)
+    tree = chain(_embody(plant, effects), (1.0 - ON_ROTOR) * armature)
     extras, state = extra_rows(plant, extra), np.zeros((2, len(armature)))
-    rest, told = targets[0][0].copy(), []
+    rest, paths = targets[0][0].copy(), []
     for path, start in zip(targets, starts, strict=True):
         said = np.full((len(path) + 1, len(start)), np.nan)
         motion = np.array([start, np.zeros_like(start)])
         _play(rows, tree, extras, state, rest, np.ascontiguousarray(path), motion, period, said)
-        told.append(said + bias)
-    return told
+        paths.append(said + bias)
+    return paths
 
 
-def driven(plant: Plant, effects: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def build_rows(plant: Plant, effects: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the servos' rows, shape (24, n), the log's bias [rad] and the rotors' whole inertia [kg·m²], (n,) each."""
     own, voltage = plant.servo, plant.robot.supply_voltage
     rows = np.array([
@@ -91,13 +91,13 @@ def driven(plant: Plant, effects: Mapping[str, Any]) -> tuple[np.ndarray, np.nda
         if name == "sensor_bias":
             bias[mask] += entry["bias"]
         if name == "joint_limit":
-            _narrowed(rows, plant, mask, entry)
+            _narrow(rows, plant, mask, entry)
     armature = rows[servo.ROTOR].copy()
     rows[servo.ROTOR] *= ON_ROTOR
     return rows, bias, armature
 
 
-def _narrowed(rows: np.ndarray, plant: Plant, mask: np.ndarray, entry: Mapping[str, Any]) -> None:
+def _narrow(rows: np.ndarray, plant: Plant, mask: np.ndarray, entry: Mapping[str, Any]) -> None:
     for k in np.flatnonzero(mask):
         joint = plant.robot.joint(plant.robot.motors[k])
         if entry["side"] != "upper":
@@ -106,7 +106,7 @@ def _narrowed(rows: np.ndarray, plant: Plant, mask: np.ndarray, entry: Mapping[s
             rows[servo.UPPER, k] = joint.upper - entry["reduction"]
 
 
-def _embodied(plant: Plant, effects: Mapping[str, Any]) -> Plant:
+def _embody(plant: Plant, effects: Mapping[str, Any]) -> Plant:
     """Return the plant with other links and another gravity."""
     for name, entry in _entries(effects):
         links = dict(plant.robot.links)
@@ -118,12 +118,12 @@ def _embodied(plant: Plant, effects: Mapping[str, Any]) -> Plant:
             link, shift = links[entry["link"]], [entry.get(axis, 0.0) for axis in "xyz"]
             links[link.name] = replace(link, com=link.com + np.array(shift))
         if name == "gravity_tilt":
-            plant = replace(plant, gravity=_tilted(plant.gravity, entry.get("roll", 0.0), entry.get("pitch", 0.0)))
+            plant = replace(plant, gravity=_tilt(plant.gravity, entry.get("roll", 0.0), entry.get("pitch", 0.0)))
         plant = replace(plant, robot=replace(plant.robot, links=links))
     return plant
 
 
-def _tilted(gravity: np.ndarray, roll: float, pitch: float) -> np.ndarray:
+def _tilt(gravity: np.ndarray, roll: float, pitch: float) -> np.ndarray:
     """Turn gravity about x, then about y."""
     x, y, z = gravity
     y, z = y * np.cos(roll) - z * np.sin(roll), y * np.sin(roll) + z * np.cos(roll)
@@ -132,7 +132,7 @@ def _tilted(gravity: np.ndarray, roll: float, pitch: float) -> np.ndarray:
 
 def _entries(effects: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
     listed = ((name, entry if isinstance(entry, list | tuple) else [entry]) for name, entry in effects.items())
-    return [(name, one) for name, entries in listed for one in entries]
+    return [(name, entry) for name, entries in listed for entry in entries]
 
 
 @compile_kernel
@@ -151,7 +151,7 @@ def _play(
         if count >= settling and (count - settling) % ticks == 0:
             _note(p, ring, count, motion, said, (count - settling) // ticks)
         for i in range(n):
-            wanted[i] = _arrived(path, i, (since - p[servo.DELAY, i]) / period, STEP / period)
+            wanted[i] = _average(path, i, (since - p[servo.DELAY, i]) / period, STEP / period)
         servo.foreign_torque(p, state, ring, count, motion, wanted, since, STEP, torque)
         extra_torque(rows, extras, rest, motion, state[servo.MOTOR], STEP, torque)
         accelerate(tree, motion, pushed, torque, work, matrix)
@@ -164,11 +164,11 @@ def _play(
 @compile_kernel
 def _note(p: np.ndarray, ring: np.ndarray, count: int, motion: np.ndarray, said: np.ndarray, row: int) -> None:
     for i in range(motion.shape[1]):
-        said[row, i] = servo.told(p, ring, count, motion, i, STEP)[0]
+        said[row, i] = servo.measure_late(p, ring, count, motion, i, STEP)[0]
 
 
 @compile_kernel
-def _arrived(path: np.ndarray, i: int, begin: float, length: float) -> float:
+def _average(path: np.ndarray, i: int, begin: float, length: float) -> float:
     """Return the mean of the held commands from a time on, for a while, both in control periods."""
     first, last = int(np.floor(begin + 1e-9)), int(np.floor(begin + length - 1e-9))
     old, new = path[min(max(first, 0), len(path) - 1), i], path[min(max(last, 0), len(path) - 1), i]

@@ -52,7 +52,7 @@ def foreign_torque(
     for i in range(motion.shape[1]):
         current += abs(state[MOTOR, i]) * p[PER_AMPERE, i]
     for i in range(motion.shape[1]):
-        q, v = told(p, ring, count, motion, i, step)
+        q, v = measure_late(p, ring, count, motion, i, step)
         state[SLOW, i] += step / (SPEED_LAG + step) * (v - state[SLOW, i])
         state[FILTERED, i] += step / (p[SMOOTHING, i] + step) * (wanted[i] - state[FILTERED, i])
         target = state[FILTERED, i]
@@ -70,14 +70,16 @@ def foreign_torque(
         driving = u * state[OMEGA, i] > 0.0
         bound = room if driving else limit * supply
         state[MOTOR, i] += step / (CURRENT_LAG + step) * (min(bound, max(-bound, u)) - state[MOTOR, i])
-        torque[i] = _through(p, state, i, motion, step) - _stopped(p, i, motion[0, i], motion[1, i])
+        torque[i] = _through(p, state, i, motion, step) - _push_back(p, i, motion[0, i], motion[1, i])
     for i in range(motion.shape[1]):
         for row in range(2):
             ring[count % REMEMBERED, row, i] = motion[row, i]
 
 
 @compile_kernel
-def told(p: np.ndarray, ring: np.ndarray, count: int, motion: np.ndarray, i: int, step: float) -> tuple[float, float]:
+def measure_late(
+    p: np.ndarray, ring: np.ndarray, count: int, motion: np.ndarray, i: int, step: float
+) -> tuple[float, float]:
     """Return position [rad] and speed [rad/s] as an encoder tells them, some time late."""
     late = p[AGE, i] / step
     if late <= 0.0:
@@ -124,7 +126,7 @@ def _dry(p: np.ndarray, state: np.ndarray, i: int, h: float) -> float:
 
 
 @compile_kernel
-def _stopped(p: np.ndarray, i: int, q: float, v: float) -> float:
+def _push_back(p: np.ndarray, i: int, q: float, v: float) -> float:
     if q > p[UPPER, i]:
         return max(0.0, STOP * (q - p[UPPER, i]) + STOP_DAMPING * v)
     if q < p[LOWER, i]:

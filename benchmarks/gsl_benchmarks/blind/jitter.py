@@ -13,7 +13,7 @@ VISCOUS = 0.02  # most of an even spread of viscous friction [N·m·s/rad]
 NOISE = (0.001, 0.002)  # least and greatest standard deviation of a robot's encoders [rad]
 
 
-def jittered(plant: Plant, rng: np.random.Generator) -> Plant:
+def jitter(plant: Plant, rng: np.random.Generator) -> Plant:
     """Return another robot of the same make."""
     servo, n = plant.servo, len(plant.robot.motors)
     return plant.with_servo(

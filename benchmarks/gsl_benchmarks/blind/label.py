@@ -56,5 +56,5 @@ class Label:
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Label:
         """Read a document again; keys that are not known are left out, missing ones have their defaults."""
-        known = {key: document[key] for key in cls.__dataclass_fields__ if key in document}
-        return cls(**{**known, "without": tuple(known.get("without", ()))})
+        fields = {key: document[key] for key in cls.__dataclass_fields__ if key in document}
+        return cls(**{**fields, "without": tuple(fields.get("without", ()))})

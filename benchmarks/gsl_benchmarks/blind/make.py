@@ -14,15 +14,15 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.records import slope
 from gsl.effects.effect import TWINS
 from gsl.errors import GslError
-from gsl_benchmarks.blind.dials import CALIBRATED, Dial, drawn, drawn_extra, takes_joint, visible
+from gsl_benchmarks.blind.dials import CALIBRATED, Dial, draw, draw_extra, takes_joint, visible
 from gsl_benchmarks.blind.extras import EXTRAS
 from gsl_benchmarks.blind.foreign import play_foreign
-from gsl_benchmarks.blind.jitter import NOISE, jittered
+from gsl_benchmarks.blind.jitter import NOISE, jitter
 from gsl_benchmarks.blind.label import ABSENT, FOREIGN, JOINT, NULL, SAME, TWO, WITHHELD, Label
 from gsl_benchmarks.blind.mix import Slot
 from gsl_benchmarks.blind.programmes import Programme
 from gsl_benchmarks.blind.same import play_same
-from gsl_benchmarks.blind.strength import Player, Yardstick, turned_up
+from gsl_benchmarks.blind.strength import Player, Yardstick, turn_up
 
 PLAYERS: Mapping[str, Player] = {SAME: play_same, FOREIGN: play_foreign}
 START = 0.02  # spread of the joints before the first command is held [rad]
@@ -64,40 +64,40 @@ class Workshop:
         noise = float(rng.uniform(*NOISE))
         label = Label(name, slot.kind, slot.generator, slot.strength, programme=slot.programme, noise=noise)
         if slot.kind != NULL:
-            label = self._caused(label, slot, rng)
-        robot = jittered(self.plant, rng)
-        log = self._logged(robot, label, rng)
+            label = self._add_causes(label, slot, rng)
+        robot = jitter(self.plant, rng)
+        log = self._record(robot, label, rng)
         bare = replace(label, effects={}, extra=None)
-        return Case(label, log, self._logged(robot, bare, rng) if slot.generator == FOREIGN else None)
+        return Case(label, log, self._record(robot, bare, rng) if slot.generator == FOREIGN else None)
 
-    def _caused(self, label: Label, slot: Slot, rng: np.random.Generator) -> Label:
+    def _add_causes(self, label: Label, slot: Slot, rng: np.random.Generator) -> Label:
         """Return the label with causes of the strength that the slot wants."""
         player, programme = PLAYERS[slot.generator], self.programmes[slot.programme]
         yardstick = Yardstick.of(self.plant, self.step, self.period, player, programme)
         if slot.kind == ABSENT:
-            dial, share, gap = _dialled(tuple(EXTRAS), yardstick, label, slot.turn, rng)
+            dial, share, gap = _dial(tuple(EXTRAS), yardstick, label, slot.turn, rng)
             return replace(label, extra={"effect": dial.effect, **dial.entry(share)}, gap=gap)
-        choices = [one for one in visible() if _fits(one, slot.kind)]
-        dial, share, gap = _dialled(choices, yardstick, label, slot.turn, rng)
+        choices = [effect for effect in visible() if _fits(effect, slot.kind)]
+        dial, share, gap = _dial(choices, yardstick, label, slot.turn, rng)
         effects, neutral = {dial.effect: dial.entry(share)}, {dial.effect: dial.neutral}
         if slot.kind == TWO:
-            others = [one for one in choices if TWINS.get(one, one) != TWINS.get(dial.effect, dial.effect)]
-            dial, share, second = _dialled(others, yardstick, label, int(rng.integers(len(others))), rng)
+            others = [effect for effect in choices if TWINS.get(effect, effect) != TWINS.get(dial.effect, dial.effect)]
+            dial, share, second = _dial(others, yardstick, label, int(rng.integers(len(others))), rng)
             effects[dial.effect], neutral[dial.effect] = dial.entry(share), dial.neutral
             gap = float(np.sqrt(gap**2 + second**2 - 1.0))
         without = tuple(effects) if slot.kind == WITHHELD else ()
         return replace(label, effects=effects, neutral=neutral, gap=gap, without=without)
 
-    def _logged(self, robot: Plant, label: Label, rng: np.random.Generator) -> Batch:
+    def _record(self, robot: Plant, label: Label, rng: np.random.Generator) -> Batch:
         """Return what a robot logs of its programme; its metadata say nothing of the causes."""
         programme, body = self.programmes[label.programme], lump(robot.robot)
         targets, n = programme.targets(body), len(body.controlled)
         starts = [path[0] + START * rng.standard_normal(len(path[0])) for path in targets]
         played = PLAYERS[label.generator](robot, label.effects, label.extra, targets, starts, self.period)
         episodes = []
-        for commands, told in zip(programme.commands, played, strict=True):
-            position = told[:, :n] + label.noise * rng.standard_normal((len(told), n))
-            times = self.period * np.arange(len(told))
+        for commands, path in zip(programme.commands, played, strict=True):
+            position = path[:, :n] + label.noise * rng.standard_normal((len(path), n))
+            times = self.period * np.arange(len(path))
             episodes.append(Trajectory(times, commands, position, slope(position, self.period)))
         about = {"robot": body.name, "role": "real", "source": "gsl blind"}
         names = [{"policy": name} for name in programme.names]
@@ -110,7 +110,7 @@ def rng_of(secret: str, *parts: int | str) -> np.random.Generator:
     return np.random.default_rng(int.from_bytes(hashlib.sha256(words.encode()).digest()))
 
 
-def _dialled(
+def _dial(
     choices: Sequence[str], yardstick: Yardstick, label: Label, turn: int, rng: np.random.Generator
 ) -> tuple[Dial, float, float]:
     """Return an effect that reaches the label's strength, its share of its range and its gap.
@@ -118,13 +118,13 @@ def _dialled(
     The one whose turn it is comes first; then all others in random order.
     """
     robot = yardstick.plant.robot
-    others = [one for one in choices if one != choices[turn % len(choices)]]
+    others = [effect for effect in choices if effect != choices[turn % len(choices)]]
     for effect in (choices[turn % len(choices)], *rng.permutation(others).tolist()):
         for _ in range(TRIES):
             extra = effect in EXTRAS
-            dial = drawn_extra(effect, robot, rng) if extra else drawn(effect, robot, rng, alone=label.kind == JOINT)
-            if (found := turned_up(measure_gap(dial, yardstick, label.noise), label.strength, rng)) is not None:
-                return dial, *found
+            dial = draw_extra(effect, robot, rng) if extra else draw(effect, robot, rng, alone=label.kind == JOINT)
+            if (share := turn_up(measure_gap(dial, yardstick, label.noise), label.strength, rng)) is not None:
+                return dial, *share
     raise GslError(f"no effect reaches the strength {label.strength}; choose a larger excitation.amplitude=")
 
 

@@ -62,18 +62,18 @@ class Slot(NamedTuple):
 
 def slots(mix: Mix, cases: int, programmes: int, rng: np.random.Generator) -> list[Slot]:
     """Return the slots in the air in random order, the foreign ones spread evenly over kinds and strengths."""
-    wanted = [(kind, turn) for kind, count in apportioned(mix.kinds, cases).items() for turn in range(count)]
+    wanted = [(kind, turn) for kind, count in apportion(mix.kinds, cases).items() for turn in range(count)]
     share = mix.foreign / sum(mix.kinds.values())
-    found: list[Slot] = []
+    slots: list[Slot] = []
     firsts: dict[tuple[str, str], int] = {}
     for index, (kind, turn) in enumerate(wanted):
         generator = FOREIGN if int((index + 1) * share + 1e-9) > int(index * share + 1e-9) else SAME
         strengths = STRENGTHS.get(kind, ("none",))
         strength = strengths[turn % len(strengths)]
         first = firsts.setdefault((kind, strength), int(rng.integers(1000)))
-        found.append(Slot(kind, generator, strength, first + turn // len(strengths), 0))
-    order = rng.permutation(len(found))
-    return [found[k]._replace(programme=place % programmes) for place, k in enumerate(order)]
+        slots.append(Slot(kind, generator, strength, first + turn // len(strengths), 0))
+    order = rng.permutation(len(slots))
+    return [slots[k]._replace(programme=place % programmes) for place, k in enumerate(order)]
 
 
 def walk_slots(mix: Mix, rng: np.random.Generator) -> list[Slot]:
@@ -82,7 +82,7 @@ def walk_slots(mix: Mix, rng: np.random.Generator) -> list[Slot]:
     return [Slot(WALK, SAME, STRONG, first + turn, 0) for turn in range(mix.walk)]
 
 
-def apportioned(shares: dict[str, int], total: int) -> dict[str, int]:
+def apportion(shares: dict[str, int], total: int) -> dict[str, int]:
     """Return whole numbers in proportion to shares that add up to a total (largest remainders)."""
     exact = {key: total * share / sum(shares.values()) for key, share in shares.items()}
     whole = {key: int(value) for key, value in exact.items()}

@@ -15,12 +15,12 @@ from gsl.diagnosis.simulate.on_ground import Walking, model_error
 from gsl.errors import GslError
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.fits import fitting_step
-from gsl_benchmarks.blind.dials import Dial, drawn_on_foot, shown_by_walks
+from gsl_benchmarks.blind.dials import Dial, draw_on_foot, list_walk_effects
 from gsl_benchmarks.blind.jitter import NOISE
 from gsl_benchmarks.blind.label import Label
 from gsl_benchmarks.blind.make import TRIES, Case
 from gsl_benchmarks.blind.mix import STRONG, Slot
-from gsl_benchmarks.blind.strength import WORST, turned_up
+from gsl_benchmarks.blind.strength import WORST, turn_up
 from gsl_benchmarks.blind.walks import Individual, Walks
 
 BANDS = {STRONG: (4.0, 20.0)}  # [floors]; lower than in the air, for windows are a third as long
@@ -52,11 +52,11 @@ class Yardstick:
     @classmethod
     def of(cls, sim: BulletWorld, walks: Walks, noise: float, rng: np.random.Generator) -> Yardstick:
         """Let the nominal robot walk, and replay it."""
-        log = replace(walks, episodes=WALKED).logged(sim, None, {}, noise, rng)
-        found = cut_log(log, lump(sim.plant.robot), walking=True)
+        log = replace(walks, episodes=WALKED).log(sim, None, {}, noise, rng)
+        cut = cut_log(log, lump(sim.plant.robot), walking=True)
         simulator = Walking(sim.plant, fitting_step(sim.step, sim.period), sim.period)
-        pieces = _some(found.pieces)
-        floor = found.with_model_error(model_error(simulator, pieces, rng)).comparison.floor
+        pieces = _some(cut.pieces)
+        floor = cut.with_model_error(model_error(simulator, pieces, rng)).comparison.floor
         return cls(simulator, pieces, floor, simulator.simulate({}, np.zeros(0), pieces))
 
     def gap(self, dial: Dial) -> Callable[[float], float]:
@@ -66,12 +66,12 @@ class Yardstick:
         """
 
         def gap(share: float) -> float:
-            told = self.simulator.simulate({dial.effect: dial.entry(share)}, np.zeros(0), self.pieces)
-            return float(np.sqrt(1.0 + self._square(told - self.without, dial)))
+            replays = self.simulator.simulate({dial.effect: dial.entry(share)}, np.zeros(0), self.pieces)
+            return float(np.sqrt(1.0 + self._square(replays - self.without, dial)))
 
         return gap
 
-    def shown(self, dial: Dial, share: float, log: Batch) -> float:
+    def measure_shown(self, dial: Dial, share: float, log: Batch) -> float:
         """Return the share of the gap that replays with the effect take away from a log of the nominal robot with it.
 
         A window begins with what a log tells of a state, and not with what springs, gears and delays hold: an effect
@@ -118,20 +118,20 @@ class Track:
         label = Label(name, slot.kind, slot.generator, slot.strength, noise=noise)
         individual = Individual(int(rng.integers(2**31)))
         yardstick = Yardstick.of(self.sim, self.walks, noise, rng)
-        choices = shown_by_walks()
+        choices = list_walk_effects()
         turn = choices[slot.turn % len(choices)]
-        for effect in (turn, *rng.permutation([one for one in choices if one != turn]).tolist()):
+        for effect in (turn, *rng.permutation([effect for effect in choices if effect != turn]).tolist()):
             for _ in range(TRIES):
-                dial = drawn_on_foot(effect, self.sim.plant, rng)
-                found = turned_up(yardstick.gap(dial), slot.strength, rng, BANDS)
-                if found is None:
+                dial = draw_on_foot(effect, self.sim.plant, rng)
+                level = turn_up(yardstick.gap(dial), slot.strength, rng, BANDS)
+                if level is None:
                     continue
-                effects = {effect: dial.entry(found[0])}
-                nominal = replace(self.walks, episodes=WALKED).logged(self.sim, None, effects, noise, rng)
-                if yardstick.shown(dial, found[0], nominal) < SHOWN:
+                effects = {effect: dial.entry(level[0])}
+                nominal = replace(self.walks, episodes=WALKED).log(self.sim, None, effects, noise, rng)
+                if yardstick.measure_shown(dial, level[0], nominal) < SHOWN:
                     continue
-                log = self.walks.logged(self.sim, individual, effects, noise, rng)
+                log = self.walks.log(self.sim, individual, effects, noise, rng)
                 if self.walks.on_foot(log) >= self.walks.still:
                     neutral = {effect: dial.neutral}
-                    return Case(replace(label, effects=effects, neutral=neutral, gap=found[1]), log, None)
+                    return Case(replace(label, effects=effects, neutral=neutral, gap=level[1]), log, None)
         raise GslError(f"no effect of strength {slot.strength} leaves the robot on its feet; choose walks.still= lower")

@@ -22,10 +22,10 @@ class Programme(NamedTuple):
 
     def targets(self, robot: Robot) -> list[np.ndarray]:
         """Return the commands as motor targets [rad], shape (T, n_motors) each."""
-        return [one[:, robot.drive] for one in self.commands]
+        return [commands[:, robot.drive] for commands in self.commands]
 
 
-def drawn_programmes(like: Excitation, count: int, period: float, rng: np.random.Generator) -> list[Programme]:
+def draw_programmes(like: Excitation, count: int, period: float, rng: np.random.Generator) -> list[Programme]:
     """Return `count` excitations: the first as it is, the others a little smaller and of other lengths.
 
     Args:
@@ -39,10 +39,10 @@ def drawn_programmes(like: Excitation, count: int, period: float, rng: np.random
         amplitude = like.amplitude * round(float(rng.uniform(SMALLEST, 1.0)), 2)
         ticks = round(like.duration * float(rng.uniform(*LENGTHS)) / period)
         made.append(replace(like, amplitude=amplitude, duration=max(1.5, ticks * period)))
-    return [_played(one, period) for one in made]
+    return [_play(excitation, period) for excitation in made]
 
 
-def _played(one: Excitation, period: float) -> Programme:
-    pieces = one.programme
-    commands = [one.commands(piece.about["motion"], piece.about["variant"], period) for piece in pieces]
+def _play(excitation: Excitation, period: float) -> Programme:
+    pieces = excitation.programme
+    commands = [excitation.commands(piece.about["motion"], piece.about["variant"], period) for piece in pieces]
     return Programme(tuple(piece.label for piece in pieces), tuple(commands))

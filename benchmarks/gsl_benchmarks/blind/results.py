@@ -21,7 +21,7 @@ COMPARED = (
 
 def results(marks: Mapping[str, Sequence[Mark]]) -> dict[str, Any]:
     """Return everything that is counted, of the diagnosis and of each baseline by name."""
-    return {name: _of_one(found) for name, found in marks.items()}
+    return {name: _of_one(own) for name, own in marks.items()}
 
 
 def _of_one(marks: Sequence[Mark]) -> dict[str, Any]:
@@ -64,21 +64,24 @@ def markdown(marks: Mapping[str, Sequence[Mark]], about: str) -> str:
         "In brackets what the library that answered did not have. Cases of two effects are left out.\n",
         table(("truth", "answers"), answers),
         "## Baselines\n" if len(marks) > 1 else "",
-        table(("figure", *marks), _compared(marks)) if len(marks) > 1 else "",
+        table(("figure", *marks), _compare(marks)) if len(marks) > 1 else "",
         "## Every answer that is not right\n",
-        table(("case", "kind", "generator", "strength", "gap", "truth", "answer"), [_told(mark) for mark in wrong]),
+        table(("case", "kind", "generator", "strength", "gap", "truth", "answer"), [_describe(mark) for mark in wrong]),
     ]
     return "\n".join(part for part in parts if part)
 
 
 def figure_rows(marks: Sequence[Mark]) -> list[tuple[str, ...]]:
     """Return a row for each figure: its name, then value and threshold of both generators."""
-    found = figures(marks)
-    pairs = zip(found[: len(found) // 2], found[len(found) // 2 :], strict=True)
-    return [(one.name, _shown(one), _needed(one), _shown(other), _needed(other)) for one, other in pairs]
+    both = figures(marks)
+    pairs = zip(both[: len(both) // 2], both[len(both) // 2 :], strict=True)
+    return [
+        (first.name, _format(first), _format_threshold(first), _format(second), _format_threshold(second))
+        for first, second in pairs
+    ]
 
 
-def _shown(figure: Figure) -> str:
+def _format(figure: Figure) -> str:
     if figure.value is None:
         return "-"
     digits = 0 if "[s]" in figure.name else 2
@@ -86,7 +89,7 @@ def _shown(figure: Figure) -> str:
     return f"{figure.value:.{digits}f}{bounds} [{figure.count}]"
 
 
-def _needed(figure: Figure) -> str:
+def _format_threshold(figure: Figure) -> str:
     if figure.threshold is None:
         return ""
     word = {True: ", met", False: ", missed", None: ""}[figure.met]
@@ -101,22 +104,22 @@ def _reliability_rows(marks: Sequence[Mark]) -> list[tuple[str, ...]]:
     ]
 
 
-def _compared(marks: Mapping[str, Sequence[Mark]]) -> list[tuple[str, ...]]:
+def _compare(marks: Mapping[str, Sequence[Mark]]) -> list[tuple[str, ...]]:
     """Return both generators' figures of every method, one row a figure."""
     rows = []
     for generator in (SAME, FOREIGN):
-        of_all = [{f.name: f for f in figures(found) if f.generator == generator} for found in marks.values()]
-        rows += [(f"{name}, {generator}", *(_shown(one[name]) for one in of_all)) for name in COMPARED]
+        of_all = [{f.name: f for f in figures(own) if f.generator == generator} for own in marks.values()]
+        rows += [(f"{name}, {generator}", *(_format(by_name[name]) for by_name in of_all)) for name in COMPARED]
     return rows
 
 
-def _told(mark: Mark) -> tuple[str, ...]:
+def _describe(mark: Mark) -> tuple[str, ...]:
     label = mark.label
-    answer = ", ".join(mark.named) if mark.named else mark.told
+    answer = ", ".join(mark.named) if mark.named else mark.answer
     probability = "" if mark.probability is None else f" ({mark.probability:.2f})"
     where = "" if mark.joint is None else f", {'right' if mark.joint else 'wrong'} joint"
-    told = f"{answer}{probability}{where}"
-    return label.case, label.kind, label.generator, label.strength, f"{label.gap:.1f}", truth_of(mark), told
+    text = f"{answer}{probability}{where}"
+    return label.case, label.kind, label.generator, label.strength, f"{label.gap:.1f}", truth_of(mark), text
 
 
 def _row(mark: Mark) -> dict[str, Any]:

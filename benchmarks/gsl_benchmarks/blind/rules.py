@@ -17,14 +17,14 @@ CLEAR = 1.0  # floors that a feature has to have
 ALONE = 0.6  # share of a feature that one joint has to have to be the only one
 
 
-def ruled(found: Log, arena: Problem) -> tuple[list[str], list[str]]:
+def apply_rules(log: Log, arena: Problem) -> tuple[list[str], list[str]]:
     """Return the effects that the rules read, likeliest first, and the joints of the first; none for no gap."""
-    told = arena.train.simulator.simulate({}, no_shifts(len(found.joints)), arena.train.pieces)
+    replays = arena.train.simulator.simulate({}, no_shifts(len(log.joints)), arena.train.pieces)
     part, first = arena.train.pieces, arena.train.pieces.warm_up
-    real, sim = part.real[:, first:], told[:, first:]
-    floor, error = found.comparison.floor, real - sim
-    speed = np.gradient(sim, found.period, axis=1)
-    commands = part.windows.commands[:, : told.shape[1], : real.shape[2]][:, ::-1][:, first:]
+    real, sim = part.real[:, first:], replays[:, first:]
+    floor, error = log.comparison.floor, real - sim
+    speed = np.gradient(sim, log.period, axis=1)
+    commands = part.windows.commands[:, : replays.shape[1], : real.shape[2]][:, ::-1][:, first:]
     servo, n = arena.train.simulator.plant.servo, real.shape[2]
     load = servo.kp[:n] * (commands - sim) / servo.limit[:n]
     features = {
@@ -35,15 +35,15 @@ def ruled(found: Log, arena: Problem) -> tuple[list[str], list[str]]:
         "torque_limit": np.abs(_mean(error * np.sign(load), np.abs(load) > 0.9)),
         "encoder_noise": np.sqrt(np.mean(np.diff(real, 2, axis=1) ** 2, axis=(0, 1)) / 6.0) - floor,
     }
-    known = {candidate.effect for candidate in arena.library}
-    scored = {name: values / floor for name, values in features.items() if name in known}
+    effects = {candidate.effect for candidate in arena.library}
+    scored = {name: values / floor for name, values in features.items() if name in effects}
     order = sorted(scored, key=lambda name: -float(np.sqrt(np.mean(scored[name] ** 2))))
     strength = scored[order[0]]
     if np.sqrt(np.mean(strength**2)) < CLEAR:
         return [], []
     worst = int(np.argmax(strength))
     alone = strength[worst] ** 2 > ALONE * np.sum(strength**2)
-    return order, [found.joints[worst]] if alone else list(found.joints)
+    return order, [log.joints[worst]] if alone else list(log.joints)
 
 
 def _mean(values: np.ndarray, mask: np.ndarray) -> np.ndarray:

@@ -44,23 +44,23 @@ def play_same(
     if extra is None:
         return held.play(targets, starts, SETTLE)
     rows, state = extra_rows(plant, extra), np.zeros((2, len(held.bias)))
-    rest, told = targets[0][0].copy(), []
+    rest, paths = targets[0][0].copy(), []
     for path, start in zip(targets, starts, strict=True):
         older = np.vstack([np.repeat(path[:1], COMMANDS - 1 + SETTLE, axis=0), path])
         said = np.full((len(path) + SETTLE, len(start)), np.nan)
         motion = np.array([start, np.zeros_like(start)])
         newest_first = np.ascontiguousarray(older[::-1])
         _play(held.servo, held.tree, rows, state, rest, newest_first, motion, STEP, round(period / STEP), SETTLE, said)
-        told.append(said[SETTLE - 1 :] + held.bias)
-    return told
+        paths.append(said[SETTLE - 1 :] + held.bias)
+    return paths
 
 
 @compile_kernel
 def _play(
     servo: ServoParameters, tree: Chain, rows: np.ndarray, extras: np.ndarray, rest: np.ndarray, commands: np.ndarray,
-    motion: np.ndarray, step: float, substeps: int, settle: int, told: np.ndarray,
+    motion: np.ndarray, step: float, substeps: int, settle: int, path: np.ndarray,
 ) -> None:  # fmt: skip
-    periods, n = told.shape
+    periods, n = path.shape
     torque, work, matrix, pushed = np.zeros(n), np.zeros((n, COLUMNS)), np.zeros((n, n)), nothing()
     memory, encoders, steps = np.zeros((MEMORY, n)), np.zeros((2, n)), np.array([0, 1])
     clock = np.array([-settle * substeps * step])
@@ -77,5 +77,5 @@ def _play(
                 motion[1, i] += step * torque[i]
                 motion[0, i] += step * motion[1, i]
         encoder_motion(servo, state, motion, step, encoders)
-        told[t] = encoders[0]
+        path[t] = encoders[0]
         clock[0] += substeps * step

@@ -14,7 +14,7 @@ from gsl.storage.hashing import file_hash
 VERSION = 1
 
 
-def sealed(nonce: str, label: Mapping[str, Any]) -> str:
+def hash_label(nonce: str, label: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a nonce and a label: it tells nothing of the label, and no other label has it."""
     return hashlib.sha256((nonce + text(label)).encode()).hexdigest()
 
@@ -41,7 +41,7 @@ def check_files(folder: Path, hashes: Mapping[str, str]) -> None:
 
 def check_label(place: Path, case: str, seal: str, entry: Mapping[str, Any]) -> None:
     """Refuse a label that is not the one that was sealed."""
-    if sealed(str(entry.get("nonce", "")), entry.get("label", {})) != seal:
+    if hash_label(str(entry.get("nonce", "")), entry.get("label", {})) != seal:
         raise GslError(f"{place}: the seal of {case} does not hold, its label or nonce was changed after it was made")
 
 

@@ -80,22 +80,22 @@ class Yardstick:
         robot = lump(self.plant.robot)
         targets, n = self.programme.targets(robot), len(robot.controlled)
         played = self.player(self.plant, effects, extra, targets, [path[0] for path in targets], self.period)
-        if not all(np.isfinite(one).all() for one in played):
+        if not all(np.isfinite(path).all() for path in played):
             return np.full(self.without.shape, np.nan)
         made = [
-            Record(name, path, told[:, :n], slope(told[:, :n], self.period))
-            for name, path, told in zip(self.programme.names, targets, played, strict=True)
+            Record(name, path, position[:, :n], slope(position[:, :n], self.period))
+            for name, path, position in zip(self.programme.names, targets, played, strict=True)
         ]
         warm_up, scored = (round(part / self.period) for part in (LogSettings.warm_up, LogSettings.scored))
         cut = cut_pieces(made, robot, self.period, warm_up=warm_up, scored=scored)
-        return self._replayed(cut)[:, warm_up:, :n] - cut.real[:, warm_up:]
+        return self._replay(cut)[:, warm_up:, :n] - cut.real[:, warm_up:]
 
-    def _replayed(self, cut: Pieces) -> np.ndarray:
+    def _replay(self, cut: Pieces) -> np.ndarray:
         assert isinstance(cut.windows, Windows)
         return Held.of(self.plant, self.step, self.period).replay(cut.windows)
 
 
-def turned_up(
+def turn_up(
     gap: Callable[[float], float],
     strength: str,
     rng: np.random.Generator,
@@ -117,8 +117,8 @@ def turned_up(
     below, above = np.log(LEAST_SHARE), 0.0
     for _ in range(HALVINGS):
         middle = 0.5 * (below + above)
-        found = gap(float(np.exp(middle)))
-        if abs(found / target - 1.0) < CLOSE:
+        size = gap(float(np.exp(middle)))
+        if abs(size / target - 1.0) < CLOSE:
             break
-        below, above = (middle, above) if found < target else (below, middle)
-    return (float(np.exp(middle)), found) if low <= found <= high else None
+        below, above = (middle, above) if size < target else (below, middle)
+    return (float(np.exp(middle)), size) if low <= size <= high else None

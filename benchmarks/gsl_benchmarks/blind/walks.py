@@ -17,7 +17,7 @@ from gsl.diagnosis.log.records import slope
 from gsl.policies.policy import neighbour
 from gsl.policies.walk_engine import WalkEngine
 from gsl.worlds.bullet import BulletWorld
-from gsl_benchmarks.blind.jitter import jittered
+from gsl_benchmarks.blind.jitter import jitter
 
 STEP = 0.001  # physics period of the robot's world [s]: a diagnosis fits at that of the simulator
 SOLE = 0.05  # relative spread of the friction under the feet
@@ -34,7 +34,7 @@ class Walks:
     spread: Annotated[float, setting("of the parameters, in units of a parameter's scale", ge=0)] = 0.07
     still: Annotated[float, setting("least share of the planned time on its feet", ge=0, le=1)] = 0.75
 
-    def logged(
+    def log(
         self, sim: BulletWorld, individual: Individual | None, effects: Mapping[str, Any], noise: float,
         rng: np.random.Generator,
     ) -> Batch:  # fmt: skip
@@ -50,15 +50,15 @@ class Walks:
         own = {} if individual is None else {"individual": individual}
         step = sim.step if individual is None else min(STEP, sim.step)
         env = replace(sim, effects={**sim.effects, **own, **effects}, floating=True, step=step).make()
-        engine, told = WalkEngine(), []
+        engine, logs = WalkEngine(), []
         names = ["pi0" if k % ITSELF == 0 else f"neighbour_{k:02d}" for k in range(self.episodes)]
         for name in names:
             near = neighbour(engine, engine.initial, 0.0 if name == "pi0" else self.spread, rng)
-            told.append(_noisy(self._walk(env, engine, near, int(rng.integers(2**31))), noise, sim.period, rng))
+            logs.append(_noisy(self._walk(env, engine, near, int(rng.integers(2**31))), noise, sim.period, rng))
         env.close()
         about = {"robot": lump(sim.plant.robot).name, "role": "real", "source": "gsl blind"}
         episodes = [{"policy": name} for name in names]
-        return Batch(tuple(told), env.layout.joints, sim.period, {**about, "episodes": episodes})
+        return Batch(tuple(logs), env.layout.joints, sim.period, {**about, "episodes": episodes})
 
     def on_foot(self, log: Batch) -> float:
         """Return the share of the planned time that the robot walks."""
@@ -100,7 +100,7 @@ class Individual:
     def apply(self, plant: Plant) -> Plant:
         """Return the plant with jitter."""
         rng = np.random.default_rng(self.seed)
-        other, contact = jittered(plant, rng), plant.contact
+        other, contact = jitter(plant, rng), plant.contact
         ground = contact.ground_friction * float(np.exp(SOLE * rng.standard_normal()))
         return replace(other, contact=replace(contact, ground_friction=ground))
 

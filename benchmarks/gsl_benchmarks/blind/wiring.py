@@ -57,11 +57,11 @@ def wire(kind: str, commands: Sequence[np.ndarray], play: Play, plant: Plant, rn
 def change(batch: Batch, *, action: Arrays | None = None, position: Arrays | None = None) -> Batch:
     """Return a log with other commands or positions; velocities are the slopes that a logger would derive."""
     episodes = []
-    for one in batch.episodes:
-        measured = position(one.position.copy()) if position else one.position
-        commands = action(one.action.copy()) if action else one.action
-        speed = slope(measured, batch.control_period) if position else one.velocity
-        episodes.append(replace(one, action=commands, position=measured, velocity=speed))
+    for episode in batch.episodes:
+        measured = position(episode.position.copy()) if position else episode.position
+        commands = action(episode.action.copy()) if action else episode.action
+        speed = slope(measured, batch.control_period) if position else episode.velocity
+        episodes.append(replace(episode, action=commands, position=measured, velocity=speed))
     return replace(batch, episodes=tuple(episodes))
 
 
@@ -71,7 +71,7 @@ def _names(batch: Batch, index: Sequence[int]) -> tuple[str, ...]:
 
 def _moving(batch: Batch) -> np.ndarray:
     """Return the joints that move, of which a fault can show, shape (k,)."""
-    ranges = np.ptp(np.concatenate([one.action for one in batch.episodes]), axis=0)
+    ranges = np.ptp(np.concatenate([episode.action for episode in batch.episodes]), axis=0)
     return np.flatnonzero(ranges > 0.1)
 
 
@@ -124,7 +124,7 @@ def _scale(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.ran
 
 def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     joints = [robot.joint(name) for name in robot.controlled]
-    return np.array([one.lower for one in joints]), np.array([one.upper for one in joints])
+    return np.array([joint.lower for joint in joints]), np.array([joint.upper for joint in joints])
 
 
 def _offset(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.random.Generator) -> Wired:
@@ -145,7 +145,9 @@ def _gains(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.ran
 
 def _rate(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.random.Generator) -> Wired:
     log, factor = play(commands), float(rng.choice(RATES))
-    episodes = tuple(replace(one, time=factor * one.time, velocity=one.velocity / factor) for one in log.episodes)
+    episodes = tuple(
+        replace(episode, time=factor * episode.time, velocity=episode.velocity / factor) for episode in log.episodes
+    )
     made = replace(log, episodes=episodes, control_period=factor * log.control_period)
     return Wired(made, plant, "rate", tuple(log.joints))
 
@@ -153,9 +155,9 @@ def _rate(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.rand
 def _hold(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.random.Generator) -> Wired:
     ticks = int(rng.choice([2, 3, 4]))
     phase = int(rng.integers(ticks))
-    taken = [np.maximum(phase + (np.arange(len(one)) - phase) // ticks * ticks, 0) for one in commands]
-    log = play([one[rows] for one, rows in zip(commands, taken, strict=True)])
-    episodes = tuple(replace(one, action=asked) for one, asked in zip(log.episodes, commands, strict=True))
+    taken = [np.maximum(phase + (np.arange(len(command)) - phase) // ticks * ticks, 0) for command in commands]
+    log = play([command[rows] for command, rows in zip(commands, taken, strict=True)])
+    episodes = tuple(replace(episode, action=asked) for episode, asked in zip(log.episodes, commands, strict=True))
     return Wired(replace(log, episodes=episodes), plant, "hold", tuple(log.joints))
 
 
@@ -170,8 +172,10 @@ def _wrap(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.rand
     """An encoder's zero lies within the motion of a joint."""
     log = play(commands)
     joint = _some(log, rng, 1)[0]
-    middle = float(np.median(np.concatenate([one.position[:, joint] for one in log.episodes])))
-    low, high = (np.quantile(np.concatenate([one.position[:, joint] for one in log.episodes]), q) for q in (0.3, 0.7))
+    middle = float(np.median(np.concatenate([episode.position[:, joint] for episode in log.episodes])))
+    low, high = (
+        np.quantile(np.concatenate([episode.position[:, joint] for episode in log.episodes]), q) for q in (0.3, 0.7)
+    )
     cut = middle if high - low < 0.05 else float(rng.uniform(low, high))
     how = _columns([joint], lambda x: np.mod(x - cut, 2.0 * np.pi))
     return Wired(change(log, position=how), plant, "wrap", (log.joints[joint],))
@@ -193,12 +197,12 @@ def _frozen(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.ra
     log = play(commands)
     joint, first = _some(log, rng, 1)[0], int(rng.integers(0, max(1, len(log.episodes) // 2)))
     episodes, last = list(log.episodes), 0.0
-    for number, one in enumerate(episodes[first:], first):
-        position = one.position.copy()
+    for number, episode in enumerate(episodes[first:], first):
+        position = episode.position.copy()
         row = int(rng.integers(20, len(position) // 2)) if number == first else 0
         last = float(position[row, joint]) if number == first else last
         position[row:, joint] = last
-        episodes[number] = replace(one, position=position)
+        episodes[number] = replace(episode, position=position)
     return Wired(replace(log, episodes=tuple(episodes)), plant, "frozen", (log.joints[joint],))
 
 
@@ -213,7 +217,9 @@ def _stale(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.ran
 def _copy(commands: Sequence[np.ndarray], play: Play, plant: Plant, rng: np.random.Generator) -> Wired:
     """What is logged as the command is the position of this row or of the next one."""
     log, row = play(commands), int(rng.integers(2))
-    episodes = tuple(replace(one, action=one.position[row : row + len(one)].copy()) for one in log.episodes)
+    episodes = tuple(
+        replace(episode, action=episode.position[row : row + len(episode)].copy()) for episode in log.episodes
+    )
     return Wired(replace(log, episodes=episodes), plant, "copy", tuple(log.joints))
 
 

@@ -5,6 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 
-def did_you_mean(word: str, known: Iterable[str], *, listed: bool = False) -> str:
+def did_you_mean(word: str, candidates: Iterable[str], *, listed: bool = False) -> str:
     """Return no suggestion."""
     return ""
