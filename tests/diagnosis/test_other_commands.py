@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
+from commands import done
 from swinging_arm import FEW, NOISE, PERIOD, arm, motions
 
 from gsl.core.plant import nominal
@@ -103,3 +107,24 @@ def test_gains_that_vary_or_are_below_zero_are_refused_in_one_line() -> None:
         with_logged_gains(SIM, columns(np.arange(9.0), np.full(9, KD)), "log")
     with pytest.raises(GslError, match=r"log: kd_command\.joint is -1; a gain is not below 0"):
         with_logged_gains(SIM, columns(np.full(9, KP), np.full(9, -1.0)), "log")
+
+
+def test_a_log_of_torques_alone_is_replayed_with_servos_that_pull_to_no_position(tmp_path: Path) -> None:
+    plant = apply_all(SIM.plant, build({"servo_gain": {"kp": 0.0}}))
+    rng, held = np.random.default_rng(0), Held.of(plant, 0.0005, PERIOD, accurate=True)  # of second order
+    for number in range(4):
+        time = PERIOD * np.arange(201)
+        torque = 0.2 * np.sin(np.outer(time, rng.uniform(2.0, 12.0, 3)) + rng.uniform(0.0, 6.0, 3)).sum(axis=1)
+        sent = np.stack([0.0 * torque, 0.0 * torque, torque], axis=1)
+        position = held.play([sent[:-1]], [np.zeros(1)], settle=1)[0][:, 0] + 1e-3 * rng.standard_normal(201)
+        rows, names = np.column_stack([time, torque, position]), "t,tau,q"
+        np.savetxt(tmp_path / f"log_{number}.csv", rows, delimiter=",", header=names, comments="")
+    signals = {"torque_command": "tau", "position": "q"}
+    chosen = {"joints": ["joint"], "robot": "pendulum", "time": {"column": "t"}, "signals": signals}
+    (tmp_path / "m.yaml").write_text(yaml.safe_dump(chosen))
+    done("import", "source=log_*.csv", "mapping=m.yaml", "name=log", folder=tmp_path)
+    done("identify", "real=log", "sim=xl330_pendulum", "name=log", "evaluations=16", "workers=1", folder=tmp_path)
+    world = yaml.safe_load((tmp_path / "runs/log/identify/world/identified.yaml").read_text())
+    assert world["effects"]["servo_gain"][0] == {"kp": 0.0, "joints": "joint"}
+    report = json.loads((tmp_path / "runs/log/identify/report.json").read_text())
+    assert report["shrinkage"]["before"] < 1.5
