@@ -10,9 +10,15 @@ from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.effects import is_learned
 from gsl.rollout.parallel import threads
-from gsl.stages.effort import APART, FLOWN, LEARNED, flights, seconds_of_rollout
-from gsl.stages.effort import measured as count_measured
-from gsl.stages.effort import searched as count_searched
+from gsl.stages.effort import (
+    APART,
+    FLOWN,
+    LEARNED,
+    count_measured,
+    count_searched,
+    flights,
+    seconds_of_rollout,
+)
 from gsl.stages.iterate import Iterate
 from gsl.stages.values import Values
 

@@ -66,7 +66,7 @@ def audit_log(batch: Batch, sim: BulletWorld, name: str) -> Found:
         InputError: It is of another robot, or its gains vary.
     """
     check_joints(batch, lump(sim.plant.robot), name)
-    sim = with_logged_gains(sim, [one.sensors for one in batch.episodes], name)
+    sim = with_logged_gains(sim, [episode.sensors for episode in batch.episodes], name)
     return audit(batch, sim.plant, sim.step, checkpoint)
 
 

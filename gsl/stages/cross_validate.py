@@ -114,7 +114,7 @@ class CrossValidate:
         """Write the table and every fold."""
         log = read_logs(self.real)
         check_log(log, lump(self.sim.plant.robot), self.real)
-        sim = with_logged_gains(self.sim, [one.sensors for one in log.episodes], self.real)
+        sim = with_logged_gains(self.sim, [episode.sensors for episode in log.episodes], self.real)
         if sim is not self.sim:
             return replace(self, sim=sim).run(folder, console)
         if on_ground(log):

@@ -83,7 +83,7 @@ class Diagnose:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json, report.html, the diagnosed world and the next experiment."""
         log = read_logs(self.real)
-        sim = with_logged_gains(self.sim, [one.sensors for one in log.episodes], self.real)
+        sim = with_logged_gains(self.sim, [episode.sensors for episode in log.episodes], self.real)
         if sim is not self.sim:
             console.status("note: the simulator's servos get the gains of the log")
             return replace(self, sim=sim).run(folder, console)

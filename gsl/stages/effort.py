@@ -46,29 +46,29 @@ def foresee(iterate: Iterate) -> tuple[list[Part], str]:
     parts = links(iterate, sim, real)
     seconds = sum(part.seconds for part in parts)
     rounds = several(iterate.iterations, "iteration")
-    walks = several(searched(iterate) * (iterate.iterations + iterate.beside + iterate.pretrained), "rollout")
-    told = f"about {duration(seconds)} for {rounds} with {walks} of searches at most"
-    return parts, f"{told}; a run that is stopped goes on where it was"
+    walks = several(count_searched(iterate) * (iterate.iterations + iterate.beside + iterate.pretrained), "rollout")
+    line = f"about {duration(seconds)} for {rounds} with {walks} of searches at most"
+    return parts, f"{line}; a run that is stopped goes on where it was"
 
 
 def links(iterate: Iterate, sim: float = ROLLOUT, real: float = ROLLOUT) -> list[Part]:
     """Return the links that an iteration builds at most, in their order, with rollouts of so many seconds."""
     budget, workers = iterate.budget, threads(iterate.workers)
     learned = is_learned(iterate.grounding)
-    found = [_search(iterate, sim)] if iterate.pretrained else []
-    found += _in_the_air(iterate)
+    parts = [_search(iterate, sim)] if iterate.pretrained else []
+    parts += _in_the_air(iterate)
     for _ in range(iterate.iterations):
         for role, count, each in ((REAL, sum(budget.real), real), (SIM, sum(budget.sim), sim)):
             if role in evidence_of(iterate.grounding):
-                found.append(Part(count * each / workers, count))
+                parts.append(Part(count * each / workers, count))
         if learned:
             models = 2 if isinstance(innermost(iterate.grounding), ActionTransformation) else 1
-            found += [Part(APART / models)] * models
-        found += [_search(iterate, sim * (LEARNED if learned else 1.0)), _measurement(iterate, real)]
-    return found + ([_search(iterate, sim), _measurement(iterate, real)] if iterate.beside else [])
+            parts += [Part(APART / models)] * models
+        parts += [_search(iterate, sim * (LEARNED if learned else 1.0)), _measurement(iterate, real)]
+    return parts + ([_search(iterate, sim), _measurement(iterate, real)] if iterate.beside else [])
 
 
-def searched(iterate: Iterate) -> int:
+def count_searched(iterate: Iterate) -> int:
     """Return how many rollouts, or steps of a learner, a search plays at most."""
     optimizer = iterate.optimizer
     if isinstance(optimizer, Search):
@@ -76,7 +76,7 @@ def searched(iterate: Iterate) -> int:
     return optimizer.steps_taken + optimizer.generations * iterate.budget.rollouts
 
 
-def measured(iterate: Iterate) -> int:
+def count_measured(iterate: Iterate) -> int:
     """Return how many episodes a measurement takes, about."""
     budget = iterate.budget
     return (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
@@ -105,21 +105,21 @@ def seconds_of_rollout(iterate: Iterate, world: World, role: str) -> float:
 
 
 def _search(iterate: Iterate, each: float) -> Part:
-    count, generations = searched(iterate), iterate.optimizer.generations
+    count, generations = count_searched(iterate), iterate.optimizer.generations
     if isinstance(iterate.optimizer, Search):
         return Part(count * each / threads(iterate.workers), count + generations * iterate.budget.screening)
     return Part(count * STEP + generations * iterate.budget.rollouts * each, count)
 
 
 def _measurement(iterate: Iterate, each: float) -> Part:
-    return Part(measured(iterate) * each / threads(iterate.workers), measured(iterate))
+    return Part(count_measured(iterate) * each / threads(iterate.workers), count_measured(iterate))
 
 
 def _in_the_air(iterate: Iterate) -> Sequence[Part]:
     """Return the links of motions in the air: each is made of the same excitation, which is there after the first."""
-    excitation, found = iterate.diagnosis.excitation, list[Part]()
+    excitation, parts = iterate.diagnosis.excitation, list[Part]()
     for name in flights(iterate.grounding):
-        count = 0 if found else len(excitation.programme)
+        count = 0 if parts else len(excitation.programme)
         seconds = FLOWN[name] * excitation.duration * len(excitation.motions)
-        found += [Part(count * ROLLOUT, count), Part(seconds, iterate.diagnosis.evaluations * (name == "identify"))]
-    return found
+        parts += [Part(count * ROLLOUT, count), Part(seconds, iterate.diagnosis.evaluations * (name == "identify"))]
+    return parts

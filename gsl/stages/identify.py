@@ -62,7 +62,7 @@ class Identify:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json and the identified world."""
         log = read_motions(self.real, lump(self.sim.plant.robot))
-        sim = with_logged_gains(self.sim, [one.sensors for one in log.records], self.real)
+        sim = with_logged_gains(self.sim, [record.sensors for record in log.records], self.real)
         if sim is not self.sim:
             return replace(self, sim=sim).run(folder, console)
         options = Options(self.without, threads=threads(self.workers))

@@ -75,7 +75,7 @@ class TrainServo:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the checkpoint, the world that it makes and what it has learned as curves."""
         exp = read_motions(self.real, lump(self.sim.plant.robot), self.held_out)
-        sim = with_logged_gains(self.sim, [one.sensors for one in exp.records], self.real)
+        sim = with_logged_gains(self.sim, [record.sensors for record in exp.records], self.real)
         if sim is not self.sim:
             return replace(self, sim=sim).run(folder, console)
         if len(exp.held_out) < 2:

@@ -59,12 +59,12 @@ class Browser:
     def __init__(self, program: str, home: str) -> None:
         read, write = os.pipe()
         answers, say = os.pipe()
-        theirs = [fcntl.fcntl(one, fcntl.F_DUPFD, FREE) for one in (read, say)]
+        theirs = [fcntl.fcntl(end, fcntl.F_DUPFD, FREE) for end in (read, say)]
         words = [program, *FLAGS, f"--user-data-dir={home}", "about:blank"]
         line = f'exec "$0" "$@" 3<&{theirs[0]} 4>&{theirs[1]}'
         self._process = subprocess.Popen(["bash", "-c", line, *words], pass_fds=theirs, stderr=subprocess.DEVNULL)
-        for one in (read, say, *theirs):
-            os.close(one)
+        for end in (read, say, *theirs):
+            os.close(end)
         self._to, self._from, self._heard = write, answers, b""
         self._number, self._session, self._loaded = 0, "", False
         self.wrong: list[str] = []
@@ -98,8 +98,8 @@ class Browser:
         with contextlib.suppress(OSError, EOFError):
             self._session = ""
             self._ask("Browser.close")
-        for one in (self._to, self._from):
-            os.close(one)
+        for end in (self._to, self._from):
+            os.close(end)
         self._process.wait(timeout=PATIENCE)
 
     def _ask(self, method: str, **settings: Any) -> dict[str, Any]:
@@ -110,8 +110,8 @@ class Browser:
         while (answer := self._hear()).get("id") != self._number:
             pass
         assert "error" not in answer, answer
-        found: dict[str, Any] = answer["result"]
-        return found
+        result: dict[str, Any] = answer["result"]
+        return result
 
     def _hear(self) -> dict[str, Any]:
         """Return the next message, and note what it complains of."""
@@ -166,7 +166,7 @@ def check_seen(path: Path, *figures: str) -> None:
         for width in (DESK, PHONE):
             shown.open(path, width)
             text = " ".join(str(shown.value("document.body.innerText")).split())
-            assert [one for one in figures if one not in text] == []
+            assert [figure for figure in figures if figure not in text] == []
             assert shown.value("document.documentElement.scrollWidth") <= width
             assert shown.value(CUT_OR_COVERED) == []
             assert shown.wrong == []

@@ -90,22 +90,22 @@ def test_gain_lag_and_friction_are_recovered(slow: LearnedServo) -> None:
 def with_beside(batch: Batch, plant: Plant) -> Batch:
     """The same motions with desired speeds and feed-forward torques beside the targets."""
     rng, episodes = np.random.default_rng(7), []
-    for one in batch.episodes:
+    for episode in batch.episodes:
         others = np.hstack([5.0 * commands(rng, PERIOD, 4.0), 0.2 * commands(rng, PERIOD, 4.0)])
-        path = Held.of(plant, STEP, PERIOD).play([np.hstack([one.action, others])], [one.action[0]], 1)[0]
+        path = Held.of(plant, STEP, PERIOD).play([np.hstack([episode.action, others])], [episode.action[0]], 1)[0]
         position = path + NOISE * rng.standard_normal(path.shape)
         columns = dict(
             zip(("velocity_command.joint", "torque_command.joint"), np.vstack([others, others[-1:]]).T, strict=True)
         )
-        episodes.append(replace(one, position=position, velocity=slope(position, PERIOD), sensors=columns))
+        episodes.append(replace(episode, position=position, velocity=slope(position, PERIOD), sensors=columns))
     return replace(batch, episodes=tuple(episodes))
 
 
 def test_a_servo_is_learned_beneath_which_other_commands_act() -> None:
     batch = with_beside(log(real(SLOW)), real(SLOW))
-    found = learned(cut_log(batch, ROBOT))
-    assert found.before["all"] > 10.0
-    assert found.after["all"] < 1.5
+    servo = learned(cut_log(batch, ROBOT))
+    assert servo.before["all"] > 10.0
+    assert servo.after["all"] < 1.5
 
 
 def test_a_report_says_what_held_out_motions_say(slow: LearnedServo) -> None:

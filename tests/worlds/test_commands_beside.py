@@ -79,10 +79,10 @@ def in_bullet(plant: Plant, sent: np.ndarray, start: np.ndarray, step: float) ->
 @pytest.mark.parametrize("name", SERVOS)
 def test_the_chain_model_does_what_the_equation_says(name: str) -> None:
     sent = commands(name)
-    told = Held.of(unlimited(*SERVOS[name]), 0.0005, PERIOD, accurate=True).replay(window(sent, np.array([START])))
+    played = Held.of(unlimited(*SERVOS[name]), 0.0005, PERIOD, accurate=True).replay(window(sent, np.array([START])))
     truth = solve(*SERVOS[name], sent)
     assert np.ptp(truth) > 0.1
-    np.testing.assert_allclose(told[0, :, 0], truth, atol=2e-5)
+    np.testing.assert_allclose(played[0, :, 0], truth, atol=2e-5)
 
 
 @pytest.mark.parametrize("name", ["all three, late", "torque control", "velocity control"])
