@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 from gsl.commandline.own_word import find_own_modules, find_trust
 from gsl.commandline.rebuild import rebuild
+from gsl.core.described import describe
 from gsl.errors import ArtifactError, ConfigError
 from gsl.report.console import Console
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact, build
 from gsl.storage.hashing import CIRCUMSTANCES, SHORT
 from gsl.storage.references import resolve
+from gsl.worlds.external import ExternalRobot, asking
 
 AGAIN = "_rerun"
 """What is added to the name of a run."""
@@ -42,7 +46,7 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
         raise ArtifactError(place, "exists; take it away or choose another out=")
     trust = find_trust(settings)
     find_own_modules(trust)
-    stage, config = rebuild(old, trust)
+    stage, config = _ask_beside(*rebuild(old, trust), folder)
     command = f"gsl rerun {folder.as_posix()}"
     new = build(stage, config=config, out=place, command=command, force=False, console=console)
     rows = list(_compare(old, new))
@@ -61,6 +65,14 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
         return 1
     message = f"{place.as_posix()}: another payload than {folder.as_posix()}: {', '.join(other)}{_why(old, new)}"
     return console.error(message, 1, command="gsl rerun")
+
+
+def _ask_beside(stage: Any, config: dict[str, Any], folder: Path) -> tuple[Any, dict[str, Any]]:
+    """Return both with the requests of a real robot where gsl writes them, whatever the settings say."""
+    for name in [field.name for field in fields(stage) if isinstance(getattr(stage, field.name), ExternalRobot)]:
+        world = asking(getattr(stage, name), folder)
+        stage, config = replace(stage, **{name: world}), {**config, name: describe(world)}
+    return stage, config
 
 
 def _beside(folder: Path) -> Path:

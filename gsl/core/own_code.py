@@ -8,10 +8,12 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 from gsl.errors import GslError
 
 OURS = "gsl"
+PACKAGES = (OURS, "gsl_experiments", "gsl_benchmarks")  # what fails in these is our fault and no user's
 FOLDERS = {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
 """Where Python and its packages lie: what fails there without a caller elsewhere is not a user's own."""
 
@@ -32,7 +34,7 @@ def package_of(kind: type) -> Path | None:
 
 def describe_own(error: BaseException) -> str | None:
     """Return where a user's own code failed and how, None if no code of a user's was running."""
-    own = [frame for frame, _ in traceback.walk_tb(error.__traceback__) if _is_own_file(frame.f_code.co_filename)]
+    own = [frame for frame, _ in traceback.walk_tb(error.__traceback__) if _is_own_frame(frame)]
     if not own:
         return None
     line = next(line for frame, line in reversed([*traceback.walk_tb(error.__traceback__)]) if frame is own[-1])
@@ -59,7 +61,8 @@ def name_failures() -> Iterator[None]:
         raise GslError(line) from error
 
 
-def _is_own_file(name: str) -> bool:
-    path = Path(name)
-    ours = Path(__file__).parents[1]
-    return path.is_file() and not any(folder in path.parents for folder in (ours, *FOLDERS))
+def _is_own_frame(frame: FrameType) -> bool:
+    if str(frame.f_globals.get("__name__", "")).partition(".")[0] in PACKAGES:
+        return False
+    path = Path(frame.f_code.co_filename)
+    return path.is_file() and not any(folder in path.parents for folder in FOLDERS)

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 from commands import ENVIRONMENT, done, gsl, refused
+from strangers import seal
 
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ArtifactError
 from gsl.storage import manifest
 from gsl.storage.hashing import file_hash
-from gsl.storage.manifest import HASH, hash_entries
 from gsl.storage.trajectories import write
 
 pytestmark = pytest.mark.slow
@@ -35,17 +35,6 @@ def artifact(tmp_path: Path) -> Path:
     (tmp_path / "evil.py").write_text(MARK)
     done("import", "source=log.csv", "mapping=plain", "name=a", folder=tmp_path)
     return tmp_path / "runs/a/import"
-
-
-def seal(artifact: Path, **entries: Any) -> None:
-    """Write a manifest as a stranger would: all hashes are right."""
-    stored = json.loads((artifact / manifest.NAME).read_text())
-    files = {
-        name: {"sha256": file_hash(artifact / name), "bytes": (artifact / name).stat().st_size}
-        for name in stored["files"]
-    }
-    stored = {key: value for key, value in stored.items() if key != HASH} | {"files": files} | entries
-    (artifact / manifest.NAME).write_text(json.dumps({**stored, HASH: hash_entries(stored)}))
 
 
 def test_a_film_of_a_log_imports_no_robot_that_only_the_log_names(artifact: Path, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import SMALL, done, gsl, refused
+from strangers import seal
 
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.runner.journal import ANSWER, RETURNS
@@ -140,6 +141,19 @@ def test_a_tape_measure_gives_the_same_values_as_a_log_of_the_base(
         for row, other in zip(ours[phase], theirs[phase], strict=True):
             assert row["values"] == pytest.approx(other["values"], rel=1e-9)
             assert row["outcome"] == pytest.approx(other["outcome"], rel=1e-9)
+
+
+def test_a_run_of_a_real_robot_is_repeated_from_its_answers_wherever_its_settings_point(tmp_path: Path) -> None:
+    words = ("collect", *SMALL, "world=robot", "name=two")
+    done("rehearse", f"request={_asked(*words, folder=tmp_path)}", "world=nao_worn", folder=tmp_path)
+    done(*words, folder=tmp_path)
+    made = tmp_path / "runs/two/collect_real"
+    text = (made / "config.yaml").read_text()
+    assert "requests: runs/two/collect_real.request" in text
+    (made / "config.yaml").write_text(text.replace("runs/two/collect_real.request", "elsewhere"))
+    seal(made)
+    done("rerun", "two/collect_real", folder=tmp_path)
+    assert not (tmp_path / "elsewhere").exists()
 
 
 COLLECT = ("collect", *SMALL, "world=robot", "name=one", "recipe.spread=0.02")

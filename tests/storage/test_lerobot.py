@@ -240,6 +240,10 @@ def test_a_data_set_without_names_is_asked_for_them(tmp_path: Path) -> None:
         (lambda f: (f / "meta/episodes.jsonl").write_text('{"length": 3}'), "row 0: has no whole number for each of"),
         (lambda f: (f / "meta/episodes.jsonl").write_text(""), "wave: has no episode; was the recording finished"),
         (
+            lambda f: (f / "meta/episodes.jsonl").write_text('{"episode_index": 0, "length": 3}\n' * 100_001),
+            "wave: has more than 100,000 episodes",
+        ),
+        (
             lambda f: (f / "meta/episodes.jsonl").write_text('{"episode_index": 0, "length": 3}'),
             "has 150 frames of episode 0, meta says 3",
         ),

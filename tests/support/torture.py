@@ -28,7 +28,7 @@ import yaml
 from commands import SMALL, done
 from torture_faults import FAULTS, fault, fill, flip
 from torture_inputs import ROOT, feed
-from torture_kills import ASKED, BLIND, kill, shares
+from torture_kills import ANSWERING, ASKED, BLIND, kill, shares
 
 from gsl.storage.hashing import sources_hash
 
@@ -136,6 +136,7 @@ def air(place: Path) -> Path:
     done("collect", "role=real", "name=air", "task=excite", "world=nao_worn", *motions, folder=place)
     done("collect", "role=real", "world=robot", "name=asked", *SMALL, folder=place)
     done("blind", "make", "name=blind", *BLIND, folder=place)
+    done("blind", "answer", "name=blind", *ANSWERING, folder=place)
     write_log(place / "runs/files")
     write_returns(place / "runs/files/returns.csv", place / ASKED / "request.json")
     return place

@@ -28,9 +28,12 @@ BLIND = (
     *("cases=2", "mix.foreign=120", "excitation.motions=[steps_large,triangle_fast]", "programmes=1", "workers=1"),
     *("excitation.repeated=[steps_large]", "excitation.duration=1.6"),
 )
+REVEALED = ("data=runs/blind/blind_make",)
+ANSWERING = (*REVEALED, "most=1", "duels=0", "nulls=0", "workers=1")
 ASKED = "runs/asked/collect_real.request"  # what a robot was asked
 SHARE = {  # those that take long
-    **dict.fromkeys(("train-servo", "blind answer", "survey"), 0.15), "compare": 0.3, "iterate": 0.6, "identify": 0.6,
+    **dict.fromkeys(("train-servo", "blind answer", "survey", "cross-validate"), 0.15),
+    **dict.fromkeys(("iterate", "identify", "audit"), 0.6), "compare": 0.3,
 }  # fmt: skip
 KILLED = {
     "collect": ("role=real", *SMALL),
@@ -46,9 +49,13 @@ KILLED = {
     "iterate": (*SMALL, "grounding=gat", "accept=true", "forward_model=linear"),
     "diagnose": (*AIR, "most=1", "duels=0", "nulls=0", "limits=false"),
     "identify": (*AIR, "evaluations=160"),
+    "audit": AIR[:2],
+    "cross-validate": (*AIR, "usual=[coulomb_friction]", "gat=null", "most=1", "duels=0", "nulls=0", "folds=2"),
+    "export": ("world=nao_worn", "format=mjcf"),
     "import": ("source=runs/files/log.csv", "mapping=runs/files/mine.yaml"),
     "blind make": BLIND,
-    "blind answer": ("data=runs/blind/blind_make", "most=1", "duels=0", "nulls=0", "workers=1"),
+    "blind answer": ANSWERING,
+    "blind reveal": (*REVEALED, "answers=runs/blind/blind_answer", "labels=runs/blind/blind_make_labels"),
     "answer": (f"request={ASKED}", "returns=runs/files/returns.csv", "out=runs/k/answer"),
     "rehearse": (f"request={ASKED}", "out=runs/k/rehearsal"),
     "survey": SMALL,

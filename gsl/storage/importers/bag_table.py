@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.budget import within
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.sizes import check_need
 from gsl.storage.importers.table import numbers
 
 STAMP = "time"
+LONG = 3600.0  # of CPU: a bag of hours is no attack, one whose messages unpack to more than the memory is
 NANOSECOND = 1e-9
 
 
@@ -27,7 +29,8 @@ class BagTable:
 
     def __init__(self, path: Path, topic: str, memory: float) -> None:
         self.path, self.topic, self.memory = path, topic, memory
-        first = next(self._messages(), None)
+        with within(f"{path}: reading it", seconds=LONG, growth=memory):
+            first = next(self._messages(), None)
         if first is None:
             raise TrajectoryError(path, f"has no message on {topic}; record it again")
         self.fields: Mapping[str, Any] = {}
@@ -37,14 +40,15 @@ class BagTable:
         """Return the wanted fields, a row a message."""
         found: dict[str, list[Any]] = {name: [] for name in wanted}
         fields = {re.split(r"[.\[]", name, maxsplit=1)[0] for name in wanted}
-        for row, (stamp, message) in enumerate(self._messages()):
-            values = {**_flat(message, fields=fields), STAMP: stamp}
-            for name, column in found.items():
-                if name not in values:
-                    raise TrajectoryError(self.path, f"a message on {self.topic} lacks it", column=name, row=row)
-                column.append(values[name])
-            if row % 10_000 == 0:
-                check_need(self.path, 50.0 * row * len(found), self.memory)
+        with within(f"{self.path}: reading it", seconds=LONG, growth=self.memory):
+            for row, (stamp, message) in enumerate(self._messages()):
+                values = {**_flat(message, fields=fields), STAMP: stamp}
+                for name, column in found.items():
+                    if name not in values:
+                        raise TrajectoryError(self.path, f"a message on {self.topic} lacks it", column=name, row=row)
+                    column.append(values[name])
+                if row % 10_000 == 0:
+                    check_need(self.path, 50.0 * row * len(found), self.memory)
         return {name: numbers(self.path, name, values) for name, values in found.items()}
 
     def _messages(self) -> Iterator[tuple[float, Any]]:

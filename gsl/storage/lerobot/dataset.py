@@ -7,6 +7,7 @@ src/lerobot/datasets. Version 2 keeps one parquet file an episode, version 3 sev
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ STATE, ACTION = "observation.state", "action"
 VERSIONS = ("v2.0", "v2.1", "v3.")
 BY_EPISODE = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"  # of version 2
 BY_FILE = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"  # of version 3
+MOST_EPISODES = 100_000
 MOST = 10**9  # of a number that an episode, a chunk or a file has, or of its frames
 
 
@@ -104,7 +106,9 @@ def open_data_set(folder: Path, memory: float) -> DataSet:
     chunk = info.get("chunks_size", 1000)
     if type(chunk) is not int or not 0 < chunk < MOST:
         raise TrajectoryError(folder / INFO, f"chunks_size is {chunk!s:.20}, no number of episodes")
-    told = list(_read_episodes(folder, version, memory))
+    told = list(islice(_read_episodes(folder, version, memory), MOST_EPISODES + 1))
+    if len(told) > MOST_EPISODES:
+        raise TrajectoryError(folder, f"has more than {MOST_EPISODES:,} episodes; take apart what you want to read")
     if not told:
         raise TrajectoryError(folder, "has no episode; was the recording finished (dataset.finalize())?")
     found = []
