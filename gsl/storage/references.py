@@ -17,6 +17,8 @@ MAKERS = {
     "collect_sim": "collect role=sim",
     "train_forward": "train-forward",
     "train_inverse": "train-inverse",
+    "train_servo": "train-servo",
+    "train_grounding": "train-grounding",
     "optimize": "optimize",
 }
 """Commands that make an artifact of a run, by the name that it has there."""

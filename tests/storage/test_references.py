@@ -33,9 +33,10 @@ def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("quick-start/optimize", "optimize"),
         ("study/iteration_01/optimize", "optimize"),
         ("study/iteration_02/optimize", "optimize"),
-        ("study/.optimize.partial", "evaluate"),
+        ("study/killed", "evaluate"),
     ):
         build(Noting(kind), config={}, out=Path("runs") / place, command="", force=False, console=None)
+    Path("runs/study/killed").rename("runs/study/.optimize.partial")
     return Path("runs")
 
 
@@ -71,6 +72,8 @@ def test_the_likely_name_is_suggested(runs: Path) -> None:
         resolve("study/optimise")
     with pytest.raises(ArtifactError, match="; gsl train-forward name=mine makes it$"):
         resolve("mine/train_forward")
+    with pytest.raises(ArtifactError, match="; gsl train-servo name=mine makes it$"):
+        resolve("mine/train_servo")
     with pytest.raises(ArtifactError, match="no such run"):
         resolve("anything", runs=Path("nowhere"))
     with pytest.raises(ArtifactError, match="empty"):
