@@ -48,11 +48,11 @@ def test_the_page_is_whole_and_needs_nothing_else(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["causes", "25 joints"])
 def test_a_browser_shows_a_diagnosis_at_any_width(kind: str, tmp_path: Path) -> None:
-    found = DOCUMENTS[kind]()
-    text = report_html(found)
+    verdict = DOCUMENTS[kind]()
+    text = report_html(verdict)
     (tmp_path / "report.html").write_text(text, encoding="utf-8")
     answers = words(text).split("Where is the gap?")[1].split("Caveats")[0]
-    check_seen(tmp_path / "report.html", headline(found), answers.strip())
+    check_seen(tmp_path / "report.html", headline(verdict), answers.strip())
 
 
 def test_long_records_of_many_joints_stay_small() -> None:
