@@ -72,6 +72,7 @@ class BlindAnswer:
     duels: Annotated[int, setting("simulated logs of each surviving cause in the self-test", ge=0)] = 2
     nulls: Annotated[int, setting("simulated logs without an effect in the self-test", ge=0)] = 3
     workers: Workers = -1
+    trust: Annotated[tuple[str, ...], setting("modules of your own whose robots the cases may name")] = ()
 
     def parents(self) -> Mapping[str, Path]:
         """Return the seals of the data, which hold the hash of every file of it."""
@@ -107,7 +108,8 @@ class BlindAnswer:
         missing = [case for case in sorted(cases) if not _file(folder, case).exists()]
         tasks = [_Task(case, folder, _nulls(folder, leaders.get(case))) for case in missing]
         options = Options(most=self.most, duels=self.duels, nulls=self.nulls, threads=1)
-        for index, (hashes, seconds) in arriving(_answer, (options, self.baselines), tasks, self.workers, progress):
+        shared = options, self.baselines, self.trust
+        for index, (hashes, seconds) in arriving(_answer, shared, tasks, self.workers, progress):
             answered.append(hashes)
             note_step(missing[index].name, 1, **seconds)
 
@@ -160,8 +162,8 @@ def _answer(frozen: bytes, task: _Task) -> tuple[dict[str, str], dict[str, float
     Returns:
         The hashes of the files by name, and the time that each answer took [s] by the name of who gave it.
     """
-    options, baselines = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
-    question, without = _question(task.case)
+    options, baselines, trust = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
+    question, without = _question(task.case, trust)
     asked = replace(options, without=tuple(without))
     files, seconds = [], {}
     for name, (answer, took) in (answer_by_baselines(question, asked, _quiet) if baselines else {}).items():
@@ -177,8 +179,8 @@ def _answer(frozen: bytes, task: _Task) -> tuple[dict[str, str], dict[str, float
     return {path.relative_to(task.folder).as_posix(): file_hash(path) for path in files}, seconds
 
 
-def _question(folder: Path) -> tuple[Question, list[str]]:
-    log, reference, asked = read_case(folder)
+def _question(folder: Path, trust: tuple[str, ...]) -> tuple[Question, list[str]]:
+    log, reference, asked = read_case(folder, trust)
     world = make(BulletWorld, asked["sim"], where=f"{folder.name}.sim")
     question = Question(log, reference, world.plant, world.step, on_ground(log))
     check_log(log, question.robot, str(folder))

@@ -54,7 +54,7 @@ def in_order(
         yield from side_by_side(study, folder, trials, -1, console)
         return
     items = [item for items in trials.values() for item in items]
-    with console.plan("result", [Part(seconds / len(items))] * len(items)):
+    with console.plan("result", [Part(seconds / max(len(items), 1))] * len(items)):
         for item in items:
             with console.plan("stage", links(item)):
                 results = list(study.results(folder.parent, item, console))

@@ -66,7 +66,7 @@ def toy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done("blind", "make", "cases=2", "mix.foreign=120", *TOY, folder=folder)
     labels = folder / "runs/toy/blind_make_labels"
     shutil.move(labels, folder / "away")  # nothing of it may be needed for an answer
-    done("blind", "answer", "baselines=true", *QUICK, folder=folder)
+    done("blind", "answer", "baselines=true", "trust=blind_arm", *QUICK, folder=folder)
     shutil.move(folder / "away", labels)
     done("blind", "reveal", "name=toy", folder=folder)
     return folder
@@ -166,7 +166,7 @@ def test_a_stopped_run_goes_on_with_what_is_missing(toy: Path, tmp_path: Path) -
     (tmp_path / "answers/case_0002.json").write_text("of a worker that was killed")
     record = {"answers/case_0001.json": file_hash(tmp_path / "answers/case_0001.json")}
     Records(tmp_path / BlindAnswer.progress, str).append(record)
-    stage = BlindAnswer(data=str(data), nulls=0, duels=0, most=1, workers=1)
+    stage = BlindAnswer(data=str(data), nulls=0, duels=0, most=1, workers=1, trust=("blind_arm",))
     result = stage.run(tmp_path, Console(json=True))
     assert result["cases"] == 2 and not (tmp_path / BlindAnswer.progress).exists()
     assert (tmp_path / "answers/case_0001.json").read_text() == left

@@ -244,7 +244,7 @@ def _stretched(lines: list[str], factor: float) -> list[str]:
         (lambda lines: lines[: 2 + 40], "must be empty (NaN) in the last row of an episode"),
         (
             lambda lines: [line.replace("gyro.x", "gyro.y") for line in lines],
-            "column gyro.y: there are 2 columns of th",
+            "column gyro.y: there are several columns of this name",
         ),
         (lambda lines: ["\x80\x04K\x01.", *lines[2:]], "does not say which request it answers"),
         (lambda lines: _changed(lines, "gyro.x", "fast"), "column gyro.x: holds what is not a number"),

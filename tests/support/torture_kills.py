@@ -30,6 +30,10 @@ BLIND = (
 )
 REVEALED = ("data=runs/blind/blind_make",)
 ANSWERING = (*REVEALED, "most=1", "duels=0", "nulls=0", "workers=1")
+FOLDED = (
+    *("usual=[coulomb_friction]", "gat=null", "by=motion", "checks=motions", "folds=2"),
+    *("most=1", "duels=0", "nulls=0"),
+)
 ASKED = "runs/asked/collect_real.request"  # what a robot was asked
 SHARE = {  # those that take long
     **dict.fromkeys(("train-servo", "blind answer", "survey", "cross-validate"), 0.15),
@@ -50,7 +54,7 @@ KILLED = {
     "diagnose": (*AIR, "most=1", "duels=0", "nulls=0", "limits=false"),
     "identify": (*AIR, "evaluations=160"),
     "audit": AIR[:2],
-    "cross-validate": (*AIR, "usual=[coulomb_friction]", "gat=null", "most=1", "duels=0", "nulls=0", "folds=2"),
+    "cross-validate": (*AIR, *FOLDED),
     "export": ("world=nao_worn", "format=mjcf"),
     "import": ("source=runs/files/log.csv", "mapping=runs/files/mine.yaml"),
     "blind make": BLIND,

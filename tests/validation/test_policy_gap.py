@@ -211,7 +211,10 @@ def _played_as_written(comparison: Mapping[str, Any], world: Mapping[str, Any]) 
 
 
 class _Silent:
-    def advance(self, steps: int = 1) -> None:
+    def fell(self, count: int) -> None:
+        pass
+
+    def advance(self, steps: int = 1, *, worked: bool = True) -> None:
         """Say nothing."""
 
 

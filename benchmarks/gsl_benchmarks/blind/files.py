@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -47,15 +47,15 @@ def write_case(folder: Path, log: Batch, reference: Batch | None, case: Mapping[
     write_json(folder / CASE, case)
 
 
-def read_case(folder: Path) -> tuple[Batch, Batch | None, dict[str, Any]]:
-    """Return log, reference if there is one, and what case.json says, which names no code.
+def read_case(folder: Path, trust: Collection[str] = ()) -> tuple[Batch, Batch | None, dict[str, Any]]:
+    """Return log, reference if there is one, and what case.json says; the code it names is of modules in `trust`.
 
     Raises:
         ArtifactError: It is no case.
         ConfigError: Its simulator is code of somebody else.
     """
     reference, case = folder / REFERENCE, document(folder / CASE, sim=dict)
-    check_code(case, where=folder.name)
+    check_code(case, trust, where=folder.name)
     if not isinstance(case.get("without", []), list):
         raise ArtifactError(folder / CASE, "without is no list of effects; copy it again")
     return read(folder / LOG), read(reference) if reference.exists() else None, case
