@@ -103,7 +103,7 @@ def lineage(reference: Reference, json: Json = False) -> None:
     """Draw what an artifact was made from."""
     from gsl.commandline.lineage import draw_lineage
 
-    draw_lineage(reference, Console(json=json))
+    raise typer.Exit(draw_lineage(reference, Console(json=json)))
 
 
 _RERUN = "A new place, RUN_rerun by default; modules that are not gsl's and whose classes its settings may name."

@@ -44,15 +44,19 @@ def verify(reference: str | None, console: Console) -> int:
     return console.error(f"{place.as_posix()}: {problem}", 1, command="gsl verify")
 
 
-def draw_lineage(reference: str, console: Console) -> None:
-    """Draw what an artifact was made from, and what is wrong with it.
+def draw_lineage(reference: str, console: Console) -> int:
+    """Draw what an artifact was made from, and what is wrong with it; return 1 if something is.
 
     Raises:
         ArtifactError: There is no such artifact.
     """
     root = lineage(resolve(reference), set())
     console.draw(_tree(root))
-    console.result(_document(root))
+    wrong = [one for one in root.all() if one.problem]
+    console.result(_document(root) | ({"exit_code": 1} if wrong else {}))
+    if wrong and not console.json:
+        return console.error(f"{wrong[0].place.as_posix()}: {wrong[0].problem}", 1, command="gsl lineage")
+    return int(bool(wrong))
 
 
 def _tree(ancestor: Ancestor, tree: Tree | None = None) -> Tree:

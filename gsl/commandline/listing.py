@@ -24,7 +24,7 @@ from gsl.storage.artifact import Artifact
 from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.identity import content_hash
 from gsl.storage.lineage import out_of_date
-from gsl.storage.manifest import Manifest, Parent, find_damage, read
+from gsl.storage.manifest import Manifest, Parent, find_damage, read, strange_file
 from gsl.storage.references import RUNS, find_all, find_damaged, resolve
 
 
@@ -94,6 +94,8 @@ def show_artifact(reference: str, console: Console) -> int:
         console.table("settings", ["setting", "value"], rows)
     files = [(name, size(file.bytes), file.sha256[:SHORT]) for name, file in artifact.manifest.files.items()]
     state = f"changed since it was made: {damaged}" if damaged else "all files are as they were made"
+    if strange := strange_file(folder, artifact.manifest):
+        state += f"; {strange} is no file of it"
     console.table("files", ["file", "size", "sha256"], files, state)
     if damaged is None:
         return 0

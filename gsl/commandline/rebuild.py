@@ -39,8 +39,10 @@ def rebuild(artifact: Artifact, trust: Sequence[str]) -> tuple[Any, dict[str, An
 
 
 def _move(settings: Any, role: list[str], source: Path) -> None:
-    """Let a setting that says where a parent lies say where it lies now; a name, as of a robot, stays."""
+    """Let a setting that says where a parent lies say where it lies now; a name, as of a robot or a class, stays."""
     *above, name = role
+    if name == "_target_":
+        return
     for part in above:
         settings = _entry(settings, part)
     before = _entry(settings, name)

@@ -89,8 +89,9 @@ def test_the_lineage_is_a_tree_down_to_the_logs(run: Path) -> None:
     order = ["evaluate", "optimize", "train_forward", "collect_real", "train_inverse", "collect_sim"]
     assert [next(i for i, line in enumerate(lines) if f"runs/chain/{name} " in line) for name in order] == [*range(6)]
     shutil.rmtree(run / "runs/chain/collect_sim")
-    assert "does not exist" in done("lineage", "chain/evaluate", folder=run).out
-    tree = json.loads(done("lineage", "chain/optimize", "--json", folder=run).out)
+    said = gsl("lineage", "chain/evaluate", folder=run)
+    assert (said.code, "does not exist" in said.out, "does not exist" in said.lines[-1]) == (1, True, True)
+    tree = json.loads(gsl("lineage", "chain/optimize", "--json", folder=run).out)
     assert [parent["role"] for parent in tree["parents"]] == ["grounding.forward_model", "grounding.inverse_model"]
 
 
@@ -106,6 +107,26 @@ def test_a_rerun_comes_to_the_same_payload_in_another_place(stage: str, run: Pat
         2,
         [f"gsl rerun: runs/moved{AGAIN}/{stage}: exists; take it away or choose another out="],
     )
+
+
+THEIRS = """from gsl.core.setting import component
+from gsl.worlds.bullet import BulletWorld
+
+
+@component
+class Theirs(BulletWorld):
+    pass
+"""
+
+
+def test_a_run_with_a_class_of_a_colleague_is_repeated_if_it_is_trusted(tmp_path: Path) -> None:
+    (tmp_path / "theirs.py").write_text(THEIRS)
+    (tmp_path / "mine/world").mkdir(parents=True)
+    (tmp_path / "mine/world/theirs.yaml").write_text("defaults: [nao_ideal, _self_]\n_target_: theirs.Theirs\n")
+    words = ("--config-dir", "mine", "world=theirs", "trust=theirs", "name=own")
+    done("collect", *words, "preset=toy", "task.duration=1.0", "workers=1", folder=tmp_path)
+    assert "say trust=theirs" in gsl("rerun", "own/collect_real", folder=tmp_path).err
+    assert "differs" not in done("rerun", "own/collect_real", "trust=theirs", folder=tmp_path).out
 
 
 def test_settings_that_name_no_stage_are_refused(run: Path) -> None:
