@@ -14,8 +14,8 @@ from gsl.stages.effort import (
     APART,
     FLOWN,
     LEARNED,
-    count_measured,
-    count_searched,
+    count_episodes,
+    count_rollouts,
     flights,
     seconds_of_rollout,
 )
@@ -47,7 +47,7 @@ def seconds(study: Compare, *, search: bool = True) -> float:
     searched = measured = 0
     if search:
         assert isinstance(iterate.optimizer, Search), "check_search() has refused others"
-        searched, measured = count_searched(iterate), count_measured(iterate)
+        searched, measured = count_rollouts(iterate), count_episodes(iterate)
     workers = threads(iterate.workers)
     sims = study.simulators or {"": iterate.sim}
     real = sum(seconds_of_rollout(iterate, world, REAL) for world in study.worlds.values()) / len(study.worlds)

@@ -116,7 +116,7 @@ def _data(data: Document) -> Iterable[tuple[str, Part]]:
     yield "replayed by", _ENGINES.get(engine, engine)
 
 
-def _describe_verified(check: Document) -> str:
+def _describe_verification(check: Document) -> str:
     if not check:
         return ""
     windows, apart = check.get("windows"), short(check.get("chain_rms_mrad"), 2)
@@ -136,6 +136,6 @@ def _count(data: Document, keys: Sequence[tuple[str, str]]) -> str:
 def _describe_make(document: Document) -> Iterable[tuple[str, Part]]:
     command = document.get("command")
     yield "command", element("code", str(command)) if command else None
-    yield "the answer in Bullet", _describe_verified(part(document, "verified"))
+    yield "the answer in Bullet", _describe_verification(part(document, "verified"))
     world = document.get("world_file")
     yield "corrected simulator", element("code", str(world)) if world else None

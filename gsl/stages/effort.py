@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -13,14 +12,14 @@ from gsl.grounding.effects import DiagnosedEffects, evidence_of, innermost, is_l
 from gsl.grounding.gat import ActionTransformation
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.servo import LearnedServo
+from gsl.rollout.estimate import measure_rollout
 from gsl.rollout.parallel import threads
-from gsl.rollout.rollout import Scenario, rollout
+from gsl.rollout.rollout import Scenario
 from gsl.worlds.external import ExternalRobot
 
 if TYPE_CHECKING:
     from gsl.stages.iterate import Iterate
 
-TRIED = 2  # rollouts of π0 in each world, after one that compiles
 ROLLOUT = 0.3  # of a walk of 7.5 s on one core, where none is tried [s]
 STEP = 0.002  # of a learner with its network [s]
 LONG = 60.0  # what takes less is begun without a word: a rollout of each world takes seconds to load [s]
@@ -46,7 +45,7 @@ def foresee(iterate: Iterate) -> tuple[list[Part], str]:
     parts = links(iterate, sim, real)
     seconds = sum(part.seconds for part in parts)
     rounds = several(iterate.iterations, "iteration")
-    walks = several(count_searched(iterate) * (iterate.iterations + iterate.beside + iterate.pretrained), "rollout")
+    walks = several(count_rollouts(iterate) * (iterate.iterations + iterate.beside + iterate.pretrained), "rollout")
     line = f"about {duration(seconds)} for {rounds} with {walks} of searches at most"
     return parts, f"{line}; a run that is stopped goes on where it was"
 
@@ -68,7 +67,7 @@ def links(iterate: Iterate, sim: float = ROLLOUT, real: float = ROLLOUT) -> list
     return parts + ([_search(iterate, sim), _measurement(iterate, real)] if iterate.beside else [])
 
 
-def count_searched(iterate: Iterate) -> int:
+def count_rollouts(iterate: Iterate) -> int:
     """Return how many rollouts, or steps of a learner, a search plays at most."""
     optimizer = iterate.optimizer
     if isinstance(optimizer, Search):
@@ -76,7 +75,7 @@ def count_searched(iterate: Iterate) -> int:
     return optimizer.steps_taken + optimizer.generations * iterate.budget.rollouts
 
 
-def count_measured(iterate: Iterate) -> int:
+def count_episodes(iterate: Iterate) -> int:
     """Return how many episodes a measurement takes, about."""
     budget = iterate.budget
     return (iterate.optimizer.generations + 1) * budget.episodes + budget.check + 2 * budget.confirmation
@@ -95,24 +94,18 @@ def flights(method: Grounding) -> tuple[str, ...]:
 def seconds_of_rollout(iterate: Iterate, world: World, role: str) -> float:
     """Return how long a rollout of π0 takes in a world [s]."""
     scenario = Scenario(world, iterate.task, iterate.policy, role, NoGrounding())
-    env, parameters = scenario.make(), iterate.policy.initial
-    rollout(scenario, env, parameters, 0)
-    begin = time.process_time()
-    for seed in range(TRIED):
-        rollout(scenario, env, parameters, seed)
-    env.close()
-    return (time.process_time() - begin) / TRIED
+    return measure_rollout(scenario, iterate.policy.initial)
 
 
 def _search(iterate: Iterate, each: float) -> Part:
-    count, generations = count_searched(iterate), iterate.optimizer.generations
+    count, generations = count_rollouts(iterate), iterate.optimizer.generations
     if isinstance(iterate.optimizer, Search):
         return Part(count * each / threads(iterate.workers), count + generations * iterate.budget.screening)
     return Part(count * STEP + generations * iterate.budget.rollouts * each, count)
 
 
 def _measurement(iterate: Iterate, each: float) -> Part:
-    return Part(count_measured(iterate) * each / threads(iterate.workers), count_measured(iterate))
+    return Part(count_episodes(iterate) * each / threads(iterate.workers), count_episodes(iterate))
 
 
 def _in_the_air(iterate: Iterate) -> Sequence[Part]:

@@ -8,7 +8,7 @@ import pytest
 
 from gsl.commandline.composer import compose, open_hydra
 from gsl.commandline.config import prepare, resolve
-from gsl.stages.effort import count_searched, foresee, links
+from gsl.stages.effort import count_rollouts, foresee, links
 
 
 def planned(*settings: str) -> Any:
@@ -36,7 +36,7 @@ def test_twice_the_rollouts_take_twice_as_long() -> None:
     once, twice = (
         planned("preset=paper", "grounding=none", "iterations=1", f"budget.rollouts={count}") for count in (20, 40)
     )
-    assert count_searched(once) == 30_000 and count_searched(twice) == 60_000
+    assert count_rollouts(once) == 30_000 and count_rollouts(twice) == 60_000
     (search, _), (longer, _) = links(once), links(twice)
     assert longer.seconds == pytest.approx(2.0 * search.seconds) and longer.steps == 60_000
 
