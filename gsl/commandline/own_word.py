@@ -6,6 +6,7 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from importlib.machinery import PathFinder
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
@@ -37,6 +38,13 @@ def find_trust(arguments: Sequence[str]) -> tuple[str, ...]:
     for key, value in _split_words(arguments):
         named += modules_of(value) if key == TRUST else modules_in({key.rpartition(".")[2]: value})
     return tuple(dict.fromkeys(named))
+
+
+def find_misspelt(arguments: Sequence[str]) -> list[str]:
+    """Return the modules that `trust=` names on a command line and that are nowhere to be imported from."""
+    typed = [module for key, value in _split_words(arguments) if key == TRUST for module in modules_of(value)]
+    places = [os.getcwd(), *sys.path]
+    return [module for module in typed if PathFinder.find_spec(module.partition(".")[0], places) is None]
 
 
 def modules_of(value: Any) -> tuple[str, ...]:

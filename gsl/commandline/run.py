@@ -13,7 +13,8 @@ from gsl.commandline.composer import compose, open_hydra
 from gsl.commandline.config import execute, prepare, resolve
 from gsl.commandline.multirun import run_jobs
 from gsl.commandline.own_effects import load_own_effects
-from gsl.commandline.own_word import find_trust
+from gsl.commandline.own_word import find_misspelt, find_trust
+from gsl.core.trust import TRUST
 from gsl.report.console import Console, divert_prints
 
 
@@ -45,6 +46,8 @@ def run(
     with open_hydra(config_dir):
         for reason in load_own_effects(config_dir, find_trust(overrides)):
             console.status(f"left out: {reason}")
+        for module in find_misspelt(overrides):
+            console.status(f"warning: {TRUST}={module} is no module of this folder, nor of an installed package")
         composition = compose(command, overrides, multirun=multirun)
         if cfg:
             console.result(resolve(composition), text=OmegaConf.to_yaml(OmegaConf.create(resolve(composition))))

@@ -17,8 +17,9 @@ from omegaconf.errors import OmegaConfBaseException
 from omegaconf.grammar.gen.OmegaConfGrammarParser import OmegaConfGrammarParser
 from omegaconf.grammar_parser import parse
 
+from gsl.commandline.overrides import FILE_GROUPS
 from gsl.core.budget import SETTINGS, read_text
-from gsl.core.trust import TRUST
+from gsl.core.trust import TARGET, TRUST
 from gsl.core.yaml_tree import yaml_tree
 from gsl.errors import InputError
 
@@ -51,6 +52,8 @@ class BudgetedFiles(FileConfigSource):
         ours = path.is_relative_to(os.path.realpath(self.path))
         if self.provider == USER or not ours:
             check_file(path, config_path if ours else path.stem)
+            if config_path.partition("/")[0] in FILE_GROUPS:
+                _check_builds_nothing(path)
         return super().load_config(config_path)
 
 
@@ -69,6 +72,11 @@ def check_file(path: Path, name: str) -> None:
         raise InputError(f"{path}: refers to {resolver}; a file refers to settings, such as ${{sim.robot}}, alone")
     if TRUST in settings or TRUST in package.split("."):
         raise InputError(f"{path}: says {TRUST}, which only you can say, on the command line")
+
+
+def _check_builds_nothing(path: Path) -> None:
+    if TARGET in _words(yaml_tree(path, read_text(path), SETTINGS)):
+        raise InputError(f"{path}: names a class, as {TARGET}, and a mapping builds none; leave it out")
 
 
 def _words(value: Any) -> Iterator[str]:

@@ -190,15 +190,19 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
                 return None
             raise
         raise ArtifactError(out, "exists and is no artifact of gsl; move it away or choose another out=") from error
-    damaged = manifest.find_damage(out, found.manifest)
-    wrong = f"changed since: {damaged}" if damaged else broken_link(out, found.manifest)
-    if found.manifest.key == identity.key and wrong is None:
+    damaged, same = manifest.find_damage(out, found.manifest), found.manifest.key == identity.key
+    broken = None if damaged else broken_link(out, found.manifest)
+    if same and damaged is None and broken is None:
         return found
     if force:
         return None
-    if damaged is None and found.manifest.key != identity.key:
-        wrong = changes(found.manifest, found.config, identity, config)
-    raise ArtifactError(out, f"was built otherwise ({wrong}); force=true {forced}, another name= keeps both")
+    if damaged:
+        problem = f"is damaged: {damaged} was changed since"
+    elif not same:
+        problem = f"was built otherwise ({changes(found.manifest, found.config, identity, config)})"
+    else:
+        problem = f"is not whole any more: {broken}"
+    raise ArtifactError(out, f"{problem}; force=true {forced}, another name= keeps both")
 
 
 def _work(
