@@ -16,7 +16,9 @@ INTERRUPTED = 130
 def report(failure: BaseException, console: Console, *, command: str = "gsl") -> int:
     """Say what ended a command and return its exit code: 2 usage, input; 1 a stage failed; 130 interrupted; 0 waits."""
     if isinstance(failure, KeyboardInterrupt) or is_interrupted():
-        return console.error("interrupted; the same command goes on from what is built", INTERRUPTED, command=command)
+        return console.error(
+            "interrupted; what is complete stays, and the same command does the rest", INTERRUPTED, command=command
+        )
     if isinstance(failure, Waiting):
         console.status(str(failure))
         console.result({"waiting": failure.request, "missing": failure.missing}, text=failure.request.as_posix())

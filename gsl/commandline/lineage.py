@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gsl.errors import ArtifactError
 from gsl.report.console import Console
 from gsl.storage.hashing import SHORT
 from gsl.storage.lineage import Ancestor, lineage
-from gsl.storage.references import artifact_folders, resolve
+from gsl.storage.references import RUNS, artifact_folders, resolve
 
 if TYPE_CHECKING:
     from rich.tree import Tree
@@ -27,6 +28,8 @@ def verify(reference: str | None, console: Console) -> int:
     wrong: dict[Path, str] = {}
     seen: set[Path] = set()
     folders = artifact_folders(reference)
+    if not folders:
+        raise ArtifactError(RUNS, "holds no artifact, so nothing is verified; go to the folder that runs/ lies in")
     for folder in folders:
         for one in lineage(folder, seen).all():
             if one.problem and one.place not in wrong:

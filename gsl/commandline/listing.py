@@ -24,7 +24,7 @@ from gsl.storage.artifact import Artifact
 from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.identity import content_hash
 from gsl.storage.lineage import out_of_date
-from gsl.storage.manifest import Manifest, Parent, find_damage, read, strange_file
+from gsl.storage.manifest import Manifest, Parent, describe_damage, find_damage, read, strange_file
 from gsl.storage.references import RUNS, find_all, find_damaged, resolve
 
 
@@ -93,13 +93,13 @@ def show_artifact(reference: str, console: Console) -> int:
         rows = [_setting(name, value) for name, value in artifact.config.items() if not name.startswith("_")]
         console.table("settings", ["setting", "value"], rows)
     files = [(name, size(file.bytes), file.sha256[:SHORT]) for name, file in artifact.manifest.files.items()]
-    state = f"changed since it was made: {damaged}" if damaged else "all files are as they were made"
+    state = f"{damaged} {describe_damage(folder, damaged)}" if damaged else "all files are as they were made"
     if strange := strange_file(folder, artifact.manifest):
         state += f"; {strange} is no file of it"
     console.table("files", ["file", "size", "sha256"], files, state)
     if damaged is None:
         return 0
-    return console.error(f"{folder / damaged}: is not as the manifest says", 1, command="gsl show")
+    return console.error(f"{folder / damaged}: {describe_damage(folder, damaged)}", 1, command="gsl show")
 
 
 def open_artifact(reference: str, console: Console) -> None:

@@ -11,11 +11,13 @@ from pydantic import ValidationError
 from pydantic_core import ArgsKwargs, ErrorDetails
 
 from gsl.core.setting import settings_of
+from gsl.core.trust import TARGET
 from gsl.errors import ConfigError
 
 T = TypeVar("T")
 
 _UNEXPECTED = re.compile(r"unexpected keyword argument '(\w+)'")
+_ADDRESS = re.compile(r" (object )?at 0x[0-9a-f]+")  # in memory: it says nothing
 _RULES = {
     "greater_than_equal": "must be at least {ge:g}",
     "greater_than": "must be above {gt:g}",
@@ -56,7 +58,10 @@ def make(target: Callable[..., T], values: Mapping[str, Any], *, where: str = ""
     except TypeError as error:
         unexpected = _UNEXPECTED.search(str(error))
         if unexpected is None:
-            raise
+            if error.__traceback__ is None or error.__traceback__.tb_next is not None:
+                raise  # within what was called
+            name = ".".join(filter(None, [where, TARGET]))
+            raise ConfigError(name, "cannot be made of these settings", given=_name_of(target)) from error
         name = ".".join(filter(None, [where, unexpected[1]]))
         raise ConfigError(name, f"no such setting{did_you_mean(unexpected[1], settings_of(target))}") from error
 
@@ -108,10 +113,14 @@ def _problem(details: ErrorDetails) -> str:
     return f"must be {kind}" if kind else details["msg"][0].lower() + details["msg"][1:]
 
 
+def _name_of(target: Callable[..., Any]) -> str:
+    return f"{target.__module__}.{getattr(target, '__qualname__', '')}"
+
+
 def _quote(value: object) -> str:
     if isinstance(value, ArgsKwargs):
         return ""
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
-    text = value if isinstance(value, str) else repr(value)
+    text = value if isinstance(value, str) else _ADDRESS.sub("", repr(value))
     return text if len(text) <= 60 else f"{text[:57]}..."

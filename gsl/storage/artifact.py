@@ -197,7 +197,7 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
     if force:
         return None
     if damaged:
-        problem = f"is damaged: {damaged} was changed since"
+        problem = f"is damaged: {damaged} {manifest.describe_damage(out, damaged)}"
     elif not same:
         problem = f"was built otherwise ({changes(found.manifest, found.config, identity, config)})"
     else:

@@ -104,7 +104,8 @@ def content_hash(path: Path) -> str:
         return file_hash(path)
     found = manifest.read(path)
     if damaged := manifest.find_damage(path, found):
-        raise ArtifactError(path / damaged, "is not as the manifest says; build the artifact again with force=true")
+        problem = manifest.describe_damage(path, damaged)
+        raise ArtifactError(path / damaged, f"{problem}; build the artifact again with force=true")
     return found.contents
 
 

@@ -48,7 +48,7 @@ def _trace(role: str, place: Path, expected: str | None, seen: set[Path]) -> Anc
         stored = None if place.is_file() else manifest.read(place)
         problem = _file_problem(place, expected) if stored is None else _problem(place, stored, expected)
     except (InputError, OSError) as error:
-        return Ancestor(role, place, None, str(error).removeprefix(f"{place}: "))
+        return Ancestor(role, place, None, str(error).removeprefix(f"{place}: ").removeprefix(f"{place}/"))
     if stored is None or place.absolute() in seen:
         return Ancestor(role, place, stored, problem)
     seen.add(place.absolute())
@@ -66,7 +66,7 @@ def _file_problem(place: Path, expected: str | None) -> str:
 
 def _problem(folder: Path, stored: Manifest, expected: str | None) -> str:
     if damaged := manifest.find_damage(folder, stored):
-        return f"{damaged} is not as the manifest says"
+        return f"{damaged} {manifest.describe_damage(folder, damaged)}"
     if strange := manifest.strange_file(folder, stored):
         return f"{strange} is no file of the artifact"
     return "was built anew since" if expected not in (None, stored.contents) else ""

@@ -21,7 +21,7 @@ NAME = "manifest.json"
 HASH = "sha256"
 """Key of the hash of all other entries."""
 
-_ALWAYS = frozenset({"config.yaml", "log.txt", "metrics.json"})  # files that no artifact lacks
+ALWAYS = frozenset({"config.yaml", "log.txt", "metrics.json"})  # files that no artifact lacks
 _DAMAGED = "build the artifact again with force=true"
 LONGEST = 1e12  # of a duration [s]
 _KINDS: Mapping[str, type | tuple[type, ...]] = {
@@ -116,6 +116,11 @@ def find_damage(folder: Path, manifest: Manifest) -> str | None:
     return None
 
 
+def describe_damage(folder: Path, name: str) -> str:
+    """Return what is wrong with a damaged file: that it is gone, or not as it was written."""
+    return "is not as the manifest says" if (folder / name).is_file() else "is missing"
+
+
 def strange_file(folder: Path, manifest: Manifest) -> str | None:
     """Return the first file of the folder that the manifest does not name; hidden ones and other artifacts are none."""
     for place, folders, files in os.walk(folder):
@@ -166,14 +171,14 @@ def read(folder: Path) -> Manifest:
         parsed = _parse(stored)
     except (TypeError, AttributeError, KeyError, ValueError, RecursionError) as error:
         raise ArtifactError(folder / NAME, f"is damaged: its entries do not fit; {_DAMAGED}") from error
-    if missing := sorted({*_ALWAYS, parsed.metrics} - parsed.files.keys()):
+    if missing := sorted({*ALWAYS, parsed.metrics} - parsed.files.keys()):
         raise ArtifactError(folder / NAME, f"is damaged: it does not name {missing[0]}; {_DAMAGED}")
     return parsed
 
 
 def resembles(folder: Path) -> bool:
     """Whether a folder whose manifest cannot be read was an artifact: it has the files that none lacks."""
-    return all((folder / name).is_file() for name in (NAME, *_ALWAYS))
+    return all((folder / name).is_file() for name in (NAME, *ALWAYS))
 
 
 def _parse(stored: dict[str, Any]) -> Manifest:

@@ -71,7 +71,8 @@ def load(reference: str | Path, kind: str, *, runs: Path = RUNS) -> Artifact:
     if artifact.manifest.kind != kind:
         raise ArtifactError(folder, f"holds {artifact.manifest.kind}, but {kind} is needed")
     if damaged := manifest.find_damage(folder, artifact.manifest):
-        raise ArtifactError(folder / damaged, "is not as the manifest says; build the artifact again with force=true")
+        problem = manifest.describe_damage(folder, damaged)
+        raise ArtifactError(folder / damaged, f"{problem}; build the artifact again with force=true")
     return artifact
 
 
@@ -143,10 +144,10 @@ def _artifacts(folder: Path) -> list[Artifact]:
 
 
 def _walk(folder: Path) -> Iterator[tuple[Path, manifest.Manifest | None]]:
-    """Yield every folder with a manifest, and that, None where it cannot be read."""
+    """Yield every folder with a manifest, or with all that an artifact has beside it, and that, None if unreadable."""
     for place, folders, files in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        if manifest.NAME in files:
+        if manifest.NAME in files or {*files} >= manifest.ALWAYS:
             yield Path(place), _readable(Path(place))
 
 

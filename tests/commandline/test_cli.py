@@ -73,7 +73,7 @@ def test_a_signal_ends_a_stage_and_leaves_nothing_half_written(tmp_path: Path, n
     _, said = process.communicate(timeout=20)
     assert (process.returncode, said) == (
         130,
-        "gsl collect: interrupted; the same command goes on from what is built\n",
+        "gsl collect: interrupted; what is complete stays, and the same command does the rest\n",
     )
     assert time.monotonic() - begin < 10
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []

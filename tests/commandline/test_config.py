@@ -149,7 +149,7 @@ def test_wrong_usage_is_one_line_too(arguments: list[str], message: str, capsys:
             1,
             "gsl collect: example_stage.Count.run failed (example_stage.py, line 50): ZeroDivisionError: division by",
         ),
-        ("ctrl-c", 130, "gsl collect: interrupted; the same command goes on from what is built\n"),
+        ("ctrl-c", 130, "gsl collect: interrupted; what is complete stays, and the same command does the rest\n"),
     ],
 )
 def test_a_stage_that_fails_leaves_nothing_behind(

@@ -61,7 +61,7 @@ def test_a_stage_that_is_stopped_leaves_nothing(stage: str, stop: signal.Signals
     longest = {"optimize": 1, "iterate": 2, "compare": 2}  # of long work, and of its search; it may be stopped before
     assert len(estimates) <= longest.get(stage, 0)
     lines = [line for line in lines if line not in estimates]
-    assert lines == [f"gsl {stage}: interrupted; the same command goes on from what is built"]
+    assert lines == [f"gsl {stage}: interrupted; what is complete stays, and the same command does the rest"]
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
     assert not (chain / "runs" / tmp_path.name).exists()
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from commands import done, gsl
+from commands import done, gsl, refused
 
 from gsl.commandline.rerun import AGAIN
 
@@ -44,10 +44,10 @@ DAMAGE: dict[str, tuple[Damage, str, str]] = {
     ),
     "a log that is gone": (lambda runs: shutil.rmtree(runs / "collect_sim"), "collect_sim", "does not exist"),
     "a manifest": (
-        lambda runs: flip(runs / "train_inverse/manifest.json"), "train_inverse/manifest.json", "is damaged",
+        lambda runs: flip(runs / "train_inverse/manifest.json"), "train_inverse: manifest.json", "is damaged",
     ),
     "no files": (
-        lambda runs: without_hash(runs / "train_forward/manifest.json"), "train_forward/manifest.json", "is damaged",
+        lambda runs: without_hash(runs / "train_forward/manifest.json"), "train_forward: manifest.json", "is damaged",
     ),
     "a file too many": (
         lambda runs: (runs / "collect_real/more.parquet").write_text(""), "collect_real", "more.parquet is no file",
@@ -159,6 +159,18 @@ def test_who_uses_what_was_made_from_other_data_is_warned(run: Path) -> None:
     assert "(unchanged)" in said.out
     [line] = [line for line in said.lines if "warning" in line]
     assert "runs/chain/collect_sim was built anew since runs/chain/train_inverse was made from it" in line
+
+
+def test_verify_says_what_is_missing_and_needs_something_to_verify(run: Path, tmp_path: Path) -> None:
+    assert refused("verify", folder=tmp_path).startswith("runs: holds no artifact, so nothing is verified")
+    shutil.copytree(run / "runs/chain/collect_real", tmp_path / "runs/mine/collect_real")
+    for name, problem in (
+        ("trajectories.parquet", "trajectories.parquet is missing"),
+        ("manifest.json", "is no complete artifact: it holds no manifest.json"),
+    ):
+        (tmp_path / "runs/mine/collect_real" / name).unlink()
+        said = gsl("verify", folder=tmp_path)
+        assert (said.code, said.lines) == (1, [f"gsl verify: runs/mine/collect_real: {problem}"])
 
 
 def test_a_damaged_artifact_is_shown_and_ends_in_1(run: Path) -> None:

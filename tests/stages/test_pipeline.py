@@ -105,7 +105,7 @@ def test_show_notices_what_was_changed_since(chain: Path) -> None:
     try:
         said = gsl("show", "chain/evaluate", folder=chain)
         assert said.code == 1
-        assert "changed since it was made: evaluation.json" in said.out
+        assert "evaluation.json is not as the manifest says" in said.out
     finally:
         table.write_text(whole)
 
