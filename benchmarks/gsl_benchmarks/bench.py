@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gsl.core.console import Console as AnyConsole
+from gsl.core.console import Silent
 from gsl.core.described import describe
 from gsl.core.interfaces import SIM
 from gsl.core.scratch import Scratch
@@ -20,7 +22,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.grounding.none import NoGrounding
 from gsl.policies.walk_engine import WalkEngine
 from gsl.report.console import Console
-from gsl.rollout.parallel import Job, trajectories
+from gsl.rollout.parallel import Job, in_parallel, trajectories
 from gsl.rollout.rollout import Scenario
 from gsl.storage.trajectories import write
 from gsl.tasks.walk import Walk
@@ -68,7 +70,7 @@ def measure(console: Console) -> dict[str, float]:
     console.status("control loops with a learned servo")
     learned = loops(replace(scenario, world=LearnedWorld(world)), REPEATS)
     console.status(f"{ROLLOUTS} rollouts in one process and in {WORKERS}")
-    inflation, seconds, made = _workers(scenario, console)
+    inflation, seconds, made = measure_workers(scenario, console)
     return {
         "loop_ratio": bare.ratio,
         "loop_ratio_grounded": grounded.ratio,
@@ -92,16 +94,18 @@ def judge(name: str, value: float) -> tuple[str, ...]:
     return name, meaning, f"{value:.{digits}f}", limit, verdict
 
 
-def _workers(scenario: Scenario, console: Console) -> tuple[float, float, list[Trajectory]]:
+def measure_workers(
+    scenario: Scenario, console: AnyConsole, rollouts: int = ROLLOUTS
+) -> tuple[float, float, list[Trajectory]]:
     """Return CPU in workers / serially, serial CPU of all rollouts [s] and what they made; the two ways take turns."""
     parameters = scenario.policy.initial
-    jobs = [Job(parameters, seed) for seed in range(ROLLOUTS)]
-    share, serial, spread = ROLLOUTS // ROUNDS, [], []
+    jobs = [Job(parameters, seed) for seed in range(rollouts)]
+    share, serial, spread = rollouts // ROUNDS, [], []
     made: list[Trajectory] = []
-    with console.progress(2 * ROLLOUTS + 4 * WORKERS, "rollouts") as progress:
+    with console.progress(2 * rollouts + 4 * WORKERS, "rollouts") as progress:
         for count in (1, WORKERS):  # compile, import, load
             trajectories(scenario, jobs[: 2 * count], workers=count, progress=progress)
-        for first in range(0, ROLLOUTS, share):
+        for first in range(0, rollouts, share):
             part = jobs[first : first + share]
             begin = time.process_time()
             made += trajectories(scenario, part, workers=1, progress=progress)
@@ -114,17 +118,15 @@ def _workers(scenario: Scenario, console: Console) -> tuple[float, float, list[T
 
 
 def _clocks() -> dict[int, float]:
-    """CPU time so far [s] of each worker, by process number."""
-    import joblib
-
+    """CPU time so far [s] of each worker that rollouts go to, by process number."""
     seconds: dict[int, float] = {}
-    while len(seconds) < WORKERS:
-        tasks = (joblib.delayed(_clock)() for _ in range(2 * WORKERS))
-        seconds = dict(joblib.Parallel(n_jobs=WORKERS, batch_size=1)(tasks))
+    with Silent().progress(0, "") as unseen:
+        while len(seconds) < WORKERS:
+            seconds = dict(in_parallel(_clock, None, range(2 * WORKERS), WORKERS, unseen))
     return seconds
 
 
-def _clock() -> tuple[int, float]:
+def _clock(_frozen: bytes, _job: int) -> tuple[int, float]:
     time.sleep(0.05)  # so that every worker gets one
     return os.getpid(), time.process_time()
 

@@ -2,7 +2,14 @@
 
 import time
 
-from gsl_benchmarks.bench import FIGURES, judge
+from gsl.core.console import Silent
+from gsl.core.interfaces import SIM
+from gsl.grounding.none import NoGrounding
+from gsl.policies.walk_engine import WalkEngine
+from gsl.rollout.rollout import Scenario
+from gsl.tasks.walk import Walk
+from gsl.worlds.bullet import BulletWorld
+from gsl_benchmarks.bench import FIGURES, judge, measure_workers
 from gsl_benchmarks.loop import StepClock
 
 
@@ -18,6 +25,15 @@ def test_a_clock_counts_what_happens_inside_and_nothing_else() -> None:
         work(4)
     assert clock.calls == 5
     assert 0.010 <= clock.seconds < 0.013
+
+
+def test_cpu_of_workers_is_counted_where_the_rollouts_are() -> None:
+    walk = Walk(duration=0.2)
+    scenario = Scenario(BulletWorld(robot="nao", effects={}), walk, WalkEngine(), SIM, NoGrounding())
+    inflation, seconds, made = measure_workers(scenario, Silent(), rollouts=6)
+    assert len(made) == 6
+    assert 0.2 < inflation < 20.0  # a worker that is counted from its start would have spent seconds on imports
+    assert seconds > 0.0
 
 
 def test_a_figure_above_its_target_is_said_to_be_over() -> None:

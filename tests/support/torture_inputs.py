@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import io
 import json
@@ -16,7 +17,13 @@ from typing import Any
 import numpy as np
 import yaml
 from commands import SMALL, Said, done, gsl
+from strangers import seal
 from torture_code import CANARY, CODES, MODULE, YAMLS_WITH_CODE, Pickled, Watch, has_code
+
+from gsl.runner.request import NAME as REQUEST
+from gsl.runner.request import hash_of
+from gsl.storage.manifest import HASH, hash_entries
+from gsl.storage.manifest import NAME as MANIFEST
 
 SLOW_CPU = 30.0  # [s] after which an input counts as a hang,
 SLOW = 120.0  # [s] of a clock, on a busy machine
@@ -26,6 +33,7 @@ COMMANDS = (
     *("identify", "cross-validate", "evaluate", "survey", "answer", "rehearse", "iterate", "import", "compare"),
     *("audit", "wiring", "export", "blind make", "blind answer", "blind reveal", "blind wiring"),
 )
+READERS = ("show", "verify", "lineage", "diff", "metrics", "export")
 LINES = (
     *("", "-1", "0", "1e999", "nan", "null", "true", "[]", "{}", "[", "{a: 1", "'", "../x", "/", ".", "*", "a b", "~"),
     *("9" * 400, "${name}", "${nothing}", "${oc.env:HOME}", "${name", "{_target_: os.system}", "???", "1,2", "a=b"),
@@ -188,17 +196,24 @@ class Inputs:
 
         folder = self.mine / "artifact"
         shutil.copytree(draw(st.sampled_from(self.artifacts)), folder)
-        path = folder / draw(st.sampled_from(["manifest.json", "manifest.json", "metrics.json", "config.yaml"]))
+        documents = [path.name for path in sorted(folder.iterdir()) if path.suffix in (".json", ".yaml")]
+        path = folder / draw(st.sampled_from([MANIFEST, *documents]))
         if path.suffix == ".yaml":
             text = self._document(draw, yaml.safe_load(path.read_bytes()), YAMLS, yaml.safe_dump)
         else:
             text = self._document(draw, json.loads(path.read_bytes()), JSONS, json.dumps)
         path.write_bytes(text)
-        command = draw(st.sampled_from(["show", "verify", "lineage", "train-forward", "evaluate", "rerun"]))
+        if draw(st.booleans()):  # a stranger's hashes may be right
+            _seal(path)
+        command = draw(st.sampled_from([*READERS, "train-forward", "evaluate", "rerun"]))
         if command == "rerun" and path.name == "metrics.json":
             command = "show"  # all else would be as it was, and a run of seconds
         if command in ("train-forward", "evaluate"):
             return (command, f"{'data' if command == 'train-forward' else 'policies'}={folder}", "name=fuzz")
+        if command == "diff":
+            return (command, str(folder), str(draw(st.sampled_from(self.artifacts))))
+        if command == "export":
+            return (command, f"trajectories={folder}", "format=csv", "name=fuzz")
         return (command, str(folder), *(["out=runs/fuzz"] if command == "rerun" else []))
 
     def _import(self, draw: Any) -> tuple[str, ...]:
@@ -245,6 +260,8 @@ class Inputs:
         path = folder / "request.json"
         path.write_bytes(self._document(draw, json.loads(path.read_bytes()), JSONS, json.dumps))
         if draw(st.booleans()):
+            _seal(path)
+        if draw(st.booleans()):
             return ("rehearse", f"request={folder}")
         (self.mine / "log.csv").write_bytes(_damaged(draw, self.csv.encode()))
         return ("answer", f"request={folder}", f"logs={self.mine / 'log.csv'}")
@@ -267,6 +284,19 @@ class Inputs:
                 return str(draw(st.sampled_from(odd))).encode()
             case _:
                 return dump(draw(_tree())).encode("utf-8", "surrogatepass")
+
+
+def _seal(path: Path) -> None:
+    """Set the hash that goes with a changed document right; one that is no mapping has none."""
+    if path.name != MANIFEST and path.name != REQUEST:
+        seal(path.parent)
+        return
+    with contextlib.suppress(ValueError, RecursionError):
+        stored = json.loads(path.read_bytes())
+        if isinstance(stored, dict):
+            entries = {key: value for key, value in stored.items() if key not in (HASH, "hash")}
+            own = {HASH: hash_entries(entries)} if path.name == MANIFEST else {"hash": hash_of(entries)}
+            path.write_text(json.dumps({**entries, **own}))
 
 
 def _text() -> Any:
