@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner
 
 LAGS = 8  # targets that the law sees, the newest included: 70 ms, beyond what servos lag behind
 LAG = 0.01  # from one of them to the next [s]
@@ -65,7 +65,7 @@ def no_law(motors: int) -> ServoLaw:
     )  # fmt: skip
 
 
-@compile_kernel
+@compile_inner
 def act(z: float) -> float:
     """Return the activation: tanh to 2 %, from products and one division, exactly 1 from 3 on."""
     z = min(3.0, max(-3.0, z))
@@ -81,7 +81,7 @@ def weights(law: ServoLaw) -> np.ndarray:
     return rows
 
 
-@compile_kernel
+@compile_inner
 def network(weights: np.ndarray, g: int, layers: np.ndarray) -> tuple[float, float]:
     """Return what group g's network adds before the torque limit and behind it, in torque limits.
 

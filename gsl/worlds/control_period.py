@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner, compile_kernel
 from gsl.worlds import bullet_c as c
 from gsl.worlds.rotor import Rotors, compensation
 from gsl.worlds.servo import servo_torque
@@ -48,7 +48,7 @@ class Memory(NamedTuple):
 
     Attributes:
         servo: State of the servos.
-        rotor: Memory of the compensation, shape (6, 3 + n).
+        rotor: Memory of the compensation, shape (7, 3 + n).
         motion: Joint positions [rad] and velocities [rad/s] at this physics step, shape (2, n).
         spin: Angular velocity of the base in world axes, then in base axes [rad/s], shape (2, 3).
         load: What the motors bear besides their servos at each physics step of the control period [N·m], shape
@@ -77,7 +77,7 @@ def first_memory(servo: ServoState, loads: int = 0) -> Memory:
     n = servo.memory.shape[1]
     return Memory(
         servo,
-        rotor=np.zeros((6, 3 + n)),
+        rotor=np.zeros((7, 3 + n)),
         motion=np.zeros((2, n)),
         spin=np.zeros((2, 3)),
         load=np.zeros((loads, n)),
@@ -89,7 +89,7 @@ def first_memory(servo: ServoState, loads: int = 0) -> Memory:
     )
 
 
-@compile_kernel
+@compile_inner
 def torques(drive: Drive, memory: Memory, turn: np.ndarray, k: int, step: float, period: float) -> None:
     """Fill in the torques of one physics step, given motion and spin (world axes).
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner
 from gsl.core.lanes import where
 
 TOOTH_STIFFNESS = 300.0  # of the gear teeth in contact, if there is play [N·m/rad]: an estimate
@@ -14,7 +14,7 @@ SUBSTEPS = 8
 DAMPING = 0.2  # of the teeth or the spring, as a share of sqrt(stiffness · inertia)
 
 
-@compile_kernel
+@compile_inner
 def limit_torque(u: float, v: float, bound: float, no_load: float) -> float:
     """Return a motor's torque [N·m] within its limit and, where it drives the motion, below its speed line.
 
@@ -30,7 +30,7 @@ def limit_torque(u: float, v: float, bound: float, no_load: float) -> float:
     return min(high, max(-low, u))
 
 
-@compile_kernel
+@compile_inner
 def through_gear(
     rotor: np.ndarray, i: int, motion: np.ndarray, u: float, bound: float, no_load: float, inertia: float,
     play: float, compliance: float, step: float,

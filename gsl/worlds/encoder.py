@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner, compile_kernel
 
 REMEMBERED = 128  # physics steps: the longest sensor delay
 
 
-@compile_kernel
+@compile_inner
 def read_encoder(delay: float, history: np.ndarray, count: int, now: float, row: int, i: int, step: float) -> float:
     """Return what an encoder tells, linear between the physics steps and so continuous in its delay.
 
@@ -43,7 +43,7 @@ def first_history(motion: np.ndarray, step: float) -> np.ndarray:
     return history
 
 
-@compile_kernel
+@compile_inner
 def fill_history(history: np.ndarray, motion: np.ndarray, step: float) -> None:
     """Write the same into a given array; floats or lanes."""
     for k in range(REMEMBERED):

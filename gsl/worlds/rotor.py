@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsl.core.body import Robot
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner
 from gsl.core.dynamics import forward_kinematics, mass_matrix
 
 LINK_SHARE = 0.5  # of the rotor inertia that the link carries
@@ -81,7 +81,7 @@ def carry_inertia(robot: Robot, carried: np.ndarray) -> Mapping[str, np.ndarray]
     return {joint.child: value * np.outer(joint.axis, joint.axis) for joint, value in zip(joints, carried, strict=True)}
 
 
-@compile_kernel
+@compile_inner
 def compensation(
     parent: np.ndarray,
     order: np.ndarray,
@@ -109,12 +109,13 @@ def compensation(
         spin: Angular velocity of the base in base axes [rad/s], shape (3,).
         step: Physics period [s].
         memory: Rows c; last joint speeds (from column 3 on); last angular momentum of what the links carry, in base
-            axes, rows 2 to 4; last torques without c; memory[1, 0] counts the calls. Shape (6, 3 + n_motors).
+            axes, rows 2 to 4; last torques without c; memory[1, 0] counts the calls; scratch. Shape (7, 3 + n_motors).
         work: Scratch, rows: rotation matrix (9), axis (3), angular velocity (3), momentum rate (3); (n_motors, 18).
         torque: Of the motors [N·m], shape (n_motors,).
     """
     n = len(parent)
-    wanted = np.zeros(n + 3)
+    wanted = memory[6]
+    wanted[:] = 0.0
     for i in order:
         _place(work, parent[i], i, axis[i], motion[0, i], motion[1, i], spin)
         speed = 0.0
@@ -150,14 +151,14 @@ def compensation(
         torque[i] += memory[0, 3 + i]
 
 
-@compile_kernel
+@compile_inner
 def _turn(spin: np.ndarray, row: np.ndarray, k: int) -> float:
     """Component k of spin x axis: base axes turn with the base."""
     first, second = (k + 1) % 3, (k + 2) % 3
     return float(spin[first] * row[9 + second] - spin[second] * row[9 + first])
 
 
-@compile_kernel
+@compile_inner
 def _place(
     work: np.ndarray, above: int, i: int, axis: np.ndarray, angle: float, speed: float, spin: np.ndarray
 ) -> None:

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner
 from gsl.core.lanes import where
 from gsl.core.servo import ROW
 from gsl.core.servo_law import LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, act, network
@@ -57,7 +57,7 @@ BRISTLE = 1e-3  # deflection at which dry friction slips [rad]: below an encoder
 STOP_STIFFNESS, STOP_DAMPING = 500.0, 2.0  # of a hard stop [N·m/rad], [N·m·s/rad]: stable at 2 ms with our rotors
 
 
-@compile_kernel
+@compile_inner
 def servo_torque(
     servos: ServoParameters,
     state: ServoState,
@@ -88,7 +88,7 @@ def servo_torque(
     state.steps[0] += 1
 
 
-@compile_kernel
+@compile_inner
 def compute_current(parameters: np.ndarray, memory: np.ndarray) -> float:
     """Return the current of all motors at the last physics step [A]."""
     current = 0.0
@@ -97,13 +97,13 @@ def compute_current(parameters: np.ndarray, memory: np.ndarray) -> float:
     return current
 
 
-@compile_kernel
+@compile_inner
 def supply_share(parameters: np.ndarray, i: int, current: float) -> float:
     """Return the share of the supply's voltage that is left at a current of all motors [A]."""
     return max(1e-3, 1.0 - parameters[SAG, i] * current)
 
 
-@compile_kernel
+@compile_inner
 def sense_error(
     parameters: np.ndarray, state: ServoState, i: int, motion: np.ndarray, elapsed: float, step: float, period: float
 ) -> tuple[float, float, float]:
@@ -123,14 +123,14 @@ def sense_error(
     return target + parameters[ROW.offset, i] - q, q, v
 
 
-@compile_kernel
+@compile_inner
 def compute_gain(parameters: np.ndarray, state: ServoState, i: int, elapsed: float) -> float:
     """Return motor i's proportional gain after what time has taken of it [N·m/rad]."""
     fade = max(0.0, 1.0 - parameters[ROW.fade, i] * max(0.0, state.clock[0] + elapsed))
     return fade * parameters[ROW.kp, i]
 
 
-@compile_kernel
+@compile_inner
 def compute_wanted_torque(
     servos: ServoParameters, state: ServoState, i: int, motion: np.ndarray, error: float, q: float, v: float,
     elapsed: float, step: float, period: float,
@@ -152,7 +152,7 @@ def compute_wanted_torque(
     return u, output
 
 
-@compile_kernel
+@compile_inner
 def _evaluate_law(
     parameters: np.ndarray, weights: np.ndarray, memory: np.ndarray, i: int, v: float, step: float, layers: np.ndarray
 ) -> tuple[float, float]:
@@ -167,7 +167,7 @@ def _evaluate_law(
     return parameters[TORQUE, i] * drive, parameters[TORQUE, i] * output
 
 
-@compile_kernel
+@compile_inner
 def encoder_motion(
     servos: ServoParameters, state: ServoState, motion: np.ndarray, step: float, told: np.ndarray
 ) -> None:
@@ -181,7 +181,7 @@ def encoder_motion(
                 told[row, i] = read_encoder(delay, state.history, state.steps[0], now, row, i, step)
 
 
-@compile_kernel
+@compile_inner
 def _measure(parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndarray) -> tuple[float, float]:
     """Return position [rad] and velocity [rad/s] at the encoder now."""
     if parameters[ROW.motor_encoder, i] * parameters[ROTOR, i] > 0.0:
@@ -189,7 +189,7 @@ def _measure(parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndar
     return motion[0, i], motion[1, i]
 
 
-@compile_kernel
+@compile_inner
 def delay_command(commands: np.ndarray, i: int, start: float, length: float) -> float:
     """Mean of a delayed, held command over one physics step: continuous in the delay.
 
@@ -206,7 +206,7 @@ def delay_command(commands: np.ndarray, i: int, start: float, length: float) -> 
     return (1.0 - newer) * commands[index, i] + newer * commands[index - 1, i]
 
 
-@compile_kernel
+@compile_inner
 def command_beside(
     parameters: np.ndarray, commands: np.ndarray, i: int, motors: int, elapsed: float, step: float, period: float
 ) -> tuple[float, float]:
@@ -216,7 +216,7 @@ def command_beside(
     return speed, delay_command(commands, 2 * motors + i, start, length)
 
 
-@compile_kernel
+@compile_inner
 def shape_target(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, step: float) -> float:
     """Filter and round a target [rad]."""
     if parameters[ROW.smoothing, i] > 0.0:
@@ -226,7 +226,7 @@ def shape_target(parameters: np.ndarray, memory: np.ndarray, i: int, target: flo
     return quantum * np.rint(target / quantum) if quantum > 0.0 else target
 
 
-@compile_kernel
+@compile_inner
 def output_torque(
     parameters: np.ndarray, memory: np.ndarray, i: int, motion: np.ndarray, u: float, output: float, supply: float,
     step: float,
@@ -263,7 +263,7 @@ def output_torque(
     )
 
 
-@compile_kernel
+@compile_inner
 def _dry(parameters: np.ndarray, memory: np.ndarray, i: int, v: float, through: float, step: float) -> float:
     size, stribeck, load = parameters[ROW.coulomb, i], parameters[ROW.stribeck, i], parameters[ROW.load_friction, i]
     if size == 0.0 and stribeck == 0.0 and load == 0.0:
@@ -280,7 +280,7 @@ def _dry(parameters: np.ndarray, memory: np.ndarray, i: int, v: float, through: 
     return where(free, 0.0, size * bent / BRISTLE)
 
 
-@compile_kernel
+@compile_inner
 def _stop(beyond: float, v: float) -> float:
     """Return the torque of a stop that only pushes back [N·m], `beyond` it [rad] at speed v away from it."""
     return where(beyond > 0.0, -max(0.0, STOP_STIFFNESS * beyond + STOP_DAMPING * v), 0.0)
