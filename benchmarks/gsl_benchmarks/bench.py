@@ -30,9 +30,9 @@ from gsl.worlds.bullet import BulletWorld
 from gsl_benchmarks.loop import LearnedWorld, loops, make_untrained
 
 FIGURES: Mapping[str, tuple[str, float | None]] = {
-    "loop_ratio": ("control loop / bare physics steps", 1.30),
-    "loop_ratio_grounded": ("the same with an MLP grounding", 1.35),
-    "loop_ratio_servo": ("the same with a learned servo", 1.40),
+    "loop_ratio": ("control loop / bare physics steps", 1.20),
+    "loop_ratio_grounded": ("the same with an MLP grounding", 1.30),
+    "loop_ratio_servo": ("the same with a learned servo", 1.30),
     "worker_inflation": ("rollouts in 2 processes / in one", 1.05),
     "reload_share": ("reload / rollout", 0.01),
     "io_share": ("writing trajectories / making them", 0.01),

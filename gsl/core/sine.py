@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner
 
 _QUARTER, _REST = 1.57079632673412561417, 6.07710050650619224932e-11  # π/2; the first times a whole number is exact
 # Coefficients within a quarter turn, from fdlibm's k_sin.c and k_cos.c (Sun Microsystems 1993): errors below 1e-16.
@@ -14,7 +14,7 @@ _C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015
 _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
 
 
-@compile_kernel
+@compile_inner
 def sine_cosine(angle: float) -> tuple[float, float]:
     """Return both of an angle [rad], a float or lanes: to 1e-15 within thousands of turns."""
     quarters = np.rint(angle * (1.0 / (_QUARTER + _REST)))

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner, compile_kernel
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
 from gsl.core.servo_law import HIDDEN, LAYERS
 from gsl.training.frozen import Frozen
@@ -124,7 +124,7 @@ def _back(servos: ServoParameters, path: Path, slopes: np.ndarray, step: float, 
                 encoder_back(rows, i, s, -adjoint.error[i], 0, step, adjoint.sensed)
 
 
-@compile_kernel
+@compile_inner
 def _links_back(rows: np.ndarray, mobility: np.ndarray, now: Moment, adjoint: Adjoint) -> None:
     """Fill in the adjoint of the torques, and move that of the motion to the beginning of the step, torques given."""
     moved, push, step = adjoint.moved, adjoint.push, now.step

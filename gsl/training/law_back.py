@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner
 from gsl.core.lanes import where
 from gsl.core.servo import ROW
 from gsl.core.servo_law import FIRST, HIDDEN, INPUTS, LAG, LAGS, LAST, NOBODY, SECOND, SIGN, SPEED_UNIT
@@ -15,7 +15,7 @@ from gsl.worlds.servo import BRISTLE, compute_wanted_torque
 from gsl.worlds.servo_state import GROUP, LAG_SHARE, LAW_BENT, STIFFNESS, TORQUE, ServoParameters, ServoState
 
 
-@compile_kernel
+@compile_inner
 def law_back(
     servos: ServoParameters, state: ServoState, now: Moment, adjoint: Adjoint, work: Work, to: Gradient
 ) -> None:
@@ -54,7 +54,7 @@ def law_back(
         moved[1, i] += now.step * held[LAW_BENT, i]
 
 
-@compile_kernel
+@compile_inner
 def _network_back(
     weights: np.ndarray, g: int, drive: float, output: float, layers: np.ndarray, inputs: np.ndarray,
     hidden: np.ndarray, to: Gradient,
@@ -94,7 +94,7 @@ def _network_back(
         inputs[k] = back
 
 
-@compile_kernel
+@compile_inner
 def slope_of_act(z: float) -> float:
     """Return the derivative of `act`."""
     low = 27.0 + 9.0 * z * z

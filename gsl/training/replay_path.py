@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner, compile_kernel
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
 from gsl.training.frozen import Frozen
 from gsl.worlds.servo import (
@@ -134,7 +134,7 @@ def replay(servos: ServoParameters, path: Path, start: np.ndarray, step: float, 
         state.clock[0] += period
 
 
-@compile_kernel
+@compile_inner
 def _torque(servos: ServoParameters, state: ServoState, now: Moment, torque: np.ndarray) -> None:
     """Do as `servo.servo_torque` does, and write down what the servos saw and did."""
     rows, memory, motion, seen = servos.rows, state.memory, now.motion, now.seen
@@ -152,7 +152,7 @@ def _torque(servos: ServoParameters, state: ServoState, now: Moment, torque: np.
     state.steps[0] += 1
 
 
-@compile_kernel
+@compile_inner
 def _move(mobility: np.ndarray, free: np.ndarray, torque: np.ndarray, now: Moment) -> None:
     """Step the links, semi-implicitly as the chain model does."""
     motion, after, step = now.motion, now.after, now.step

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner
 from gsl.core.lanes import where
 from gsl.core.servo import ROW
 from gsl.training.gradient import (
@@ -86,7 +86,7 @@ class Work(NamedTuple):
     hidden: np.ndarray
 
 
-@compile_kernel
+@compile_inner
 def output_back(rows: np.ndarray, now: Moment, adjoint: Adjoint, work: Work, numbers: np.ndarray) -> None:
     """Pull adjoints back through the servos' outputs, to those of wanted torque and of what the law adds behind it.
 
@@ -122,7 +122,7 @@ def output_back(rows: np.ndarray, now: Moment, adjoint: Adjoint, work: Work, num
         numbers[BY_ARMATURE, i] -= carried * push * (after[1, i] - motion[1, i]) / step
 
 
-@compile_kernel
+@compile_inner
 def _sum(jacobian: np.ndarray, k: int, outcome: tuple[float, ...]) -> float:
     total = 0.0 * outcome[0]
     for r in range(OUTCOMES):
@@ -130,7 +130,7 @@ def _sum(jacobian: np.ndarray, k: int, outcome: tuple[float, ...]) -> float:
     return total
 
 
-@compile_kernel
+@compile_inner
 def _differentiate(
     rows: np.ndarray, i: int, motion: np.ndarray, before: np.ndarray, seen: np.ndarray, supply: float, step: float,
     memory: np.ndarray, jacobian: np.ndarray,
@@ -150,7 +150,7 @@ def _differentiate(
             jacobian[k, r] = (probe[r] - base[r]) / PROBES[k]
 
 
-@compile_kernel
+@compile_inner
 def _outcome(
     rows: np.ndarray, i: int, motion: np.ndarray, before: np.ndarray, seen: np.ndarray, supply: float, step: float,
     memory: np.ndarray, probed: int,
@@ -183,7 +183,7 @@ def _outcome(
     )  # fmt: skip
 
 
-@compile_kernel
+@compile_inner
 def feedback_back(rows: np.ndarray, state: ServoState, now: Moment, adjoint: Adjoint, numbers: np.ndarray) -> None:
     """Pull the adjoints of wanted torques back to control errors, targets and encoders, the law apart.
 
@@ -212,7 +212,7 @@ def feedback_back(rows: np.ndarray, state: ServoState, now: Moment, adjoint: Adj
         encoder_back(rows, i, now.number, by_v, 1, now.step, sensed)
 
 
-@compile_kernel
+@compile_inner
 def _beside_back(
     rows: np.ndarray, commands: np.ndarray, i: int, motors: int, now: Moment, by_u: float, numbers: np.ndarray
 ) -> None:
@@ -225,7 +225,7 @@ def _beside_back(
     numbers[BY_DELAY, i] += by_u * later / now.period
 
 
-@compile_kernel
+@compile_inner
 def _filter_back(rows: np.ndarray, held: np.ndarray, i: int, by_target: float, step: float) -> float:
     """Return the adjoint of motor i's target before its filter; rounding counts as what it is on average: nothing."""
     if rows[ROW.smoothing, i] > 0.0:
@@ -236,14 +236,14 @@ def _filter_back(rows: np.ndarray, held: np.ndarray, i: int, by_target: float, s
     return by_target
 
 
-@compile_kernel
+@compile_inner
 def slope_by_delay(commands: np.ndarray, i: int, start: float, length: float) -> float:
     """Return the derivative of a delayed target by its delay [rad per control period], see `servo.delayed`."""
     change = delay_command(commands, i, start - SHIFT * length, length) - delay_command(commands, i, start, length)
     return change / (SHIFT * length)
 
 
-@compile_kernel
+@compile_inner
 def encoder_back(rows: np.ndarray, i: int, index: int, share: float, row: int, step: float, sensed: np.ndarray) -> None:
     """Give the adjoint of what an encoder tells at a physics step to the steps at which it was measured."""
     age = rows[ROW.sensor_delay, i] / step
@@ -255,7 +255,7 @@ def encoder_back(rows: np.ndarray, i: int, index: int, share: float, row: int, s
         sensed[first - 1, row, i] += older * share
 
 
-@compile_kernel
+@compile_inner
 def take_sensed(rows: np.ndarray, number: int, adjoint: Adjoint) -> None:
     """Pass the adjoint of what was measured at a physics step to the outputs' motion, or to the rotors'."""
     moved, held, sensed = adjoint.moved, adjoint.held, adjoint.sensed[number]

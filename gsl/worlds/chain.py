@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.body import Robot, lump
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner, compile_kernel
 from gsl.core.plant import Plant
 from gsl.core.sine import sine_cosine
 
@@ -110,7 +110,7 @@ def nothing() -> Pushed:
     return Pushed(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
 
 
-@compile_kernel
+@compile_inner
 def accelerate(
     chain: Chain, motion: np.ndarray, pushed: Pushed, torque: np.ndarray, work: np.ndarray, matrix: np.ndarray
 ) -> None:
@@ -141,7 +141,7 @@ def accelerate(
     _solve(chain, matrix, torque)
 
 
-@compile_kernel
+@compile_inner
 def _place(chain: Chain, i: int, angle: float, work: np.ndarray) -> None:
     """Fill in link i's rotation, origin and joint screw, and its own inertia about the base's origin."""
     row, above, axis = work[i], chain.parent[i], chain.axis[i]
@@ -167,7 +167,7 @@ def _place(chain: Chain, i: int, angle: float, work: np.ndarray) -> None:
     _own_inertia(chain, i, row)
 
 
-@compile_kernel
+@compile_inner
 def _own_inertia(chain: Chain, i: int, row: np.ndarray) -> None:
     """Fill in mass, first and second moment (xx, xy, xz, yy, yz, zz) about the base's origin (Steiner)."""
     m, com, inertia = chain.mass[i], chain.com[i], chain.inertia[i]
@@ -190,7 +190,7 @@ def _own_inertia(chain: Chain, i: int, row: np.ndarray) -> None:
             slot += 1
 
 
-@compile_kernel
+@compile_inner
 def _bias(chain: Chain, i: int, speed: float, work: np.ndarray) -> None:
     """Fill in link i's velocity, its acceleration at constant joint speeds, and the force which that takes."""
     row, above = work[i], chain.parent[i]
@@ -221,7 +221,7 @@ def _bias(chain: Chain, i: int, speed: float, work: np.ndarray) -> None:
         )  # fmt: skip
 
 
-@compile_kernel
+@compile_inner
 def _push(point: np.ndarray, force: np.ndarray, row: np.ndarray) -> None:
     """Take what a force from outside at a point of the link gives off the force that the link needs."""
     place = (
@@ -235,7 +235,7 @@ def _push(point: np.ndarray, force: np.ndarray, row: np.ndarray) -> None:
         row[_MOMENT + k] -= place[a] * force[b] - place[b] * force[a]
 
 
-@compile_kernel
+@compile_inner
 def _momentum(row: np.ndarray, angular: int, linear: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return mass matrix times a spatial vector (columns `angular`, `linear` of the row): linear and angular part."""
     w0, w1, w2 = row[angular], row[angular + 1], row[angular + 2]
@@ -252,7 +252,7 @@ def _momentum(row: np.ndarray, angular: int, linear: int) -> tuple[tuple[float, 
     return along, about
 
 
-@compile_kernel
+@compile_inner
 def _inertia_row(chain: Chain, i: int, work: np.ndarray, matrix: np.ndarray) -> None:
     """Fill in row i of M + A for joint i and those above it; row i of `work` holds the inertia of all that i moves."""
     force, moment = _momentum(work[i], _AXIS, _ARM)
@@ -267,7 +267,7 @@ def _inertia_row(chain: Chain, i: int, work: np.ndarray, matrix: np.ndarray) -> 
     matrix[i, i] += chain.armature[i]
 
 
-@compile_kernel
+@compile_inner
 def _solve(chain: Chain, matrix: np.ndarray, right: np.ndarray) -> None:
     """Solve (M + A) x = right in place by LᵀDL, over ancestors only."""
     n = len(right)
@@ -291,7 +291,7 @@ def _solve(chain: Chain, matrix: np.ndarray, right: np.ndarray) -> None:
             i = chain.parent[i]
 
 
-@compile_kernel
+@compile_inner
 def _cross(one: np.ndarray, a: int, two: np.ndarray, b: int, result: np.ndarray, to: int) -> None:
     result[to] = one[a + 1] * two[b + 2] - one[a + 2] * two[b + 1]
     result[to + 1] = one[a + 2] * two[b] - one[a] * two[b + 2]

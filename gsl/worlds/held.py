@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.body import Robot, carrier
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner, compile_kernel
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
 from gsl.core.plant import Plant, Push
 from gsl.core.servo_law import HIDDEN, LAYERS
@@ -201,7 +201,7 @@ def _side_by_side(
         state.clock[0] += substeps * step
 
 
-@compile_kernel
+@compile_inner
 def _step(
     servo: ServoParameters, state: ServoState, tree: Chain, pushes: np.ndarray, load: np.ndarray, motion: np.ndarray,
     step: float, substeps: int, scratch: Scratch,
@@ -214,7 +214,7 @@ def _step(
             motion[0, i] += step * motion[1, i]
 
 
-@compile_kernel
+@compile_inner
 def _leap(
     servo: ServoParameters, state: ServoState, tree: Chain, pushes: np.ndarray, load: np.ndarray, motion: np.ndarray,
     step: float, substeps: int, scratch: Scratch,
@@ -244,7 +244,7 @@ def _leap(
     state.steps[1] = 1
 
 
-@compile_kernel
+@compile_inner
 def _accelerate(
     servo: ServoParameters, state: ServoState, tree: Chain, pushes: np.ndarray, load: np.ndarray, motion: np.ndarray,
     start: float, length: float, row: int, period: float, scratch: Scratch,
@@ -258,7 +258,7 @@ def _accelerate(
     accelerate(tree, motion, scratch.pushed, scratch.torque, scratch.work, scratch.matrix)
 
 
-@compile_kernel
+@compile_inner
 def _fill(windows: Windows, first: int, motion: np.ndarray, commands: np.ndarray, clock: np.ndarray) -> None:
     """Write windows into lanes; lanes that are left over get the last window once more."""
     for lane in range(LANES):
@@ -272,7 +272,7 @@ def _fill(windows: Windows, first: int, motion: np.ndarray, commands: np.ndarray
                 commands[k, i, lane] = windows.commands[w, k, i]
 
 
-@compile_kernel
+@compile_inner
 def _push(pushes: np.ndarray, time: float, step: float, force: np.ndarray) -> None:
     """Fill in the forces of one physics step."""
     for j in range(len(pushes)):

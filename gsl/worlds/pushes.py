@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from gsl.core.body import Robot, carrier
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner
 from gsl.core.lanes import where
 from gsl.core.plant import Plant, Push
 from gsl.robots.urdf import principal_axes
@@ -49,7 +49,7 @@ def overlap(push: Push, time: float, step: float) -> float:
     return acting(push.start, push.end, time, step)
 
 
-@compile_kernel
+@compile_inner
 def acting(start: float, end: float, time: float, step: float) -> float:
     """Return the same given start and end of the push [s]; `time` may be lanes."""
     share = (min(end, time + step) - max(start, time)) / step

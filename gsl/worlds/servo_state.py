@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner
 from gsl.core.servo import ROW, Servo
 from gsl.core.servo_law import HIDDEN, LAYERS, ServoLaw, no_law, weights
 from gsl.worlds.drive_train import ROTOR_SHARE, STIFFEST
@@ -98,7 +98,7 @@ def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: fl
     )
 
 
-@compile_kernel
+@compile_inner
 def settle(memory: np.ndarray, history: np.ndarray, motion: np.ndarray, target: np.ndarray, step: float) -> None:
     """Write what settled servos remember, the rest of the memory being zero; floats or lanes.
 

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gsl.core.compiled import compile_kernel
+from gsl.core.compiled import compile_inner
 from gsl.core.plant import Plant
 from gsl.core.servo import ROW, Servo
 from gsl.effects.effect import Effect, name_of
@@ -77,7 +77,7 @@ class VelocityMotors:
             bullet.stepSimulation(client)
 
 
-@compile_kernel
+@compile_inner
 def ask_speed(
     parameters: np.ndarray, state: ServoState, position: np.ndarray, fastest: np.ndarray, period: float,
     speed: np.ndarray,

@@ -37,7 +37,7 @@ def test_cpu_of_workers_is_counted_where_the_rollouts_are() -> None:
 
 
 def test_a_figure_above_its_target_is_said_to_be_over() -> None:
-    assert judge("loop_ratio", 1.21)[2:] == ("1.21", "1.3", "ok")
+    assert judge("loop_ratio", 1.21)[2:] == ("1.21", "1.2", "over")
     assert judge("reload_share", 0.0123)[2:] == ("0.0123", "0.01", "over")
     assert judge("step_us", 29.6)[2:] == ("30", "", "")
 

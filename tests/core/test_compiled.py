@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import subprocess
 import sys
@@ -10,6 +11,8 @@ from pathlib import Path
 import pytest
 
 pytestmark = pytest.mark.slow
+
+SOURCES = Path(__file__).parents[2] / "gsl"
 
 DOUBLING = """
 from gsl.core.compiled import compile_kernel
@@ -53,3 +56,18 @@ def test_where_no_folder_can_be_written_it_is_compiled_every_time() -> None:
     command = [sys.executable, "-c", DOUBLING]  # beside a source there would be one more place
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.startswith("6.0 Counter()")
+
+
+def test_functions_of_inner_loops_call_none_that_may_allocate() -> None:
+    """They count no references, so an array that a kernel made for them would never be freed."""
+    decorated: dict[str, list[ast.FunctionDef]] = {"compile_inner": [], "compile_kernel": []}
+    for path in SOURCES.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef):
+                for decorator in node.decorator_list:
+                    decorated.get(ast.unparse(decorator), []).append(node)
+    kernels = {function.name for function in decorated["compile_kernel"]}
+    assert kernels and decorated["compile_inner"]
+    for function in decorated["compile_inner"]:
+        calls = [node.func for node in ast.walk(function) if isinstance(node, ast.Call)]
+        assert not {call.id for call in calls if isinstance(call, ast.Name)} & kernels, function.name
