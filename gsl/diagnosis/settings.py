@@ -102,6 +102,7 @@ class SearchSettings:
     leads: int = 8  # that are fitted after the first screening
     leads_after: int = 5  # that are fitted beside an effect that stands already
     per_effect: int = 2  # of these, of one effect
+    hardly: float = 0.1  # share of what a screening saw of an effect, from which a fit beside others begins as well
     beam: int = 2  # single effects that are continued
     few: int = 20  # training windows of which a screening leaves none out
     walk_windows: int = 8  # of a walk that a screening looks at

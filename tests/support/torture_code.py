@@ -48,7 +48,7 @@ class Watch:
 
     def __init__(self, folder: Path) -> None:
         self.elsewhere: list[str] = []
-        temporary = os.path.realpath(tempfile.gettempdir())
+        temporary = self.temporary = os.path.realpath(tempfile.gettempdir())  # itself: of a file without a name
         self.fine = (os.path.realpath(folder) + os.sep, os.path.join(temporary, "gsl-"), "/dev/", "/proc/")
         sys.addaudithook(self)
 
@@ -61,7 +61,7 @@ class Watch:
         if not isinstance(path, str | os.PathLike):
             return
         place = os.path.realpath(os.fspath(path))
-        if not place.startswith(self.fine) and not any(name in place for name in CACHES):
+        if place != self.temporary and not place.startswith(self.fine) and not any(name in place for name in CACHES):
             self.elsewhere.append(place)
 
 

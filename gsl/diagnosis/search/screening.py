@@ -101,11 +101,21 @@ def extend(problem: Problem, base: Hypothesis, width: int) -> tuple[list[Hypothe
     """Return hypotheses with one effect more than `base`, best first, and the screening that led to them."""
     screening = screen(problem, base)
     new = [lead for lead in screening.leads if (lead.candidate.effect, lead.candidate.scope) not in base.places]
-    fits = [
-        problem.fit((*base.candidates, lead.candidate), np.r_[base.start, lead.parameters], lead.shifts)
-        for lead in _best_leads(new, width, problem.settings.per_effect)
-    ]
+    fits = [_fit_lead(problem, base, lead) for lead in _best_leads(new, width, problem.settings.per_effect)]
     return sorted(fits, key=by_cost), screening
+
+
+def _fit_lead(problem: Problem, base: Hypothesis, lead: Lead) -> Hypothesis:
+    """Fit one effect more from where the screening saw it, and from hardly any of it in what stands.
+
+    The screening gives each joint the calibration that suits the effect alone. Beside other effects a descent from
+    there can end in another valley, above what already stands.
+    """
+    candidates, neutral = (*base.candidates, lead.candidate), lead.candidate.neutral
+    hardly = neutral + problem.settings.hardly * (lead.parameters - neutral)
+    starts = [(lead.parameters, lead.shifts), *([(hardly, base.fit.shifts)] if base.candidates else [])]
+    fits = [problem.fit(candidates, np.r_[base.start, values], shifts) for values, shifts in starts]
+    return min(fits, key=lambda hypothesis: hypothesis.fit.cost)
 
 
 def screen_candidates(

@@ -166,7 +166,7 @@ class Search:
         """Add one effect after the other to the best single one as long as more is left than noise."""
         chosen = self._polish(singles[0]) if self.thresholds.share else singles[0]
         beam, level = self._distinct(singles), self._how.room
-        while chosen.size < self.most:
+        while len({*chosen.names}) < self.most:
             lacking = self._lacking(chosen, level)
             if not (lacking or self._zeros_aside(chosen)):
                 break
