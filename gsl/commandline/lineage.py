@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gsl.core.visible import visible
 from gsl.report.console import Console
 from gsl.storage.hashing import SHORT
 from gsl.storage.lineage import Ancestor, lineage
@@ -64,16 +65,20 @@ def _tree(ancestor: Ancestor, tree: Tree | None = None) -> Tree:
     from rich.tree import Tree
 
     stored = ancestor.manifest
-    label = Text(f"{ancestor.role}: " if ancestor.role else "")
-    label.append(ancestor.place.as_posix(), style="bold")
+    label = Text(_in_a_line(f"{ancestor.role}: ") if ancestor.role else "")
+    label.append(_in_a_line(ancestor.place.as_posix()), style="bold")
     if stored is not None:
-        label.append(f"  {stored.kind} {stored.contents[:SHORT]}", style="dim")
+        label.append(_in_a_line(f"  {stored.kind} {stored.contents[:SHORT]}"), style="dim")
     if ancestor.problem:
-        label.append(f"  {ancestor.problem}", style="red")
+        label.append(_in_a_line(f"  {ancestor.problem}"), style="red")
     branch = Tree(label) if tree is None else tree.add(label)
     for parent in ancestor.parents:
         _tree(parent, branch)
     return branch
+
+
+def _in_a_line(text: str) -> str:
+    return visible(text.replace("\n", " "))
 
 
 def _document(ancestor: Ancestor) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import ENVIRONMENT, done, gsl, refused
+from commands import ENVIRONMENT, SMALL, done, gsl, refused
 from strangers import seal
 
 from gsl.core.trajectory import Batch, Trajectory
@@ -48,6 +48,21 @@ def test_a_film_of_a_log_imports_no_robot_that_only_the_log_names(artifact: Path
     assert not (tmp_path / "ran").exists()
 
 
+def test_a_lineage_does_not_steer_the_terminal(artifact: Path, tmp_path: Path) -> None:
+    parent = {"role": "\x1b[2J\n", "path": "\u202egone", "hash": "\x9b1m"}
+    seal(artifact, kind="\x1b]0;owned\x07", parents=[parent])
+    said = gsl("lineage", "a", folder=tmp_path)
+    assert not any(steering in said.out + said.err for steering in "\x1b\x07\x9b\u202e"), said
+    assert "\\u001b]0;owned\\u0007" in said.out
+    assert len(said.out.splitlines()) == 2
+
+
+def test_a_mapping_may_be_a_link_to_a_file_of_any_name(artifact: Path, tmp_path: Path) -> None:
+    (tmp_path / "version_2").write_text("defaults: [plain]\n")
+    (tmp_path / "mine.yaml").symlink_to("version_2")
+    done("import", "source=log.csv", "mapping=mine.yaml", "check=true", folder=tmp_path)
+
+
 SAID = {"force": "true", "out": "../elsewhere", "executor": "dask", "address": "tcp://127.0.0.1:1"}
 
 
@@ -60,6 +75,22 @@ def test_a_file_neither_replaces_artifacts_nor_writes_or_sends_elsewhere(key: st
     assert (said.code, f"type {key}=..." in said.err) == (2, True), said
     typed = {"address": ("executor=dask", f"{key}={SAID[key]}")}.get(key, (f"{key}={SAID[key]}",))
     done("collect", *typed, "--cfg", "job", folder=tmp_path)
+
+
+@pytest.mark.parametrize("launcher", ["basic", "joblib"])
+def test_no_job_of_a_multirun_lets_its_files_send_elsewhere(launcher: str, tmp_path: Path) -> None:
+    if launcher == "joblib":
+        pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
+    place = tmp_path / "theirs/task"
+    place.mkdir(parents=True)
+    (place / "first.yaml").write_text("defaults: [walk]\n")
+    said = "executor: dask\naddress: tcp://127.0.0.1:1\ntask:\n  _target_: gsl.tasks.walk.Walk\n"
+    (place / "second.yaml").write_text(f"# @package _global_\n{said}")
+    words = ("collect", "--multirun", "--config-dir=theirs", "task=first,second", *SMALL)
+    ended = gsl(*words, f"hydra/launcher={launcher}", "name=a", folder=tmp_path)
+    assert ended.code == 2, ended
+    assert "executor = dask: is said by a file, and only you can say it" in ended.err + ended.out
+    assert [path.parent.name for path in (tmp_path / "runs/a").glob("*/collect_real")] == ["task=first"]
 
 
 def test_a_file_of_very_many_settings_is_refused(tmp_path: Path) -> None:
