@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from gsl.core.visible import visible
 from gsl.report.console import Console
 from gsl.storage.hashing import SHORT
-from gsl.storage.lineage import Ancestor, lineage
+from gsl.storage.lineage import Ancestor, Seen, lineage
 from gsl.storage.references import artifact_folders, resolve
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def verify(reference: str | None, console: Console) -> int:
         ArtifactError: There is no such artifact.
     """
     wrong: dict[Path, str] = {}
-    seen: set[Path] = set()
+    seen: Seen = {}
     folders = artifact_folders(reference)
     for folder in folders:
         for one in lineage(folder, seen).all():
@@ -51,7 +51,7 @@ def draw_lineage(reference: str, console: Console) -> int:
     Raises:
         ArtifactError: There is no such artifact.
     """
-    root = lineage(resolve(reference), set())
+    root = lineage(resolve(reference), {})
     console.draw(_tree(root))
     wrong = [one for one in root.all() if one.problem]
     console.result(_document(root) | ({"exit_code": 1} if wrong else {}))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -19,6 +20,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ArtifactError
 from gsl.storage import manifest
 from gsl.storage.hashing import file_hash
+from gsl.storage.lineage import LONGEST
 from gsl.storage.trajectories import write
 
 pytestmark = pytest.mark.slow
@@ -55,6 +57,24 @@ def test_a_lineage_does_not_steer_the_terminal(artifact: Path, tmp_path: Path) -
     assert not any(steering in said.out + said.err for steering in "\x1b\x07\x9b\u202e"), said
     assert "\\u001b]0;owned\\u0007" in said.out
     assert len(said.out.splitlines()) == 2
+
+
+def test_a_lineage_without_end_is_no_damage(artifact: Path, tmp_path: Path) -> None:
+    contents = manifest.read(artifact).contents
+    for k in range(2 * LONGEST):
+        folder, above = tmp_path / f"runs/{k:03d}/import", "a" if k == 0 else f"{k - 1:03d}"
+        shutil.copytree(artifact, folder)
+        seal(folder, parents=2 * [{"role": "source", "path": f"../../{above}/import", "hash": contents}])
+    seal(artifact, parents=[{"role": "source", "path": "../../010/import", "hash": contents}])  # round and round
+    last = f"{2 * LONGEST - 1:03d}"
+    for command in ("verify", "lineage"):
+        said = gsl(command, last, folder=tmp_path)
+        assert said.code == 1, said
+        assert f"runs/{LONGEST - 1:03d}/import: is {LONGEST} generations back; what it" in said.lines[-1]
+    assert "all files are as they were made\n" in done("show", last, folder=tmp_path).out
+    assert "nothing below runs/ could go" in done("clean", "stale=true", folder=tmp_path).out
+    (tmp_path / "runs/000/import/log.txt").write_text("another")
+    assert "runs/000/import: log.txt is not as" in gsl("verify", "005", folder=tmp_path).err
 
 
 def test_a_mapping_may_be_a_link_to_a_file_of_any_name(artifact: Path, tmp_path: Path) -> None:
