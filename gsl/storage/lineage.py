@@ -12,7 +12,6 @@ from gsl.storage import manifest
 from gsl.storage.hashing import file_hash
 from gsl.storage.manifest import Manifest, Parent
 
-
 LONGEST = 200
 """Generations of a lineage, of which an iteration adds less than ten."""
 
