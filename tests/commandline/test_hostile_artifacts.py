@@ -134,6 +134,19 @@ def test_files_that_name_each_other_without_end_are_given_up(names: list[str], t
     assert time.process_time() - begin < 30.0
 
 
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("defaults: [/collect]\n", "yaml files name each other in a circle, in their `defaults:`"),
+        ("name: ${oc.env:HOME\n", "collect.yaml: holds a reference that cannot be read; it is written as ${sim.robot}"),
+    ],
+)
+def test_a_file_that_hydra_says_nothing_of_is_told_in_words(text: str, problem: str, tmp_path: Path) -> None:
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs/collect.yaml").write_text(text)
+    assert refused("collect", "--config-dir=theirs", "--cfg", "job", folder=tmp_path).endswith(problem)
+
+
 def test_a_file_does_not_refer_to_another_place_either(tmp_path: Path) -> None:
     place = tmp_path / "theirs/experiment/theirs.yaml"
     place.parent.mkdir(parents=True)

@@ -194,17 +194,17 @@ def test_what_was_given_up_does_nothing_more_when_it_returns_after_all() -> None
 
 @pytest.mark.parametrize("name", ["read", "send", "begin", "end"])
 @pytest.mark.parametrize(
-    ("how", "told"),
+    ("how", "problem"),
     [
         ("raise SystemExit(0)", "SystemExit: 0"),
         ("import asyncio; raise asyncio.CancelledError('the server went')", "CancelledError: the server went"),
     ],
 )
-def test_no_function_of_a_robot_ends_the_runner(walk: Path, tmp_path: Path, name: str, how: str, told: str) -> None:
+def test_no_function_of_a_robot_ends_the_runner(walk: Path, tmp_path: Path, name: str, how: str, problem: str) -> None:
     path = robot(tmp_path, how, "acting", name, 1, "once")
     ended = run(walk, "--yes", "--unpaced", f"--robot={path}", f"--log={tmp_path / 'answer.csv'}")
     assert (ended.returncode, ended.stderr) == (2, "")
-    assert f"{name}() failed: {told}" in ended.stdout
+    assert f"{name}() failed: {problem}" in ended.stdout
     assert np.allclose(sent(path)[-1], read_request(walk)["episodes"][0]["posture"])
 
 
