@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from gsl.core.budget import DOCUMENT_BYTES, read_text
 from gsl.core.described import restore
 from gsl.core.interfaces import World
 from gsl.grounding.diagnosis_file import read_diagnosis
@@ -17,7 +18,8 @@ from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import report_of
 from gsl.storage.hashing import PAGE
 
-_FRAME = 'style="width: 100%; height: 600px; border: 0"'
+_FRAME = 'sandbox="allow-scripts" style="width: 100%; height: 600px; border: 0"'
+"""A page may be a stranger's: its scripts do not reach the notebook around it, which can run code."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,8 @@ class Verdict(Result):
         return f"{self.verdict}: {self.summary}"
 
     def _repr_html_(self) -> str:
-        return f'<iframe srcdoc="{escape((self.folder / PAGE).read_text(encoding="utf-8"))}" {_FRAME}></iframe>'
+        page = read_text(self.folder / PAGE, DOCUMENT_BYTES)
+        return f'<iframe srcdoc="{escape(page)}" {_FRAME}></iframe>'
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -250,8 +250,11 @@ def _compose(command: str, overrides: Sequence[str], trust: Sequence[str]) -> Di
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None
     name, how = file_of(command), {"from_shell": False, "with_log_configuration": False}
-    with within("putting the settings together"):  # files may name each other again and again
-        config = hydra.compose_config(config_name=name, overrides=list(overrides), run_mode=RunMode.RUN, **how)
+    try:
+        with within("putting the settings together"):  # files may name each other again and again
+            config = hydra.compose_config(config_name=name, overrides=list(overrides), run_mode=RunMode.RUN, **how)
+    except RecursionError as error:
+        raise InputError("yaml files name each other in a circle, in their `defaults:`") from error
     check_code(plain(_without_hydra(config)), trust, references=True)
     return config
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gsl.core.visible import visible
 from gsl.errors import ArtifactError
 from gsl.report.console import Console
 from gsl.storage.hashing import SHORT
-from gsl.storage.lineage import Ancestor, lineage
+from gsl.storage.lineage import Ancestor, Seen, lineage
 from gsl.storage.references import RUNS, artifact_folders, resolve
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ def verify(reference: str | None, console: Console) -> int:
         ArtifactError: There is no such artifact.
     """
     wrong: dict[Path, str] = {}
-    seen: set[Path] = set()
+    seen: Seen = {}
     folders = artifact_folders(reference)
     if not folders:
         raise ArtifactError(RUNS, "holds no artifact, so nothing is verified; go to the folder that runs/ lies in")
@@ -53,7 +54,7 @@ def draw_lineage(reference: str, console: Console) -> int:
     Raises:
         ArtifactError: There is no such artifact.
     """
-    root = lineage(resolve(reference), set())
+    root = lineage(resolve(reference), {})
     console.draw(_tree(root))
     wrong = [one for one in root.all() if one.problem]
     console.result(_document(root) | ({"exit_code": 1} if wrong else {}))
@@ -67,16 +68,20 @@ def _tree(ancestor: Ancestor, tree: Tree | None = None) -> Tree:
     from rich.tree import Tree
 
     stored = ancestor.manifest
-    label = Text(f"{ancestor.role}: " if ancestor.role else "")
-    label.append(ancestor.place.as_posix(), style="bold")
+    label = Text(_in_a_line(f"{ancestor.role}: ") if ancestor.role else "")
+    label.append(_in_a_line(ancestor.place.as_posix()), style="bold")
     if stored is not None:
-        label.append(f"  {stored.kind} {stored.contents[:SHORT]}", style="dim")
+        label.append(_in_a_line(f"  {stored.kind} {stored.contents[:SHORT]}"), style="dim")
     if ancestor.problem:
-        label.append(f"  {ancestor.problem}", style="red")
+        label.append(_in_a_line(f"  {ancestor.problem}"), style="red")
     branch = Tree(label) if tree is None else tree.add(label)
     for parent in ancestor.parents:
         _tree(parent, branch)
     return branch
+
+
+def _in_a_line(text: str) -> str:
+    return visible(text.replace("\n", " "))
 
 
 def _document(ancestor: Ancestor) -> dict[str, Any]:

@@ -24,7 +24,9 @@ from omegaconf import DictConfig
 from gsl.commandline.composer import Composition
 from gsl.commandline.config import RUNS, execute, resolve
 from gsl.commandline.failure import describe_failure, report
+from gsl.commandline.known_settings import plain
 from gsl.commandline.overrides import file_of, key_of
+from gsl.commandline.own_word import check_own_word
 from gsl.core.interruption import end_with_parent
 from gsl.errors import GslError
 from gsl.report.console import Console
@@ -129,6 +131,7 @@ def run_job(
     level = job_level(list(hydra.overrides.task), swept, int(hydra.job.num))
     console.status(f"job {hydra.job.num}: {level}")
     try:
+        check_own_word(plain(config), {key_of(word) for word in hydra.overrides.task})  # a job may be of other files
         values = resolve(Composition(config, (), {}, ()))
         outcome = {"job": level, "exit_code": 0, **execute(command, line, values, console, trust=trust, level=level)}
     except Exception as failure:

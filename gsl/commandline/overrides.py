@@ -86,5 +86,6 @@ def _as_option(group: str, path: Path) -> str:
         raise InputError(f"{group} = {path}: is no {group}, whose file's name must end with .yaml")
     if not path.is_file():
         raise InputError(f"{group} = {path}: there is no such file")
-    name = _ROOT + path.resolve().with_suffix("").as_posix().lstrip("/")
+    place = path.parent.resolve() / path.stem  # not where a link leads: a name without .yaml is none of hydra's
+    name = _ROOT + place.as_posix().lstrip("/")
     return name if re.fullmatch(r"[\w./-]+", name) else "'" + name.replace("\\", "\\\\").replace("'", "\\'") + "'"

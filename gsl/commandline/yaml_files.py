@@ -68,7 +68,11 @@ def check_file(path: Path, name: str) -> None:
     words = [*map(str, settings), *name.split("/"), package, *_words(settings.get("defaults"))]
     if any(_HYDRA in word for word in words):
         raise InputError(f"{path}: sets hydra itself, which can start programs; type such settings instead")
-    if resolver := next(_resolvers([tree]), ""):
+    try:
+        resolver = next(_resolvers([tree]), "")
+    except OmegaConfBaseException as error:  # of which hydra says nothing but that
+        raise InputError(f"{path}: holds a reference that cannot be read; it is written as ${{sim.robot}}") from error
+    if resolver:
         raise InputError(f"{path}: refers to {resolver}; a file refers to settings, such as ${{sim.robot}}, alone")
     if TRUST in settings or TRUST in package.split("."):
         raise InputError(f"{path}: says {TRUST}, which only you can say, on the command line")
@@ -100,10 +104,7 @@ def _resolvers(value: Any) -> Iterator[str]:
 
 def _resolver(text: str) -> str:
     """Return the name of what a text refers to beside settings; nothing if it does not."""
-    try:
-        waiting: list[Any] = [parse(text)]
-    except OmegaConfBaseException:
-        return ""  # it is told when it is resolved
+    waiting: list[Any] = [parse(text)]
     while waiting:
         node = waiting.pop()
         if isinstance(node, OmegaConfGrammarParser.InterpolationResolverContext):

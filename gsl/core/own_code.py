@@ -55,7 +55,7 @@ def name_failures() -> Iterator[None]:
         yield
     except GslError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         if (line := describe_own(error)) is None:
             raise
         raise GslError(line) from error

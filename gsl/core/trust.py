@@ -111,7 +111,7 @@ def class_of(name: Any, where: str = "") -> Any:
         raise ConfigError(setting, "is no name of a class, which is module.Class", given=str(name))
     try:
         module = importlib.import_module(place)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise ConfigError(setting, f"cannot be loaded: {reason}", given=str(name)) from error
     target = getattr(module, attribute, None)

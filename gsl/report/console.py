@@ -194,7 +194,7 @@ class Console:
         if words := self._work.text():
             below = Table.grid()
             below.add_row(ProgressBar(total=1.0, completed=self._work.share, width=min(BAR, self._stderr.width)))
-            below.add_row(Text(self._title(words)))
+            below.add_row(Text(visible(self._title(words))))
             shown.append(below)
         return Group(*shown)
 
@@ -205,7 +205,7 @@ class Console:
             self._said = now
             if self._lines is not None:
                 self._lines.interrupted = True
-            self._stderr.print(self._title(self._work.text()), markup=False, highlight=False, soft_wrap=True)
+            self._stderr.print(visible(self._title(self._work.text())), markup=False, highlight=False, soft_wrap=True)
 
     def _title(self, title: str) -> str:
         return f"{self._part}: {title}" if self._part else title

@@ -167,7 +167,7 @@ def _soft(hinge: Hinge, joint: Joint, follows: Follows) -> dict[str, tuple[float
     own = (ends.get("lower", -math.inf), ends.get("upper", math.inf))
     lower, upper = sorted(follows.ratio * (end - follows.offset) for end in own)
     lower, upper = max(lower, joint.lower), min(upper, joint.upper)
-    if not lower < upper:
+    if not (own[0] < own[1] and lower < upper):
         problem = f"its soft limits {own[0]:g} and {own[1]:g} rad leave no range; mend its <safety_controller>"
         raise ConfigError(f"joints.{hinge.name}", problem)
     return {hinge.name: (lower, upper)}

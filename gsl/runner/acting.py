@@ -49,7 +49,7 @@ def _name_episode(episode: Mapping[str, Any]) -> Iterator[None]:
         yield
     except GslError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise GslError(f"{episode['name']}: its policy failed: {type(error).__name__}: {error}") from error
 
 

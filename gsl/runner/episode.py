@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from gsl.runner.following import Following
 from gsl.runner.guard import Guard, longest, ramp
 from gsl.runner.request import layout_of
 from gsl.runner.senses import RobotError, Seen, Senses, names_of
-from gsl.runner.watch import FIRST, Watch, limit_of
+from gsl.runner.watch import FIRST, GivenUp, Watch, limit_of
 
 HOLD = 1.0  # for which the last safe target is held before the ramp out of a stop [s]
 LATEST = 3.0  # that a tick may come before the episode is stopped, in periods
@@ -174,7 +174,7 @@ class Player:
         return seen.observation[self._layout["position"]]
 
     def _read(self, now: float) -> Seen:
-        seen = self._senses.interpret(self._call("read"), now)
+        seen: Seen = self._watch_over("read", lambda: self._senses.interpret(self.robot.read(), now))
         self._reads, self._down = True, seen.fell
         return seen
 
@@ -186,13 +186,22 @@ class Player:
             raise RobotError("read() hangs and the robot lay down when it was last seen; nothing more is sent to it")
         return None
 
-    def _call(self, name: str, *words: Any) -> Any:
-        """Call a function of the robot, none where it has none; the first reading may have to open a connection."""
-        function = getattr(self.robot, name, lambda *words: None)
+    def _call(self, name: str, *words: Any) -> None:
+        """Call a function of the robot, none where it has none."""
+        self._watch_over(name, getattr(self.robot, name, lambda *words: None), *words)
+
+    def _watch_over(self, name: str, function: Callable[..., Any], *words: Any) -> Any:
+        """Return what a part of the robot's file returns; the first reading may have to open a connection.
+
+        Raises:
+            RobotError: It fails, or calls sys.exit(): nothing in it ends the runner while the robot is away.
+        """
         slow = name in ("begin", "end") or (name == "read" and not self._reads)
         try:
             return self.watch.call(name, function, *words, patience=FIRST if slow else 1.0)
-        except Exception as error:
+        except (RobotError, KeyboardInterrupt, GivenUp):
+            raise
+        except BaseException as error:
             raise RobotError(f"{name}() failed: {type(error).__name__}: {error}") from error
 
     def _send(self, target: np.ndarray) -> str:

@@ -48,6 +48,7 @@ def _run(folder: Path, asked: argparse.Namespace) -> int:
     for name in SIGNALS:  # hold, ramp out, keep what is complete; in a background job as well
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.default_int_handler)
+    asked.log = asked.log.absolute()  # a robot's file may change the current folder
     try:
         request = read_request(folder, asked.trust)
         if asked.dry_run:

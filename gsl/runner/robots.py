@@ -26,7 +26,7 @@ def robot_of(path: Path) -> Any:
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise RobotError(f"{path} cannot be loaded: {type(error).__name__}: {error}") from error
     for name in ("read", "send"):
         if not callable(getattr(module, name, None)):

@@ -9,8 +9,8 @@ from gsl.core.visible import visible
 
 
 def say(text: str) -> None:
-    """Tell a person something; nobody, if stdout is gone."""
-    if sys.stdout is None:
+    """Tell a person something; nobody, if stdout is gone, or closed by a robot's file."""
+    if sys.stdout is None or sys.stdout.closed:
         return
     encoding = sys.stdout.encoding or "utf-8"
     shown = visible(text).encode(encoding, "backslashreplace").decode(encoding)

@@ -84,7 +84,8 @@ def _numbers(name: str, value: Any, size: int) -> np.ndarray:
     except (TypeError, ValueError) as error:
         raise RobotError(f"read() gives for '{name}' what is no list of numbers") from error
     if numbers.shape != (size,):
-        raise RobotError(f"read() gives {numbers.size} numbers for '{name}', not {size}")
+        shape = "" if numbers.ndim == 1 else f" in the shape {numbers.shape}"
+        raise RobotError(f"read() gives {numbers.size} numbers{shape} for '{name}', not {size}")
     if not np.isfinite(numbers).all():
         raise RobotError(f"read() gives for '{name}' a number that is not finite")
     return numbers

@@ -39,7 +39,7 @@ class Hangs(RobotError):
         self.name = name
 
 
-class _GivenUp(BaseException):
+class GivenUp(BaseException):
     """Ends a thread that was given up, in case what hung in it returns after all."""
 
 
@@ -143,7 +143,7 @@ class Watch:
         thread = threading.current_thread()
         with self._lock:
             if isinstance(thread, _Worker) and thread.is_given_up:
-                raise _GivenUp
+                raise GivenUp
             self._under_way = call
             self._tell_sentinel()
 

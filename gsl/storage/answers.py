@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,6 +25,7 @@ from gsl.storage.trajectory_contract import SCHEMA_VERSION, UNITS, check_names, 
 NO = ("false", "no", "0", "")
 STOPPED = "stopped"
 OFF = 0.5  # of the control period, the most by which a row may come too late or too soon
+HUGE = 1e6  # in SI units, more than any of a robot's sensors measures
 ROW = 64 * 32  # bytes that no row of ours reaches for a robot of 100 columns
 _PATTERNS = ("answer*.csv", "answer*.parquet", "returns*.csv")
 
@@ -162,8 +162,8 @@ def _read_measured(path: Path, number: int, row: Mapping[str, Any]) -> Answered:
             numbers[name] = float(text) if text else None
         except ValueError as error:
             raise ArtifactError(path, f"row {number}: {name} is '{text}', not a number") from error
-        if numbers[name] is not None and not math.isfinite(numbers[name] or 0.0):
-            raise ArtifactError(path, f"row {number}: {name} is not a finite number")
+        if not abs(numbers[name] or 0.0) <= HUGE:  # not that either
+            raise ArtifactError(path, f"row {number}: {name} is '{text[:20]}', which nothing measures")
     if abs(numbers["distance"] or 0.0) > 100.0:
         raise ArtifactError(path, f"row {number}: a distance of {numbers['distance']:g} m; is it in metres?")
     return Answered(path, fell=fell in YES, distance=numbers["distance"], value=numbers["value"])

@@ -18,7 +18,7 @@ import yaml
 from gsl.core.budget import read_json, read_text
 from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
-from gsl.core.own_code import package_of
+from gsl.core.own_code import describe_own, package_of
 from gsl.core.step_metrics import listen_to_steps
 from gsl.core.trust import modules_in
 from gsl.core.unit import Unit
@@ -218,7 +218,10 @@ def _work(
         parents = tuple(Parent(role, relative(path, folder), identity.parents[role]) for role, path in found)
         listening = listen_to_steps(StepLog(folder, identity.kind).note)
         with collect_links() as links, at_work(Origin(command, settings, parents, folder, links)) as origin, listening:
-            metrics = stage.run(folder, console)
+            try:
+                metrics = stage.run(folder, console)
+            except SystemExit as error:  # of a user's own code: the work is not done, whatever the code says
+                raise GslError(describe_own(error) or f"something has called sys.exit({error})") from error
         checkpoint()
         logger.info("%s ends after %.1f s", identity.kind, time.perf_counter() - begin)
     documents.write_json(folder / METRICS, metrics)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import functools
 import os
 import re
 import shutil
@@ -49,12 +50,13 @@ def find_leftovers(runs: Path) -> list[Leftover]:
 def find_stale(runs: Path, *, stale: bool, orphaned: bool) -> list[Leftover]:
     """Return artifacts below `runs` that were made from one that was built anew since, or from one that is gone."""
     reasons: dict[Path, str] = {}
+    read = functools.cache(manifest.read)
     for artifact in find_all(runs):
         folder, made = artifact.folder, artifact.manifest
         above = [parent.path for parent in made.parents if not (folder / parent.path).exists()]
         if orphaned and above:
             reasons[folder] = f"orphaned: {Path(os.path.normpath(folder / above[0])).as_posix()} is gone"
-        elif stale and (change := out_of_date(folder)):
+        elif stale and (change := out_of_date(folder, read)):
             reasons[folder] = f"stale: {change}"
     return [Leftover(folder, why, _measure_artifact(folder), artifact=True) for folder, why in reasons.items()]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,6 +11,9 @@ from gsl.errors import ArtifactError, InputError
 from gsl.storage import manifest
 from gsl.storage.hashing import file_hash
 from gsl.storage.manifest import Manifest, Parent
+
+LONGEST = 200
+"""Generations of a lineage, of which an iteration adds less than ten."""
 
 
 @dataclass(frozen=True)
@@ -38,22 +41,42 @@ class Ancestor:
         yield self
 
 
-def lineage(folder: Path, seen: set[Path]) -> Ancestor:
+Seen = dict[Path, tuple[Manifest, str]]
+"""Artifacts that were looked at, by absolute path, and what is wrong with their files: each is hashed once."""
+
+
+def lineage(folder: Path, seen: Seen) -> Ancestor:
     """Return an artifact with all that is above it, every file hashed again; what is in `seen` is not followed."""
-    return _trace("", folder, None, seen)
+    return _trace("", folder, None, seen, 0)
 
 
-def _trace(role: str, place: Path, expected: str | None, seen: set[Path]) -> Ancestor:
+def _trace(role: str, place: Path, expected: str | None, seen: Seen, depth: int) -> Ancestor:
+    again = seen.get(place.absolute())
     try:
-        stored = None if place.is_file() else manifest.read(place)
-        problem = _file_problem(place, expected) if stored is None else _problem(place, stored, expected)
+        if again is None and place.is_file():
+            return Ancestor(role, place, None, _file_problem(place, expected))
+        stored, damage = again or _look_at(place)
     except (InputError, OSError) as error:
         return Ancestor(role, place, None, str(error).removeprefix(f"{place}: ").removeprefix(f"{place}/"))
-    if stored is None or place.absolute() in seen:
+    problem = damage or ("was built anew since" if expected not in (None, stored.contents) else "")
+    if again is not None:
         return Ancestor(role, place, stored, problem)
-    seen.add(place.absolute())
-    above = [_trace(one.role, _place(place, one), one.hash, seen) for one in (*stored.parents, *stored.links)]
+    if depth == LONGEST:
+        too_far = f"is {LONGEST} generations back; what it was made from is not looked at"
+        return Ancestor(role, place, stored, problem or too_far)
+    seen[place.absolute()] = stored, damage
+    made = (*stored.parents, *stored.links)
+    above = [_trace(each.role, _place(place, each), each.hash, seen, depth + 1) for each in made]
     return Ancestor(role, place, stored, problem, above)
+
+
+def _look_at(folder: Path) -> tuple[Manifest, str]:
+    """Return the manifest of an artifact, and what is wrong with its files, nothing if all is well."""
+    stored = manifest.read(folder)
+    if damaged := manifest.find_damage(folder, stored):
+        return stored, f"{damaged} {manifest.describe_damage(folder, damaged)}"
+    strange = manifest.strange_file(folder, stored)
+    return stored, f"{strange} is no file of the artifact" if strange else ""
 
 
 def _place(folder: Path, parent: Parent) -> Path:
@@ -62,14 +85,6 @@ def _place(folder: Path, parent: Parent) -> Path:
 
 def _file_problem(place: Path, expected: str | None) -> str:
     return "was changed since" if expected not in (None, file_hash(place)) else ""
-
-
-def _problem(folder: Path, stored: Manifest, expected: str | None) -> str:
-    if damaged := manifest.find_damage(folder, stored):
-        return f"{damaged} {manifest.describe_damage(folder, damaged)}"
-    if strange := manifest.strange_file(folder, stored):
-        return f"{strange} is no file of the artifact"
-    return "was built anew since" if expected not in (None, stored.contents) else ""
 
 
 def broken_link(folder: Path, stored: Manifest) -> str | None:
@@ -87,26 +102,32 @@ def broken_link(folder: Path, stored: Manifest) -> str | None:
     return None
 
 
-def out_of_date(folder: Path, seen: set[Path] | None = None) -> str | None:
-    """Return which artifact above this one was built anew after it was used, by the manifests alone."""
-    seen = set() if seen is None else seen
-    if folder.absolute() in seen or folder.is_file():
-        return None
-    seen.add(folder.absolute())
-    try:
-        parents = manifest.read(folder).parents
-    except ArtifactError:
-        return None
-    for parent in parents:
-        place = _place(folder, parent)
-        if not (place / manifest.NAME).is_file():
-            continue  # a file, or gone: that nobody can say
+def out_of_date(folder: Path, read: Callable[[Path], Manifest] = manifest.read) -> str | None:
+    """Return which artifact above this one was built anew after it was used, by the manifests alone.
+
+    Args:
+        folder: Of the artifact.
+        read: Reads the manifest of a folder; who asks for many artifacts keeps what it has read.
+    """
+    waiting, seen = [folder], set[Path]()
+    while waiting:
+        child = waiting.pop()
+        if child.absolute() in seen or child.is_file():
+            continue
+        seen.add(child.absolute())
         try:
-            same = manifest.read(place).contents == parent.hash
-        except ArtifactError as error:
-            return str(error)
-        if not same:
-            return f"{place.as_posix()} was built anew since {folder.as_posix()} was made from it"
-        if above := out_of_date(place, seen):
-            return above
+            parents = read(child).parents
+        except ArtifactError:
+            continue
+        for parent in parents:
+            place = _place(child, parent)
+            if not (place / manifest.NAME).is_file():
+                continue  # a file, or gone: that nobody can say
+            try:
+                same = read(place).contents == parent.hash
+            except ArtifactError as error:
+                return str(error)
+            if not same:
+                return f"{place.as_posix()} was built anew since {child.as_posix()} was made from it"
+            waiting.append(place)
     return None

@@ -91,7 +91,8 @@ def test_a_diagnosis_is_an_object_with_its_page(elsewhere: Path) -> None:
     findings = gsl.diagnose(log.folder, world, most=1, duels=0, nulls=1, limits=False, workers=1)
     assert "command_latency" in findings.causes
     assert str(findings).startswith(f"{findings.verdict}: ")
-    assert "srcdoc" in findings._repr_html_()
+    assert 'iframe srcdoc="' in findings._repr_html_()
+    assert 'sandbox="allow-scripts"' in findings._repr_html_()  # of an origin of its own: not the notebook's
     assert "command_latency" in findings.world.effects  # type: ignore[attr-defined]
 
 

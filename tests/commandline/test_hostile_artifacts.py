@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -12,13 +13,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import ENVIRONMENT, done, gsl, refused
+from commands import ENVIRONMENT, SMALL, done, gsl, refused
 from strangers import seal
 
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ArtifactError
 from gsl.storage import manifest
 from gsl.storage.hashing import file_hash
+from gsl.storage.lineage import LONGEST
 from gsl.storage.trajectories import write
 
 pytestmark = pytest.mark.slow
@@ -48,6 +50,39 @@ def test_a_film_of_a_log_imports_no_robot_that_only_the_log_names(artifact: Path
     assert not (tmp_path / "ran").exists()
 
 
+def test_a_lineage_does_not_steer_the_terminal(artifact: Path, tmp_path: Path) -> None:
+    parent = {"role": "\x1b[2J\n", "path": "\u202egone", "hash": "\x9b1m"}
+    seal(artifact, kind="\x1b]0;owned\x07", parents=[parent])
+    said = gsl("lineage", "a", folder=tmp_path)
+    assert not any(steering in said.out + said.err for steering in "\x1b\x07\x9b\u202e"), said
+    assert "\\u001b]0;owned\\u0007" in said.out
+    assert len(said.out.splitlines()) == 2
+
+
+def test_a_lineage_without_end_is_no_damage(artifact: Path, tmp_path: Path) -> None:
+    contents = manifest.read(artifact).contents
+    for k in range(2 * LONGEST):
+        folder, above = tmp_path / f"runs/{k:03d}/import", "a" if k == 0 else f"{k - 1:03d}"
+        shutil.copytree(artifact, folder)
+        seal(folder, parents=2 * [{"role": "source", "path": f"../../{above}/import", "hash": contents}])
+    seal(artifact, parents=[{"role": "source", "path": "../../010/import", "hash": contents}])  # round and round
+    last = f"{2 * LONGEST - 1:03d}"
+    for command in ("verify", "lineage"):
+        said = gsl(command, last, folder=tmp_path)
+        assert said.code == 1, said
+        assert f"runs/{LONGEST - 1:03d}/import: is {LONGEST} generations back; what it" in said.lines[-1]
+    assert "all files are as they were made\n" in done("show", last, folder=tmp_path).out
+    assert "nothing below runs/ could go" in done("clean", "stale=true", folder=tmp_path).out
+    (tmp_path / "runs/000/import/log.txt").write_text("another")
+    assert "runs/000/import: log.txt is not as" in gsl("verify", "005", folder=tmp_path).err
+
+
+def test_a_mapping_may_be_a_link_to_a_file_of_any_name(artifact: Path, tmp_path: Path) -> None:
+    (tmp_path / "version_2").write_text("defaults: [plain]\n")
+    (tmp_path / "mine.yaml").symlink_to("version_2")
+    done("import", "source=log.csv", "mapping=mine.yaml", "check=true", folder=tmp_path)
+
+
 SAID = {"force": "true", "out": "../elsewhere", "executor": "dask", "address": "tcp://127.0.0.1:1"}
 
 
@@ -60,6 +95,22 @@ def test_a_file_neither_replaces_artifacts_nor_writes_or_sends_elsewhere(key: st
     assert (said.code, f"type {key}=..." in said.err) == (2, True), said
     typed = {"address": ("executor=dask", f"{key}={SAID[key]}")}.get(key, (f"{key}={SAID[key]}",))
     done("collect", *typed, "--cfg", "job", folder=tmp_path)
+
+
+@pytest.mark.parametrize("launcher", ["basic", "joblib"])
+def test_no_job_of_a_multirun_lets_its_files_send_elsewhere(launcher: str, tmp_path: Path) -> None:
+    if launcher == "joblib":
+        pytest.importorskip("hydra_plugins.hydra_joblib_launcher")
+    place = tmp_path / "theirs/task"
+    place.mkdir(parents=True)
+    (place / "first.yaml").write_text("defaults: [walk]\n")
+    said = "executor: dask\naddress: tcp://127.0.0.1:1\ntask:\n  _target_: gsl.tasks.walk.Walk\n"
+    (place / "second.yaml").write_text(f"# @package _global_\n{said}")
+    words = ("collect", "--multirun", "--config-dir=theirs", "task=first,second", *SMALL)
+    ended = gsl(*words, f"hydra/launcher={launcher}", "name=a", folder=tmp_path)
+    assert ended.code == 2, ended
+    assert "executor = dask: is said by a file, and only you can say it" in ended.err + ended.out
+    assert [path.parent.name for path in (tmp_path / "runs/a").glob("*/collect_real")] == ["task=first"]
 
 
 def test_a_file_of_very_many_settings_is_refused(tmp_path: Path) -> None:
@@ -81,6 +132,19 @@ def test_files_that_name_each_other_without_end_are_given_up(names: list[str], t
     said = gsl("collect", "--config-dir=theirs", "experiment=theirs", "--cfg", "job", folder=tmp_path)
     assert (said.code, len(said.lines)) == (2, 1), said
     assert time.process_time() - begin < 30.0
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("defaults: [/collect]\n", "yaml files name each other in a circle, in their `defaults:`"),
+        ("name: ${oc.env:HOME\n", "collect.yaml: holds a reference that cannot be read; it is written as ${sim.robot}"),
+    ],
+)
+def test_a_file_that_hydra_says_nothing_of_is_told_in_words(text: str, problem: str, tmp_path: Path) -> None:
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs/collect.yaml").write_text(text)
+    assert refused("collect", "--config-dir=theirs", "--cfg", "job", folder=tmp_path).endswith(problem)
 
 
 def test_a_file_does_not_refer_to_another_place_either(tmp_path: Path) -> None:

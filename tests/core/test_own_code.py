@@ -6,6 +6,7 @@ import runpy
 from pathlib import Path
 
 import pytest
+from commands import refused
 
 from gsl.core.own_code import describe_own
 
@@ -15,6 +16,26 @@ def test_a_failure_in_one_of_our_packages_is_no_users_own(package: str, tmp_path
     assert describe_own(_fail(tmp_path, f"{package}.module")) is None
     line = describe_own(_fail(tmp_path, "mine.module"))
     assert line == "mine.module.<module> failed (module.py, line 1): ZeroDivisionError: division by zero"
+
+
+EXITS = """import sys
+from dataclasses import dataclass
+from gsl.policies.walk_engine import WalkEngine
+
+@dataclass(frozen=True)
+class Mine(WalkEngine):
+    def start(self, parameters, layout):
+        sys.exit(0)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+def test_work_that_a_users_own_code_ends_has_failed(workers: int, tmp_path: Path) -> None:
+    (tmp_path / "exits.py").write_text(EXITS)
+    words = ("collect", "policy._target_=exits.Mine", "preset=toy", "task.duration=1.6", f"workers={workers}")
+    said = refused(*words, "name=refused", folder=tmp_path, code=1)
+    assert said.startswith("exits.Mine.start failed (exits.py, line 8): SystemExit: 0")
 
 
 def _fail(folder: Path, name: str) -> ZeroDivisionError:

@@ -163,9 +163,10 @@ def test_soft_limits_of_a_follower_are_those_of_its_leader_turned_round(tmp_path
     np.testing.assert_allclose([limits(body).lower[0], limits(body).upper[0]], [-0.4, 0.3])
 
 
-def test_soft_limits_that_leave_nothing_are_refused(tmp_path: Path) -> None:
-    file = written(tmp_path, joint("j1", "a", LIMIT + SOFT.format(1.5, 2)))
-    line = "joints.j1: its soft limits 1.5 and 2 rad leave no range; mend its <safety_controller>"
+@pytest.mark.parametrize("soft", [(1.5, 2), (0.3, -0.3)])
+def test_soft_limits_that_leave_nothing_are_refused(soft: tuple[float, float], tmp_path: Path) -> None:
+    file = written(tmp_path, joint("j1", "a", LIMIT + SOFT.format(*soft)))
+    line = "joints.j1: its soft limits {:g} and {:g} rad leave no range; mend its <safety_controller>".format(*soft)
     assert refused("robot", file, folder=tmp_path).endswith(line)
 
 

@@ -192,6 +192,49 @@ def test_what_was_given_up_does_nothing_more_when_it_returns_after_all() -> None
     assert after == [] and not is_stuck()
 
 
+@pytest.mark.parametrize("name", ["read", "send", "begin", "end"])
+@pytest.mark.parametrize(
+    ("how", "problem"),
+    [
+        ("raise SystemExit(0)", "SystemExit: 0"),
+        ("import asyncio; raise asyncio.CancelledError('the server went')", "CancelledError: the server went"),
+    ],
+)
+def test_no_function_of_a_robot_ends_the_runner(walk: Path, tmp_path: Path, name: str, how: str, problem: str) -> None:
+    path = robot(tmp_path, how, "acting", name, 1, "once")
+    ended = run(walk, "--yes", "--unpaced", f"--robot={path}", f"--log={tmp_path / 'answer.csv'}")
+    assert (ended.returncode, ended.stderr) == (2, "")
+    assert f"{name}() failed: {problem}" in ended.stdout
+    assert np.allclose(sent(path)[-1], read_request(walk)["episodes"][0]["posture"])
+
+
+def test_a_robots_file_that_ends_python_is_refused(walk: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("raise SystemExit(0)\n")
+    ended = run(walk, "--yes", f"--robot={tmp_path / 'mine.py'}", f"--log={tmp_path / 'answer.csv'}")
+    assert (ended.returncode, ended.stdout.endswith("mine.py cannot be loaded: SystemExit: 0\n")) == (2, True)
+
+
+def test_a_reading_that_hangs_when_it_is_looked_at_is_named(walk: Path, tmp_path: Path) -> None:
+    path = robot(tmp_path, "globals().update(at=Late())", "acting", "read", 5, "once")
+    late = "class Late:\n    def __array__(self, *words, **more):\n        time.sleep(1e6)\n"
+    path.write_text(path.read_text().replace("def count", f"{late}def count"))
+    ended = run(walk, "--yes", "--unpaced", f"--robot={path}", f"--log={tmp_path / 'answer.csv'}")
+    assert (ended.returncode, ended.stderr) == (2, "")
+    assert "read() has not returned for 0.4 s; the robot was held, then ramped unseen" in ended.stdout
+
+
+def test_the_answer_is_where_it_was_asked_for_though_a_robot_changes_the_folder(walk: Path, tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    path = robot(tmp_path, "pass", "anywhere", "read", 0, "once")
+    path.write_text(
+        f"import os, sys\nos.chdir({str(tmp_path / 'elsewhere')!r})\nsys.stdout.close()\n{path.read_text()}"
+    )
+    line = [sys.executable, "-I", str(walk / "runner.py"), "--yes", "--unpaced", f"--robot={path}", "--log=answer.csv"]
+    ended = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert (tmp_path / "answer.csv").is_file() and not [*(tmp_path / "elsewhere").iterdir()]
+
+
 def test_a_time_limit_that_is_none_is_refused(walk: Path, tmp_path: Path) -> None:
     path = robot(tmp_path, SLEEPS, "acting", "read", 12, "always")
     path.write_text(path.read_text().replace("True, 0.4", "True, float('nan')"))

@@ -91,6 +91,15 @@ def away(log: Trajectory) -> Trajectory:
     return replace(log, position=log.position + 0.9 * (np.arange(log.position.shape[1]) == SHOULDER))
 
 
+def cut_off(log: Trajectory, steps: int) -> Trajectory:
+    rows = steps + 1
+    sensors = {name: values[:rows] for name, values in log.sensors.items()}
+    position, velocity = log.position[:rows], log.velocity[:rows]
+    return Trajectory(
+        log.time[:rows], log.action[:steps], position, velocity, sensors=sensors, fell=np.arange(rows) == steps
+    )
+
+
 def in_degrees(log: Trajectory) -> Trajectory:
     return replace(log, position=np.rad2deg(log.position), velocity=np.rad2deg(log.velocity))
 
@@ -151,16 +160,44 @@ def test_one_log_for_two_episodes_is_refused_where_they_ask_for_different_things
     request, found = answers(walks, tmp_path)
     twin = {**found, "neighbour_01": replace(found["pi0_01"])}
     foreign = {name: replace(one, path=Path("answer.parquet")) for name, one in twin.items()}
-    with pytest.raises(InputError, match="pi0_01 and neighbour_01 have the same log, number for number; each of them"):
+    with pytest.raises(InputError, match="pi0_01 and neighbour_01 have the same log, to 1e-05 rad; each of them"):
         check_answers(request, foreign)
     alike = {**found, "pi0_02": found["pi0_01"]}
     assert check_answers(request, alike) == [
-        "pi0_01 and pi0_02 have the same log, number for number: is it of a simulation without noise?"
+        "pi0_01 and pi0_02 have the same log, to 1e-05 rad: is it of a simulation without noise?"
     ]
+    noise = 1e-7 * np.random.default_rng(0).standard_normal(found["pi0_01"].trajectory.position.shape)
+    nearly = spoilt(twin, "neighbour_01", lambda log: replace(log, position=log.position + noise))
+    cut = spoilt(twin, "neighbour_01", lambda log: cut_off(log, 40))
+    for copied in (nearly, cut):
+        with pytest.raises(InputError, match="pi0_01 and neighbour_01 have the same log"):
+            check_answers(request, {name: replace(one, path=Path("a.parquet")) for name, one in copied.items()})
     clocked = {name: replace(one, trajectory=replace(one.trajectory, time=one.trajectory.time + 1e-4 * (
         np.arange(len(one.trajectory.time)) > 0))) for name, one in alike.items()}  # fmt: skip
     with pytest.raises(InputError, match="pi0_01 and pi0_02 have the same log"):
         check_answers(request, clocked)
+
+
+def test_a_log_that_runs_backwards_is_told(walks: Path, tmp_path: Path) -> None:
+    request, found = answers(walks, tmp_path)
+    turned = spoilt(found, "pi0_01", lambda log: replace(log, position=log.position[::-1], velocity=log.velocity[::-1]))
+    assert "pi0_01: its velocities go against its positions; is it turned round in time?" in check_answers(
+        request, turned
+    )
+
+
+@pytest.mark.parametrize(
+    ("row", "problem"),
+    [
+        ("pi0_01,1e300,no", "row 1: value is '1e300', which nothing measures"),
+        ("pi0_01,nan,no", "row 1: value is 'nan', which nothing measures"),
+    ],
+)
+def test_a_measured_value_that_cannot_be_one_is_refused(walks: Path, tmp_path: Path, row: str, problem: str) -> None:
+    request, _ = answers(walks, tmp_path)
+    (tmp_path / ASKED / "returns.csv").write_text(f"episode,value,fell\n{row}\n")
+    with pytest.raises(InputError, match=problem):
+        read_answers(tmp_path / ASKED, request)
 
 
 def test_the_stages_look_at_answers(walks: Path, tmp_path: Path) -> None:
