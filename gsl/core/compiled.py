@@ -50,7 +50,7 @@ def _compile(function: F, **more: bool) -> F:
     if hasattr(kept, "_impl"):  # not with NUMBA_DISABLE_JIT, or without a folder
         place = kept._impl
         kept._cache_file = _CheckedFiles(kept.cache_path, place.filename_base, place.locator.get_source_stamp())
-    return dispatcher  # type: ignore[return-value]
+    return dispatcher
 
 
 class _CheckedFiles(IndexDataCacheFile):

@@ -162,14 +162,16 @@ def test_who_uses_what_was_made_from_other_data_is_warned(run: Path) -> None:
 
 
 def test_verify_says_what_is_missing_and_needs_something_to_verify(run: Path, tmp_path: Path) -> None:
-    assert refused("verify", folder=tmp_path).startswith("runs: holds no artifact, so nothing is verified")
-    shutil.copytree(run / "runs/chain/collect_real", tmp_path / "runs/mine/collect_real")
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    assert refused("verify", folder=mine).startswith("runs: holds no artifact, so nothing is verified")
+    shutil.copytree(run / "runs/chain/collect_real", mine / "runs/mine/collect_real")
     for name, problem in (
         ("trajectories.parquet", "trajectories.parquet is missing"),
         ("manifest.json", "is no complete artifact: it holds no manifest.json"),
     ):
-        (tmp_path / "runs/mine/collect_real" / name).unlink()
-        said = gsl("verify", folder=tmp_path)
+        (mine / "runs/mine/collect_real" / name).unlink()
+        said = gsl("verify", folder=mine)
         assert (said.code, said.lines) == (1, [f"gsl verify: runs/mine/collect_real: {problem}"])
 
 
