@@ -42,9 +42,15 @@ class Link:
     shapes: tuple[Shape, ...] = ()
 
 
+LONGEST = 0.25  # way of a slide that counts as much as a radian of a hinge, at most [m]: about the arm of a robot
+_USUAL = 2.0  # range of a hinge [rad]: the whole way of a short slide counts as much
+
+
 @dataclass(frozen=True)
 class Joint:
-    """A hinge between two links; with `fixed_at` [rad] it is rigid at that angle.
+    """A hinge between two links, or a slide; with `fixed_at` [rad] it is rigid at that angle.
+
+    All units of a slide are those of a hinge with m for rad and N for N·m: [m], [m/s], [N], [N/m], [kg].
 
     Attributes:
         origin: Of the child's frame in the parent's axes [m], shape (3,).
@@ -53,6 +59,7 @@ class Joint:
         max_velocity: [rad/s].
         effort: Peak torque [N·m].
         armature: Inertia of the rotor seen at the output [kg·m²].
+        slides: Whether it slides along its axis in place of turning about it.
     """
 
     name: str
@@ -66,6 +73,15 @@ class Joint:
     effort: float
     armature: float = 0.0
     fixed_at: float | None = None
+    slides: bool = False
+
+    @property
+    def size(self) -> float:
+        """What counts as much as a radian of a hinge: 1 [rad], or a length [m] of a slide that fits its range.
+
+        Margins, amplitudes and noise that are said in radians are by so much smaller for a slide.
+        """
+        return min(LONGEST, (self.upper - self.lower) / _USUAL) if self.slides else 1.0
 
 
 @dataclass(frozen=True)
@@ -136,6 +152,16 @@ class Robot:
     def joint(self, name: str) -> Joint:
         """Return the joint called `name`."""
         return next(joint for joint in self.joints if joint.name == name)
+
+    @property
+    def slides(self) -> tuple[str, ...]:
+        """The motors that slide."""
+        return tuple(name for name in self.motors if self.joint(name).slides)
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """What counts as much as a radian of each motor, see `Joint.size`, shape (n_motors,)."""
+        return np.array([self.joint(name).size for name in self.motors])
 
     def bound_commands(self, name: str) -> tuple[float, float]:
         """Return the range that commands of a motor keep [rad]."""

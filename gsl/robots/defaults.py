@@ -1,7 +1,7 @@
 """What a description of a body does not say of its servos, derived from what it says: start values for a diagnosis.
 
     armature = TIME_CONSTANT effort / velocity      the time in which full torque brings a free rotor up to speed
-    kp       = effort / FULL_AT                     full torque at an error of FULL_AT
+    kp       = effort / FULL_AT                     full torque at an error of FULL_AT; of a slide see `Joint.size`
     kd       = 2 DAMPING sqrt(kp inertia)           inertia of rotor and of all that the joint carries, others still
 
 `gsl diagnose` fits gains, friction and inertia of every joint anew before it looks for a cause, so that these need to
@@ -44,17 +44,17 @@ def with_gains(robot: Robot, settings: Mapping[str, tuple[float | None, float | 
 
     Args:
         robot: With everything else.
-        settings: kp [N·m/rad] and kd [N·m·s/rad] by motor, None where it is left open.
+        settings: kp [N·m/rad] and kd [N·m·s/rad] by motor, [N/m] and [N·s/m] of slides, None where it is left open.
     """
     body = lump(robot)
     carried = np.diag(mass_matrix(body, robot.stance))[6:]
     gains = {}
     for name, inertia in zip(robot.motors, carried.tolist(), strict=True):
         joint, (kp, kd) = robot.joint(name), settings.get(name, (None, None))
-        kp = joint.effort / FULL_AT if kp is None else kp
+        kp = joint.effort / (FULL_AT * joint.size) if kp is None else kp
         kd = 2.0 * DAMPING * float(np.sqrt(kp * (inertia + joint.armature))) if kd is None else kd
         gains[name] = (kp, kd)
-    peak = max(robot.joint(name).effort for name in robot.motors)
+    peak = max(joint.effort * joint.size for joint in map(robot.joint, robot.motors))
     made = replace(robot, gains=gains, torque_unit=torque_unit(peak))
     return replace(
         made, ranges={**(softer_gains(made) if any(kp for kp, _ in settings.values()) else {}), **made.ranges}
@@ -67,7 +67,8 @@ def softer_gains(robot: Robot) -> dict[str, dict[str, tuple[float, float]]]:
     Simulators of position servos are often far stiffer than any servo: kp may be as low as that of the softest that we
     know, which has its full torque at an error of SOFTEST, and kd may be lower by as much.
     """
-    least = min(robot.joint(name).effort / (SOFTEST * robot.gains[name][0]) for name in robot.motors)
+    motors = [robot.joint(name) for name in robot.motors]
+    least = min(joint.effort / (SOFTEST * joint.size * robot.gains[joint.name][0]) for joint in motors)
     usual = settings_of(effect_class("servo_gain"))["kp"]
     assert usual.lower is not None and usual.upper is not None
     return {} if least >= usual.lower else {"servo_gain": dict.fromkeys(("kp", "kd"), (least, usual.upper))}

@@ -75,7 +75,8 @@ def _attitude(shape: Shape) -> Sequence[float] | np.ndarray:
 
 def _add_joint(root: xml.Element, joint: Joint, soft: tuple[float, float] | None) -> None:
     fixed = joint.fixed_at is not None
-    node = xml.SubElement(root, "joint", name=joint.name, type="fixed" if fixed else "revolute")
+    kind = "fixed" if fixed else "prismatic" if joint.slides else "revolute"
+    node = xml.SubElement(root, "joint", name=joint.name, type=kind)
     xml.SubElement(node, "parent", link=joint.parent)
     xml.SubElement(node, "child", link=joint.child)
     turn = Rotation.from_rotvec(joint.axis * joint.fixed_at).as_euler("xyz") if fixed else (0.0, 0.0, 0.0)

@@ -36,7 +36,7 @@ def _soft(hinges: Iterable[Hinge]) -> Iterator[str]:
     for hinge in hinges:
         if any(hinge.soft.values()):
             ends = " and ".join(f"{hinge.soft[key]:g}" for key in ("lower", "upper") if key in hinge.soft)
-            yield f"commands of joint {hinge.name} keep the soft limits of its <safety_controller>: {ends} rad"
+            yield f"commands of joint {hinge.name} keep the soft limits of its <safety_controller>: {ends} {hinge.unit}"
         elif hinge.soft:
             yield f"joint {hinge.name} has soft limits of 0 in its <safety_controller>: taken as not set"
 

@@ -21,12 +21,14 @@ T = TypeVar("T")
 
 PRIMITIVES = ("box", "sphere", "cylinder")
 TURNING = ("revolute", "continuous")
+SLIDING = "prismatic"
+DRIVEN = (*TURNING, SLIDING)
 _LIMITS = ("lower", "upper", "effort", "velocity")
 _SOFT = {"lower": "soft_lower_limit", "upper": "soft_upper_limit"}
 _LEFT = ("${", "$(")  # how an expression begins that xacro would have replaced
 _GREY = (0.75, 0.77, 0.8, 1.0)
 FLOATING = "floating"
-KINDS = (*TURNING, "fixed", "prismatic")
+KINDS = (*DRIVEN, "fixed")
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,8 @@ class Hinge:
         soft: What <safety_controller> says of the range that commands keep: lower, upper [rad].
         follows: Joint, multiplier and offset [rad] of <mimic>, if there is one.
         dynamics: What <dynamics> says: damping [N·m·s/rad], friction [N·m].
+
+    If it slides, m stands for rad and N for N·m.
     """
 
     name: str
@@ -55,6 +59,16 @@ class Hinge:
     soft: dict[str, float]
     follows: tuple[str, float, float] | None
     dynamics: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def slides(self) -> bool:
+        """Whether it moves along its axis."""
+        return self.kind == SLIDING
+
+    @property
+    def unit(self) -> str:
+        """Of its position."""
+        return "m" if self.slides else "rad"
 
 
 @dataclass(frozen=True)

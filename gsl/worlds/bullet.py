@@ -233,6 +233,7 @@ class BulletEnv(gymnasium.Env):
 
     def _at_rest(self, posture: np.ndarray) -> Start:
         targets = posture[self._drive]
-        positions = targets + self.world.start_noise * self.np_random.standard_normal(self._n)[self._drive]
+        noise = self.world.start_noise * self.np_random.standard_normal(self._n)[self._drive]
+        positions = targets + noise * self._robot.sizes
         positions = np.clip(positions, self._plant.servo.lower_stop, self._plant.servo.upper_stop)
         return resting(self._robot, positions, targets, floating=self.world.floating)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Robot, lump
-from gsl.core.plant import Plant
+from gsl.core.plant import Plant, hardness
 from gsl.core.scratch import Scratch
 from gsl.robots.urdf import principal_axes, urdf
 from gsl.worlds.base_frame import base_motion
@@ -62,7 +62,7 @@ class Engine:
         self.body = NOTHING
         self.plant, self.physics, self.robot = plant, physics, lump(plant.robot)
         self.handle = client_handle(pybullet.__file__, self.client)
-        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law)
+        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law, hardness(plant.robot))
         apart, moved = servo.rows[ROTOR], physics.motors == "servo"
         armature = plant.servo.armature - apart if moved else np.zeros(len(apart))
         self._motors = None if moved else VelocityMotors.of(plant, servo.rows)
