@@ -28,7 +28,7 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
     find_own_modules(modules_in({"robot": name}))
     body = robot(name)
     model, picture = folder / f"{body.name}.urdf", folder / f"{body.name}.png"
-    shown = any(link.shapes for link in body.links.values())
+    shown = any(link.looks for link in body.links.values())
     files = [str(model), str(picture)] if shown else [str(model)]
     remarks = [*body.remarks, *([] if shown else ["no picture: none of its links has a shape that could be shown"])]
     with claim(folder):

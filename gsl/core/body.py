@@ -8,11 +8,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 
+MESH = "mesh"
+
+
 @dataclass(frozen=True)
 class Shape:
-    """A primitive on a link [m]: a `box` of full edges, a `sphere` (radius,) or a `cylinder` (radius, length).
+    """A shape on a link [m]: a `box` of full edges, a `sphere` (radius,), a `cylinder` (radius, length) or a `mesh`.
 
-    It is turned by `turn`: roll, pitch and yaw about the link's x, y and z, in this order [rad].
+    A mesh is in a file, scaled by `size`; it collides as its convex hull. A shape is turned by `turn`: roll, pitch and
+    yaw about the link's x, y and z, in this order [rad].
     """
 
     kind: str
@@ -22,6 +26,8 @@ class Shape:
     colour: tuple[float, float, float] = (0.9, 0.9, 0.92)
     along: str = "z"  # a cylinder's axis
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    file: str = ""
+    shown: bool = True
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,11 @@ class Link:
     com: np.ndarray
     inertia: np.ndarray
     shapes: tuple[Shape, ...] = ()
+
+    @property
+    def looks(self) -> tuple[Shape, ...]:
+        """The shapes that show."""
+        return tuple(shape for shape in self.shapes if shape.shown)
 
 
 LONGEST = 0.25  # way of a slide that counts as much as a radian of a hinge, at most [m]: about the arm of a robot

@@ -9,11 +9,13 @@ from pathlib import Path
 from gsl.core.body import Robot
 from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError, InputError
+from gsl.robots.mesh_files import SUFFIXES as MESHES
 from gsl.robots.robot_file import SUFFIXES, files_of, from_file
 
 _NOT_ROBOTS = (
-    *("catalogue", "defaults", "frames", "hinges", "joint_limits", "mimic", "nao_legs", "nao_shapes", "robot_file"),
-    *("so101_published", "so101_shapes", "urdf", "urdf_remarks", "urdf_xml", "xl330_published"),
+    *("catalogue", "defaults", "frames", "hinges", "joint_limits", "mesh_files", "meshes", "mimic", "nao_legs"),
+    *("nao_shapes", "robot_file", "so101_published", "so101_shapes", "urdf", "urdf_numbers", "urdf_remarks"),
+    *("urdf_shapes", "urdf_xml", "xl330_published"),
 )
 
 
@@ -38,7 +40,7 @@ def read_files(name: str) -> dict[str, Path]:
     """Return what a robot is read from, by the setting that names it: its files are part of what a world is."""
     first, *others = files(name) or (None,)
     named = {} if first is None else {"robot": first}
-    return named | {f"robot.{path.suffix[1:]}": path for path in others}
+    return named | {f"robot.{path.name if path.suffix.lower() in MESHES else path.suffix[1:]}": path for path in others}
 
 
 def robot(name: str) -> Robot:

@@ -83,6 +83,8 @@ def from_description(
             mounts.append(_hold(hinge, place := _place(hinge, held, follows, hinges)))
             if hinge.kind != "fixed" and hinge.name not in held:
                 remarks.append(_remark(hinge, place, follows.get(hinge.name), hinges))
+    if sliding := [mount.joint.name for mount in mounts if mount.joint.slides]:
+        remarks.append(f"joints that slide, their commands in m and forces in N: {', '.join(sliding)}")
     links, placed = align(description.links, mounts)
     robot = Robot(
         description.name, links, placed, tuple(chosen), coupled, stance=dict(stance), remarks=tuple(remarks), soft=soft,

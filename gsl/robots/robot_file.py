@@ -37,6 +37,7 @@ class RobotSettings:
     """What a robot's yaml file may say."""
 
     urdf: Annotated[str | None, setting("the body, beside this file; none for servos of unknown load")] = None
+    hulls: Annotated[bool, setting("whether the URDF's <collision> meshes collide, as convex hulls")] = False
     name: Annotated[str | None, setting("of the robot; that of the URDF by default", min_length=1)] = None
     joints: Annotated[Mapping[str, Any] | None, setting("controlled joints in order, with what is known of them")] = (
         None
@@ -45,7 +46,7 @@ class RobotSettings:
         default_factory=dict
     )
     groups: Annotated[Mapping[str, tuple[str, ...]], setting("names for sets of joints")] = field(default_factory=dict)
-    stance: Annotated[Mapping[str, float], setting("a usual posture, others at 0", unit="rad")] = field(
+    stance: Annotated[Mapping[str, float], setting("a usual posture, others at 0 [rad], [m]")] = field(
         default_factory=dict
     )
     encoder_step: Annotated[float, setting("resolution of the encoders", unit="rad", ge=0)] = 2.0 * math.pi / 4096
@@ -58,9 +59,12 @@ class RobotSettings:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """Return the files that a robot is read from: the file itself, and the URDF that it names."""
-    named = _settings(path).urdf if path.suffix in YAML else None
-    return (path,) if named is None else (path, path.parent / named)
+    """Return the files that a robot is read from: the file itself, the URDF that it names, and meshes that collide."""
+    settings = _settings(path) if path.suffix in YAML else RobotSettings()
+    if settings.urdf is None:
+        return (path,)
+    urdf = path.parent / settings.urdf
+    return (path, urdf, *(read_description(urdf, hulls=True).hulls if settings.hulls else ()))
 
 
 def from_file(path: Path) -> Robot:
@@ -76,7 +80,7 @@ def from_file(path: Path) -> Robot:
             if not (path.parent / settings.urdf).exists():
                 raise ConfigError("urdf", "there is no such file, as seen from the robot's file", given=settings.urdf)
             robot = from_description(
-                read_description(path.parent / settings.urdf), joints, settings.held, settings.stance
+                read_description(path.parent / settings.urdf, hulls=settings.hulls), joints, settings.held, settings.stance
             )
         else:
             robot = lone(settings.name or path.stem, joints or {})

@@ -75,7 +75,8 @@ class Engine:
         self._pushes = aim(plant, self._loaded)
         self._link_from_inertial = Rotation.from_matrix(axes.T).as_quat().tolist()
         self._folder = Scratch()
-        for name, text in (("robot", urdf(self._loaded, visuals=False)), ("ground", PLANE)):
+        model = urdf(self._loaded, visuals=False, meshes=Path(self._folder.name))
+        for name, text in (("robot", model), ("ground", PLANE)):
             Path(self._folder.name, f"{name}.urdf").write_text(text)
 
     def close(self) -> None:
