@@ -19,8 +19,10 @@ from gsl.core.validation import make
 from gsl.errors import ConfigError, InputError
 from gsl.report.console import Console
 from gsl.robots.catalogue import names
+from gsl.robots.descriptions import PREFIX
 from gsl.robots.hinges import JointSettings, drivable, from_description
 from gsl.robots.joint_limits import is_limit, is_range
+from gsl.robots.robot_file import urdf_of
 from gsl.robots.urdf_xml import Description, Hinge, read_description
 from gsl.storage.whole import explain_refusal
 
@@ -47,7 +49,7 @@ _DYNAMICS = {"damping": ("viscous_friction", "coefficient"), "friction": ("coulo
 class Init:
     """What `gsl init` is told; of joints that slide, in m for rad and N for N·m."""
 
-    urdf: Annotated[str, setting("your robot", min_length=1)]
+    urdf: Annotated[str, setting("your robot: a file, or robot_descriptions:NAME", min_length=1)]
     name: Annotated[str, setting("what its world will be called", min_length=1)]
     out: Annotated[str | None, setting("folder to write; the name by default", min_length=1)] = None
     joints: Annotated[tuple[str, ...], setting("controlled joints in order; all that move by default")] = field(
@@ -72,7 +74,7 @@ def write_configuration(arguments: Sequence[str], worlds: Collection[str], conso
         InputError: A setting is wrong, the URDF cannot be read, or the folder is there already.
     """
     told: Init = make(Init, _settings(arguments))
-    folder, urdf = Path(told.out or told.name), Path(told.urdf)
+    folder, urdf = Path(told.out or told.name), urdf_of(told.urdf)
     if not re.fullmatch(r"[A-Za-z_][\w-]*", told.name):
         raise ConfigError(
             "name", "must be a word of letters, digits, _ and -, not beginning with a digit", given=told.name
@@ -146,7 +148,8 @@ def _write(
     with explain_refusal(folder):
         try:
             world.parent.mkdir(parents=True)
-            text = _robot_text(robot, Path(os.path.relpath(urdf, folder)), joints)
+            seen = told.urdf if told.urdf.startswith(PREFIX) else Path(os.path.relpath(urdf, folder)).as_posix()
+            text = _robot_text(robot, urdf.name, seen, joints)
             (place / ROBOT).write_text(text, encoding="utf-8")
             known = {"name": told.name, "robot": (folder / ROBOT).as_posix(), "period": told.period}
             known["effects"] = effects
@@ -156,15 +159,15 @@ def _write(
             shutil.rmtree(place, ignore_errors=True)
 
 
-def _robot_text(robot: Robot, urdf: Path, values: Mapping[str, Mapping[str, float]]) -> str:
+def _robot_text(robot: Robot, name: str, urdf: str, values: Mapping[str, Mapping[str, float]]) -> str:
     joints = "".join(f"  {_plain(name)}: {_flow(values[name])}\n" for name in robot.controlled)
     held = "".join(f"# {remark}\n" for remark in robot.remarks)
     units = "  # kp [N·m/rad], kd [N·m·s/rad], effort [N·m], velocity without load [rad/s], armature [kg·m²]\n"
     units += "  # of those that slide: m for rad, N for N·m, kg for kg·m²\n" if robot.slides else ""
     return (
-        _ROBOT_HEAD.format(urdf=urdf.name)
+        _ROBOT_HEAD.format(urdf=name)
         + held
-        + f"urdf: {_plain(urdf.as_posix())}   # as seen from this file\njoints:\n{units}{joints}"
+        + f"urdf: {_plain(urdf)}   # as seen from this file\njoints:\n{units}{joints}"
         + "held: {}   # where the other joints stand [rad], [m]: 0 or as near as they go if nothing is said\n"
         + "groups: {}   # names for several joints, scopes of effects: {wrist: [roll, pitch]}\n"
         + "ranges: {}   # where effects may be larger on your robot: {backlash: {width: [0, 0.05]}}\n"

@@ -69,7 +69,8 @@ def _add_joint(node: xml.Element, joint: Joint, simulator: Simulator) -> None:
     k = motors.index(joint.name)
     low, high = max(joint.lower, servo.lower_stop[k]), min(joint.upper, servo.upper_stop[k])
     xml.SubElement(
-        node, "joint", name=joint.name, type="slide" if joint.slides else "hinge", axis=text(*joint.axis), range=text(low, high),
+        node, "joint", name=joint.name, type="slide" if joint.slides else "hinge",
+        axis=text(*joint.axis), range=text(low, high),
         armature=text(servo.armature[k]), damping=text(servo.viscous[k]), frictionloss=text(servo.coulomb[k]),
     )  # fmt: skip
 

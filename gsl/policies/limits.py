@@ -119,8 +119,18 @@ def breach(bounds: Limits, targets: np.ndarray, period: float) -> Breach | None:
     path[steps:] -= path[:-steps].copy()
     most, far = np.maximum(bounds.jump, bounds.speed * period), bounds.speed * steps * period
     rules = (
-        (bounds.lower - targets, targets, bounds.lower, "the target of {:.4g} {unit} is below the limit of {:.4g} {unit}"),
-        (targets - bounds.upper, targets, bounds.upper, "the target of {:.4g} {unit} is above the limit of {:.4g} {unit}"),
+        (
+            bounds.lower - targets,
+            targets,
+            bounds.lower,
+            "the target of {:.4g} {unit} is below the limit, {:.4g} {unit}",
+        ),
+        (
+            targets - bounds.upper,
+            targets,
+            bounds.upper,
+            "the target of {:.4g} {unit} is above the limit, {:.4g} {unit}",
+        ),
         (change - most, change, most, "the target jumps by {:.4g} {unit}, more than the {:.4g} {unit} allowed"),
         (path - far, path, far, "the target moves {:.4g} {unit} in 0.2 s, more than the {:.4g} {unit} allowed"),
     )

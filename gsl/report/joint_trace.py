@@ -57,7 +57,7 @@ def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = N
 def joint_trace_figure(
     traces: Traces, joint: str, *, title: str | None = None, rest: int = 0, width: float = WIDTH
 ) -> Figure:
-    """Return the figure of one joint as people read it; each simulator is labelled with its RMS distance from the real robot.
+    """Return the figure of one joint as people read it; each simulator with its RMS distance from the real robot.
 
     Args:
         traces: What to draw.
@@ -87,7 +87,9 @@ def joint_trace_figure(
         axes.set_ylabel(f"{joint} [{unit}]")
         ends = [(factor * float(angle[-1]), label, colour) for label, angle, colour, _, _ in lines]
         label_ends(axes, float(traces.time[-1]), ends, gap=label_gap(0.13, whole))
-        headline(whole, _finding(joint, [_with_unit(distance, unit) for distance in distances]) if title is None else title)
+        headline(
+            whole, _finding(joint, [_with_unit(distance, unit) for distance in distances]) if title is None else title
+        )
     return whole
 
 

@@ -15,10 +15,10 @@ from gsl.core.body import MESH, Robot, Shape, lump
 from gsl.core.dynamics import forward_kinematics
 from gsl.core.trajectory import Trajectory
 from gsl.errors import InputError
-from gsl.robots.meshes import Part, parts_of
 from gsl.report.film import Shot
-from gsl.report.shown import scale_of
 from gsl.report.film_strip import places, turns, walks
+from gsl.report.shown import scale_of
+from gsl.robots.meshes import Part, parts_of
 
 if TYPE_CHECKING:
     import rerun
@@ -157,5 +157,7 @@ def _log_curves(
         time = rerun.TimeColumn("time", duration=trajectory.time[: len(values)])
         for k, joint in enumerate(joints):
             place, scale = f"joints/{joint}/{name}", scale_of(joint, slides)
-            recording.log(place, rerun.SeriesLines(colors=[shade], widths=[width], names=f"{name} [{scale.unit}]"), static=True)
+            recording.log(
+                place, rerun.SeriesLines(colors=[shade], widths=[width], names=f"{name} [{scale.unit}]"), static=True
+            )
             recording.send_columns(place, [time], rerun.Scalars.columns(scalars=scale.factor * values[:, k]))

@@ -1,7 +1,7 @@
 """Where the meshes are that a URDF names: beside it, or in its package; never further away.
 
     meshes/arm.stl, ../meshes/arm.stl         as seen from the URDF
-    package://arm_description/meshes/arm.stl  in a folder of that name, or with a package.xml that says it, above the URDF
+    package://arm_description/meshes/arm.stl  in a folder above the URDF of that name, or whose package.xml says it
     file:///home/me/arm/meshes/arm.stl        as it is, if it lies where the above may
 
 A URDF may be somebody else's: it names no file beyond those folders, and links that lead out of them are not followed.

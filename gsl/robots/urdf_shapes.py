@@ -67,10 +67,12 @@ class Looks:
             scale = read_numbers(form.get("scale", "1 1 1"), 3, "scale of a <mesh>")
             return self._mesh(form.get("filename", ""), Shape(MESH, scale, colour=colour, **where))
         names = ("radius",) if form.tag == "sphere" else ("radius", "length")
-        return [Shape(form.tag, tuple(read_number(form, name, f"<{form.tag}>") for name in names), colour=colour, **where)]
+        return [
+            Shape(form.tag, tuple(read_number(form, name, f"<{form.tag}>") for name in names), colour=colour, **where)
+        ]
 
     def _mesh(self, name: str, shape: Shape) -> list[Shape]:
-        """Return the shape with its file; none if it is not found, cannot be read, or would neither show nor collide."""
+        """Return the shape with its file, if it is found and can be read, and shows or collides."""
         if shape.collides and not self._hulls:
             return []
         try:

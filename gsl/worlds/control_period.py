@@ -41,9 +41,8 @@ class Drive(NamedTuple):
     @classmethod
     def of(cls, servo: ServoParameters, rotor: Rotors, base_axes: np.ndarray) -> Drive:
         """Put together what `torques` needs."""
-        return cls(
-            servo, base_axes, rotor.parent, rotor.order, rotor.axis, rotor.turns, rotor.carried, rotor.armature, rotor.gain
-        )
+        constants = (rotor.parent, rotor.order, rotor.axis, rotor.turns, rotor.carried, rotor.armature, rotor.gain)
+        return cls(servo, base_axes, *constants)
 
 
 class Memory(NamedTuple):

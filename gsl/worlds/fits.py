@@ -61,7 +61,9 @@ def check_turning(robot: Robot, setting: str = "sim.robot") -> None:
     if robot.slides:
         turning = ",".join(name for name in robot.controlled if name not in robot.slides)
         problem = f"logs are compared in radians, and {', '.join(robot.slides)} slide"
-        advice = f"hold them by a robot file: gsl init ... joints=[{turning}]" if turning else "no joint is left to look at"
+        advice = (
+            f"hold them by a robot file: gsl init ... joints=[{turning}]" if turning else "no joint is left to look at"
+        )
         raise ConfigError(setting, f"{problem}; {advice}")
 
 

@@ -70,7 +70,7 @@ def extent(robot: Robot, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _boxes(robot: Robot, positions: np.ndarray) -> Iterator[tuple[Shape, np.ndarray]]:
-    """Yield every shape with points in base axes [m] whose hull it fills, shape (3, n): of a primitive those of a box."""
+    """Yield every shape with points in base axes whose hull it fills [m], shape (3, n)."""
     frames = forward_kinematics(robot, dict(zip(robot.motors, positions.tolist(), strict=True)))
     for name, link in robot.links.items():
         for shape in link.shapes:

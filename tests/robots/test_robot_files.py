@@ -185,6 +185,8 @@ WHOLE = (
     "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint></robot>"
 )
 
+SLIDE = WHOLE.replace("revolute", "prismatic")
+
 
 def but(old: str, new: str) -> str:
     """The robot of two links with something else in it."""
@@ -224,7 +226,7 @@ def with_more(name: str) -> str:
         (but("0 0 1", "0 1"), "joint 'j': axis must be 3 finite numbers, not '0 1'"),
         (
             but("revolute", "planar"),
-            "joint 'j': type 'planar' is not supported; there are revolute, continuous, fi",
+            "joint 'j': type 'planar' is not supported; there are revolute, continuous, pr",
         ),
         (but("revolute", "fixed"), "joints: the URDF has no joint that turns or slides, so nothing can be controlled"),
         (
@@ -232,7 +234,10 @@ def with_more(name: str) -> str:
             "joints.j: has effort 1e+06, a placeholder; write its motor's peak force [N] in <limit>, or in a robot",
         ),
         (SLIDE.replace("velocity='1'", ""), "joints.j: has no velocity; write its motor's speed without load [m/s] in"),
-        (SLIDE.replace("upper='1'", "upper='100'"), "joints.j: its limits are -1 and 100 m, a placeholder; write lower"),
+        (
+            SLIDE.replace("upper='1'", "upper='100'"),
+            "joints.j: its limits are -1 and 100 m, a placeholder; write lower",
+        ),
         (SLIDE.replace("lower='-1' upper='1'", ""), "joints.j: has no range; write lower and upper [m] in <limit>, or"),
         (but("mass value='1'", "mass value='0'"), "joints.j: it moves the link 'b', which has no mass; give that an"),
         (but("izz='1'", "izz='-1'"), "link 'b': a mass or a principal moment of inertia is negative; no body is like"),
