@@ -190,7 +190,7 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
 def with_mass(link: Link, mass: float, com: np.ndarray, inertia: np.ndarray) -> Link:
     """Return `link` with another rigid body (mass, com, inertia about com; link axes) welded on."""
     total = link.mass + mass
-    joint_com = (link.mass * link.com + mass * com) / total
+    joint_com = (link.mass * link.com + mass * com) / total if total > 0.0 else link.com
     moved = [
         _move_inertia(i, m, c - joint_com) for i, m, c in ((link.inertia, link.mass, link.com), (inertia, mass, com))
     ]

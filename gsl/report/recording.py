@@ -18,7 +18,7 @@ from gsl.errors import InputError
 from gsl.report.film import Shot
 from gsl.report.film_strip import places, turns, walks
 from gsl.report.shown import scale_of
-from gsl.robots.meshes import Part, parts_of
+from gsl.robots.meshes import Part, draw_parts
 
 if TYPE_CHECKING:
     import rerun
@@ -97,7 +97,7 @@ def _solids(rerun: Any, shapes: Sequence[Shape]) -> Iterator[tuple[Callable[[Seq
     for shape in shapes:
         if shape.kind != MESH:
             yield partial(_solid, rerun, shape), shape.colour
-        for mesh in parts_of(shape) if shape.kind == MESH else ():
+        for mesh in draw_parts(shape) if shape.kind == MESH else ():
             yield partial(_mesh, rerun, mesh), mesh.colour or shape.colour
 
 

@@ -232,6 +232,10 @@ def _torque_constants(chosen: Mapping[str, JointSettings], coupled: Mapping[str,
 def _check_masses(robot: Robot) -> None:
     body = lump(robot)
     for joint in body.joints:
+        moments = np.linalg.eigvalsh(body.links[joint.child].inertia)
+        if moments[0] < -1e-9 * moments[-1]:
+            problem = f"it moves the link '{joint.child}', with a principal moment of inertia of {moments[0]:.3g} kg·m²"
+            raise ConfigError(f"joints.{joint.name}", f"{problem}; no body has one below 0: mend its <inertial>")
         if body.links[joint.child].mass <= 0.0:
             problem = f"it moves the link '{joint.child}', which has no mass; give that an <inertial>"
             raise ConfigError(f"joints.{joint.name}", problem)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from gsl.core.body import Shape
+from gsl.core.body import MESH, Robot, Shape
 from gsl.core.budget import MESH_BYTES, TEXT_BYTES, check_file, within
 from gsl.errors import InputError
 from gsl.robots.frames import euler
@@ -40,6 +40,27 @@ def can_read(file: Path) -> bool:
     """Whether the libraries are there that read a mesh."""
     needed = _NEEDED.get(file.suffix.lower(), ("trimesh",))
     return all(importlib.util.find_spec(name) is not None for name in needed)
+
+
+def problems_of(robot: Robot) -> list[str]:
+    """Return what keeps meshes from being drawn, one line a file."""
+    lines: dict[str, None] = {}
+    for link in robot.links.values():
+        for shape in link.looks:
+            try:
+                if shape.kind == MESH:
+                    _read(Path(shape.file))
+            except InputError as error:
+                lines[str(error)] = None
+    return list(lines)
+
+
+def draw_parts(shape: Shape) -> list[Part]:
+    """Return the parts of a mesh as `parts_of` does, none of one that cannot be read: the rest of the robot shows."""
+    try:
+        return parts_of(shape)
+    except InputError:
+        return []
 
 
 def parts_of(shape: Shape) -> list[Part]:

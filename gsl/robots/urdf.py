@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from gsl.core.body import MESH, Joint, Link, Robot, Shape
 from gsl.robots.frames import euler, rpy
-from gsl.robots.meshes import hull_of, parts_of, write_stl
+from gsl.robots.meshes import draw_parts, hull_of, write_stl
 
 _ALONG = {"x": (0.0, np.pi / 2, 0.0), "y": (np.pi / 2, 0.0, 0.0), "z": (0.0, 0.0, 0.0)}
 
@@ -65,7 +65,7 @@ def _add_link(root: xml.Element, link: Link, visuals: bool, meshes: Path | None)
 def _add_mesh(node: xml.Element, role: str, shape: Shape, folder: Path | None) -> None:
     if folder is None:
         return
-    for part in [hull_of(shape)] if role == "collision" or shape.collides else parts_of(shape):
+    for part in [hull_of(shape)] if role == "collision" or shape.collides else draw_parts(shape):
         file = folder / f"mesh_{len(list(folder.iterdir()))}.stl"
         write_stl(file, part)
         element = xml.SubElement(node, role)

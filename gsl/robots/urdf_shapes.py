@@ -64,25 +64,26 @@ class Looks:
         if form.tag == "box":
             return [Shape("box", read_numbers(form.get("size", ""), 3, "size of a <box>"), colour=colour, **where)]
         if form.tag == MESH:
-            scale = read_numbers(form.get("scale", "1 1 1"), 3, "scale of a <mesh>")
-            return self._mesh(form.get("filename", ""), Shape(MESH, scale, colour=colour, **where))
+            return self._mesh(form, Shape(MESH, (1.0, 1.0, 1.0), colour=colour, **where))
         names = ("radius",) if form.tag == "sphere" else ("radius", "length")
         return [
             Shape(form.tag, tuple(read_number(form, name, f"<{form.tag}>") for name in names), colour=colour, **where)
         ]
 
-    def _mesh(self, name: str, shape: Shape) -> list[Shape]:
+    def _mesh(self, form: xml.Element, shape: Shape) -> list[Shape]:
         """Return the shape with its file, if it is found and can be read, and shows or collides."""
         if shape.collides and not self._hulls:
             return []
+        name = form.get("filename", "")
         try:
+            scale = read_numbers(form.get("scale", "1 1 1"), 3, "its scale")
             file = find_mesh(name, self._urdf)
         except ValueError as error:
             why = str(error)
         else:
             if can_read(file):
                 self._colliding += [file] if shape.collides else []
-                return [replace(shape, file=str(file))]
+                return [replace(shape, size=scale, file=str(file))]
             why = "pip install 'gsl[mesh]' brings what reads them"
         names = self._left.setdefault(why, [])
         names += [word] if (word := Path(name).name) not in names else []

@@ -10,7 +10,7 @@ import numpy as np
 from gsl.core.body import MESH, Robot, Shape
 from gsl.core.dynamics import forward_kinematics
 from gsl.robots.frames import euler
-from gsl.robots.meshes import hull_of, parts_of
+from gsl.robots.meshes import draw_parts, hull_of
 from gsl.worlds.physics import Reading
 
 CLEARANCE = 5e-4  # of the lowest sole above the ground [m]
@@ -83,7 +83,7 @@ def _corners(shape: Shape) -> np.ndarray:
         return euler(*shape.turn) @ (_edges(shape)[:, None] * _CORNERS) + np.array(shape.centre)[:, None]
     if shape.collides:
         return hull_of(shape).vertices.T
-    points = np.concatenate([part.vertices for part in parts_of(shape)])
+    points = np.concatenate([np.array([shape.centre]), *(part.vertices for part in draw_parts(shape))])
     low, high = points.min(axis=0), points.max(axis=0)
     return (high - low)[:, None] * _CORNERS + 0.5 * (low + high)[:, None]
 

@@ -240,7 +240,10 @@ def with_more(name: str) -> str:
         ),
         (SLIDE.replace("lower='-1' upper='1'", ""), "joints.j: has no range; write lower and upper [m] in <limit>, or"),
         (but("mass value='1'", "mass value='0'"), "joints.j: it moves the link 'b', which has no mass; give that an"),
-        (but("izz='1'", "izz='-1'"), "link 'b': a mass or a principal moment of inertia is negative; no body is like"),
+        (
+            but("izz='1'", "izz='-1'"),
+            "joints.j: it moves the link 'b', with a principal moment of inertia of -1",
+        ),
         (but("izz='1'", ""), "link 'b': <inertia> lacks izz"),
         (with_more("j"), "two joints are called 'j'"),
         (with_more("k"), "it is no tree: b is the child of two joints"),
