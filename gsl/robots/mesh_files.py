@@ -44,7 +44,7 @@ def find_mesh(name: str, urdf: Path) -> Path:
     inside = [path for root, path in there if path.resolve().is_relative_to(root)]
     if not inside:
         raise ValueError("outside of its folder")
-    return inside[0]
+    return inside[0].resolve()
 
 
 def _beside(name: str, home: Path) -> Iterator[tuple[Path, Path]]:

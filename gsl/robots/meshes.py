@@ -131,8 +131,8 @@ def _load(file: Path, changed: int) -> tuple[Part, ...]:
     except InputError:
         raise
     except Exception as error:  # trimesh raises whatever the damage leads to
-        words = " ".join(f"{error}".split())[:100]
-        raise InputError(f"{file}: is no mesh of its kind, or damaged: {words or type(error).__name__}") from error
+        words = "" if isinstance(error, ImportError) else " ".join(f": {error}".split())[:100]
+        raise InputError(f"{file}: is no mesh of its kind, or damaged{words}") from error
     if not parts:
         raise InputError(f"{file}: holds no mesh")
     return parts

@@ -33,10 +33,11 @@ def _limits(hinges: Iterable[Hinge]) -> Iterator[str]:
 
 def _soft(hinges: Iterable[Hinge]) -> Iterator[str]:
     for hinge in hinges:
-        if any(hinge.soft.values()):
+        narrower = [key for key, end in hinge.soft.items() if end != hinge.limit.get(key)]
+        if any(hinge.soft.values()) and narrower:
             ends = " and ".join(f"{hinge.soft[key]:g}" for key in ("lower", "upper") if key in hinge.soft)
             yield f"commands of joint {hinge.name} keep the soft limits of its <safety_controller>: {ends} {hinge.unit}"
-        elif hinge.soft:
+        elif not any(hinge.soft.values()) and hinge.soft:
             yield f"joint {hinge.name} has soft limits of 0 in its <safety_controller>: taken as not set"
 
 

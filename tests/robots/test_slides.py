@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gsl.core.body import Robot, lump
-from gsl.core.dynamics import forward_kinematics, gravity_torque, mass_matrix
+from gsl.core.dynamics import Frames, forward_kinematics, gravity_torque, mass_matrix
 from gsl.core.plant import Plant, nominal
 from gsl.errors import ConfigError, InputError
 from gsl.policies.excitation import MENU, Excitation
@@ -18,12 +18,14 @@ from gsl.policies.limits import breach, limits
 from gsl.policies.sides import Pair, pairs
 from gsl.report.shown import scale_of
 from gsl.robots.catalogue import robot
+from gsl.robots.frames import euler
 from gsl.robots.urdf import urdf
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.engine import Engine
 from gsl.worlds.fits import check_turning
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.physics import Physics
+from gsl.worlds.servo import STOP_STIFFNESS
 from gsl.worlds.servo_state import COMMANDS
 from gsl.worlds.start import resting
 
@@ -116,9 +118,9 @@ def test_its_rotor_is_inert_and_weighs_nothing(made: Callable[..., Path]) -> Non
     body = lump(robot(str(made(LIFT))))
     heavy = replace(body, joints=tuple(replace(joint, armature=2.0) for joint in body.joints))
     plant = nominal(heavy).with_servo(kp=np.zeros(1), kd=np.zeros(1))
-    fallen = -0.5 * GRAVITY * MASS / (MASS + 2.0) * 0.2**2
     for path in play(plant, np.zeros((10, 1))):
-        assert path[-1, 0] == pytest.approx(fallen, rel=0.03)
+        later = np.diff(path[4:, 0], 2) / PERIOD**2  # Bullet's compensation has found it by then
+        np.testing.assert_allclose(later, -GRAVITY * MASS / (MASS + 2.0), rtol=1e-3)
 
 
 @pytest.mark.parametrize("fields", [{}, {"coulomb": 0.5}, {"delay": 0.013}, {"load_friction": 0.1}])
@@ -135,21 +137,20 @@ def test_the_chain_is_pinned_to_bullet(made: Callable[..., Path], fields: dict[s
 )
 def test_with_rotors_they_agree_far_below_a_millimetre(made: Callable[..., Path], fields: dict[str, float]) -> None:
     body = lump(robot(str(made(GANTRY))))
-    numbers = {
-        name: np.where([name in body.slides for name in body.motors], value, 0.0) for name, value in fields.items()
-    }
-    if "lower_stop" in fields:
-        numbers["lower_stop"] = np.where(numbers["lower_stop"] < 0.0, numbers["lower_stop"], -np.inf)
-    plant = nominal(body).with_servo(**numbers)
+    sliding, plant = np.array([name in body.slides for name in body.motors]), nominal(body)
+    plant = plant.with_servo(
+        **{name: np.where(sliding, value, getattr(plant.servo, name)) for name, value in fields.items()}
+    )
     chain, bullet = play(plant, wander(body))
     np.testing.assert_allclose(chain, bullet, atol=3e-3 if "play" in fields else 5e-4)
 
 
 def test_a_hard_stop_holds_what_presses_on_it(made: Callable[..., Path]) -> None:
     plant = nominal(lump(robot(str(made(LIFT)))))
-    plant = plant.with_servo(lower_stop=np.array([-0.05]))
-    for path in play(plant, np.full((100, 1), -0.2)):  # with all its force
-        assert -0.0505 < path[-1, 0] <= -0.05
+    plant, pressed = plant.with_servo(lower_stop=np.array([-0.05])), 30.0 + MASS * GRAVITY
+    hard = 100.0 * (MASS + 0.02 * 30.0 / 0.8)
+    for path in play(plant, np.r_[[[0.0]], np.full((100, 1), -0.2)]):  # with all its force
+        assert path[-1, 0] == pytest.approx(-0.05 - pressed / (STOP_STIFFNESS * hard), abs=1e-6)
 
 
 def test_its_inertia_and_its_weight_are_those_of_differences(made: Callable[..., Path]) -> None:
@@ -175,10 +176,10 @@ def test_a_follower_goes_the_other_way_from_its_offset(made: Callable[..., Path]
     body = robot(str(made(GANTRY)))
     assert dict(body.coupled) == {"grip": "reach"} and body.slides == ("way", "reach", "grip")
     frames = [forward_kinematics(lump(body), {"reach": place, "grip": place}) for place in (0.0, 0.01)]
-    axis = np.array([-np.sin(1.4), np.cos(1.4), 0.0])  # turned by 0.4 and by 1 about z, under the tilts above
+    axis = euler(0.2, 0.3, 0.0) @ [-np.sin(1.4), np.cos(1.4), 0.0]  # turned by 0.4 and by 1 about z, on the tilted way
 
-    def apart(frame: object) -> np.ndarray:
-        return frame.turn["cart"].T @ (frame.origin["mate"] - frame.origin["bob"])  # type: ignore[attr-defined]
+    def apart(frame: Frames) -> np.ndarray:
+        return frame.origin["mate"] - frame.origin["bob"]
 
     np.testing.assert_allclose(apart(frames[0]), 0.01 * axis, atol=1e-12)
     np.testing.assert_allclose(apart(frames[1]), 0.0, atol=1e-12)
@@ -208,7 +209,7 @@ def test_an_excitation_moves_it_within_its_range(made: Callable[..., Path]) -> N
         assert breach(bounds, path, PERIOD) is None
     reach = bounds.joints.index("reach")
     largest = played.commands("steps_large", "a", PERIOD)[:, reach]
-    assert 0.005 < np.ptp(largest) < 0.04
+    assert 0.003 < np.ptp(largest) < 0.04
     beyond = np.tile(bounds.rest, (3, 1))
     beyond[2, reach] = 0.021
     found = breach(bounds, beyond, PERIOD)
