@@ -28,10 +28,10 @@ def limits_problem(limit: Mapping[str, float], *, slides: bool) -> str:
     """Return what is wrong with the limits of a driven joint and what to do, nothing if all is well."""
     missing = [key for key in MEANING[slides] if not is_limit(key, limit.get(key, 0.0), slides=slides)]
     if missing:
-        has = [f"no {key}" if key not in limit else f"{key} {limit[key]:g}, a placeholder" for key in missing]
+        lacks = [f"no {key}" if key not in limit else f"{key} {limit[key]:g}, a placeholder" for key in missing]
         what, typed = [MEANING[slides][key] for key in missing], " ".join(f"{key}=..." for key in missing)
         advice = f"write its motor's {' and '.join(what)} in <limit>, or in a robot file (gsl init ... {typed})"
-        return f"has {' and '.join(has)}; {advice}"
+        return f"has {' and '.join(lacks)}; {advice}"
     if is_range(limit, slides=slides):
         return ""
     lower, upper, unit = limit.get("lower", 0.0), limit.get("upper", 0.0), "m" if slides else "rad"
