@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gsl.commandline.init import write_configuration
 from gsl.core.body import Robot, lump
 from gsl.core.dynamics import Frames, forward_kinematics, gravity_torque, mass_matrix
 from gsl.core.plant import Plant, nominal
@@ -16,6 +17,7 @@ from gsl.errors import ConfigError, InputError
 from gsl.policies.excitation import MENU, Excitation
 from gsl.policies.limits import breach, limits
 from gsl.policies.sides import Pair, pairs
+from gsl.report.console import Console
 from gsl.report.shown import scale_of
 from gsl.robots.catalogue import robot
 from gsl.robots.frames import euler
@@ -256,3 +258,44 @@ def test_placeholders_of_a_slide(made: Callable[..., Path]) -> None:
     file.write_text(file.read_text().replace('effort="30" velocity="0.8"', 'effort="0" velocity="1000"'))
     with pytest.raises(InputError, match=r"rise: has effort 0, a placeholder and velocity 1000, a placeholder; write"):
         robot(str(file))
+
+
+def test_mixed_limits_are_asked_for_where_they_are_missing(made: Callable[..., Path], tmp_path: Path) -> None:
+    file = made(GANTRY)
+    file.write_text(file.read_text().replace('effort="4" velocity="6"', 'velocity="6"'))
+    with pytest.raises(InputError, match=r"joints.swing: has no effort; write its motor's peak torque \[N·m\] in"):
+        robot(str(file))
+    out = tmp_path / "mine"
+    write_configuration([f"urdf={file}", "name=mine", f"out={out}", "effort=7"], (), Console())
+    body = robot(str(out / "robot.yaml"))
+    assert [body.joint(name).effort for name in ("way", "swing", "reach")] == [40.0, 7.0, 15.0]
+    text = (out / "robot.yaml").read_text()
+    assert "m for rad, N for N·m" in text
+    with pytest.raises(ConfigError, match="velocity: stands in for what a URDF leaves open, and this one says it"):
+        write_configuration([f"urdf={file}", "name=other", f"out={tmp_path}/other", "velocity=7"], (), Console())
+
+
+def test_a_rotor_far_heavier_than_what_it_moves_is_told(made: Callable[..., Path]) -> None:
+    text = LIFT.replace("prismatic", "revolute").replace('"0.8"', '"{speed}"')
+    light = INERTIA.replace("0.00", "0.00000")
+    heavy = robot(str(made(text, inertia=light, speed=1.0)))
+    (remark,) = [remark for remark in heavy.remarks if "rotors" in remark]
+    assert remark.startswith("rotors are far heavier than what they move, and the robot may swing: rise; look at")
+    assert not [remark for remark in robot(str(made(text, speed=8.0))).remarks if "rotors" in remark]
+
+
+def test_impossible_inertia_of_a_welded_link_is_only_remarked(made: Callable[..., Path]) -> None:
+    welded = (
+        '<link name="plate"><inertial><mass value="1e-6"/>'
+        '<inertia ixx="2e-8" iyy="2e-8" izz="-1e-9" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        '<joint name="glue" type="fixed"><parent link="cage"/><child link="plate"/></joint>'
+    )
+    body = robot(str(made(LIFT.replace("</robot>", f"{welded}</robot>"))))
+    assert any(remark.startswith("link plate has the principal moments -1e-09") for remark in body.remarks)
+
+
+def test_massless_links_that_are_welded_have_a_place(made: Callable[..., Path]) -> None:
+    nothing = '<link name="world"/><joint name="down" type="fixed"><parent link="world"/><child link="base"/></joint>'
+    text = LIFT.replace(f'<inertial><mass value="5"/>{"{inertia}"}</inertial>', "", 1)
+    body = lump(robot(str(made(text.replace("</robot>", f"{nothing}</robot>")))))
+    assert np.isfinite(body.links["world"].com).all() and body.links["world"].mass == 0.0
