@@ -59,16 +59,14 @@ class Looks:
         if form is None:
             return []
         (x, y, z), turn = read_origin(node)
-        where = {"centre": (float(x), float(y), float(z)), "turn": rpy(turn), "collides": collides}
-        colour = self._colour_of(node)
+        place = (float(x), float(y), float(z))
+        bare = Shape(form.tag, (1.0, 1.0, 1.0), place, collides, self._colour_of(node), turn=rpy(turn))
         if form.tag == "box":
-            return [Shape("box", read_numbers(form.get("size", ""), 3, "size of a <box>"), colour=colour, **where)]
+            return [replace(bare, size=read_numbers(form.get("size", ""), 3, "size of a <box>"))]
         if form.tag == MESH:
-            return self._mesh(form, Shape(MESH, (1.0, 1.0, 1.0), colour=colour, **where))
+            return self._mesh(form, bare)
         names = ("radius",) if form.tag == "sphere" else ("radius", "length")
-        return [
-            Shape(form.tag, tuple(read_number(form, name, f"<{form.tag}>") for name in names), colour=colour, **where)
-        ]
+        return [replace(bare, size=tuple(read_number(form, name, f"<{form.tag}>") for name in names))]
 
     def _mesh(self, form: xml.Element, shape: Shape) -> list[Shape]:
         """Return the shape with its file, if it is found and can be read, and shows or collides."""

@@ -106,8 +106,8 @@ def read_description(path: Path, *, hulls: bool = False) -> Description:
         links = {link.name: link for link in _each(root, "link", partial(_link, looks))}
         base, hinges = _tree(links, _each(root, "joint", _hinge))
         ordered = {name: links[name] for name in (base, *(hinge.child for hinge in hinges))}
-        told = (*looks.remarks(), *remarks(root, ordered.values(), hinges))
-        return Description(root.get("name") or path.stem, ordered, hinges, told, looks.hull_files())
+        lines = (*looks.remarks(), *remarks(root, ordered.values(), hinges))
+        return Description(root.get("name") or path.stem, ordered, hinges, lines, looks.hull_files())
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
 

@@ -214,8 +214,8 @@ def test_an_excitation_moves_it_within_its_range(made: Callable[..., Path]) -> N
     assert 0.003 < np.ptp(largest) < 0.04
     beyond = np.tile(bounds.rest, (3, 1))
     beyond[2, reach] = 0.021
-    found = breach(bounds, beyond, PERIOD)
-    assert found is not None and found.problem == "the target of 0.021 m is above the limit, 0.02 m"
+    broken = breach(bounds, beyond, PERIOD)
+    assert broken is not None and broken.problem == "the target of 0.021 m is above the limit, 0.02 m"
 
 
 def test_it_starts_near_where_it_should(made: Callable[..., Path]) -> None:
