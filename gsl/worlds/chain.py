@@ -148,8 +148,7 @@ def accelerate(
 def _place(chain: Chain, i: int, angle: float, work: np.ndarray) -> None:
     """Fill in link i's rotation, origin and joint screw, and its own inertia about the base's origin."""
     row, above, axis = work[i], chain.parent[i], chain.axis[i]
-    slides = chain.slides[i]
-    s, c = sine_cosine(0.0 * angle if slides else angle)
+    s, c = sine_cosine(0.0 * angle if chain.slides[i] else angle)
     t, x, y, z = 1.0 - c, axis[0], axis[1], axis[2]
     local = (
         c + t * x * x, t * x * y - s * z, t * x * z + s * y,
@@ -167,12 +166,13 @@ def _place(chain: Chain, i: int, angle: float, work: np.ndarray) -> None:
         row[3 * k] = a * local[0] + b * local[3] + d * local[6]
         row[3 * k + 1] = a * local[1] + b * local[4] + d * local[7]
         row[3 * k + 2] = a * local[2] + b * local[5] + d * local[8]
-    if slides:
+    for k in range(3):
+        first, second = (k + 1) % 3, (k + 2) % 3
+        row[_ARM + k] = row[_PLACE + first] * row[_AXIS + second] - row[_PLACE + second] * row[_AXIS + first]
+    if chain.slides[i]:
         for k in range(3):
             row[_PLACE + k] += angle * row[_AXIS + k]
             row[_ARM + k], row[_AXIS + k] = row[_AXIS + k], 0.0 * angle
-    else:
-        _cross(row, _PLACE, row, _AXIS, row, _ARM)
     _own_inertia(chain, i, row)
 
 
@@ -298,10 +298,3 @@ def _solve(chain: Chain, matrix: np.ndarray, right: np.ndarray) -> None:
         while i >= 0:
             right[k] -= matrix[k, i] * right[i]
             i = chain.parent[i]
-
-
-@compile_kernel
-def _cross(one: np.ndarray, a: int, two: np.ndarray, b: int, result: np.ndarray, to: int) -> None:
-    result[to] = one[a + 1] * two[b + 2] - one[a + 2] * two[b + 1]
-    result[to + 1] = one[a + 2] * two[b] - one[a] * two[b + 2]
-    result[to + 2] = one[a] * two[b + 1] - one[a + 1] * two[b]

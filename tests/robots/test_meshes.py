@@ -12,11 +12,11 @@ import pytest
 import trimesh
 
 from gsl.core.body import MESH, Joint, Link, Robot, Shape
+from gsl.core.budget import MESH_BYTES
 from gsl.errors import InputError
-from gsl.robots import meshes, urdf_shapes
 from gsl.robots.catalogue import read_files, robot
 from gsl.robots.mesh_files import find_mesh
-from gsl.robots.meshes import draw_parts, hull_of, parts_of, problems_of
+from gsl.robots.meshes import can_read, draw_parts, hull_of, parts_of, problems_of
 from gsl.worlds.camera import Camera, View
 from gsl.worlds.start import extent, lowest_point
 
@@ -140,7 +140,7 @@ def test_what_is_left_out_is_told(made: Callable[..., Path], monkeypatch: pytest
         "1 mesh is not drawn (bar.stl): its scale must be 3 finite numbers, not '1 1'"
         in robot(str(made(scale="1 1"))).remarks
     )
-    monkeypatch.setattr(urdf_shapes, "can_read", lambda file: False)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     body = robot(str(made()))
     assert "1 mesh is not drawn (bar.stl): pip install 'gsl[mesh]' brings what reads them" in body.remarks
     assert [shape.kind for shape in body.links["bar"].looks] == ["sphere"]  # what collides, for want of other looks
@@ -148,8 +148,8 @@ def test_what_is_left_out_is_told(made: Callable[..., Path], monkeypatch: pytest
 
 def test_libraries_that_are_missing_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     there = importlib.util.find_spec
-    monkeypatch.setattr(meshes.importlib.util, "find_spec", lambda name: None if name == "collada" else there(name))
-    assert meshes.can_read(Path("a.stl")) and meshes.can_read(Path("a.OBJ")) and not meshes.can_read(Path("a.dae"))
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "collada" else there(name))
+    assert can_read(Path("a.stl")) and can_read(Path("a.OBJ")) and not can_read(Path("a.dae"))
 
 
 @pytest.mark.parametrize(
@@ -176,10 +176,11 @@ def test_a_damaged_mesh_leaves_the_rest_to_be_drawn(
         assert camera.picture(View((0.0, 0.0, 0.0), 3.0), 40, 40).shape == (40, 40, 3)
 
 
-def test_a_mesh_has_a_budget(made: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_has_a_budget(made: Callable[..., Path]) -> None:
     shape = bar(made())
-    monkeypatch.setattr(meshes, "MESH_BYTES", 100)
-    with pytest.raises(InputError, match="bytes; 100 are read at most"):
+    with Path(shape.file).open("r+b") as file:
+        file.truncate(MESH_BYTES + 1)
+    with pytest.raises(InputError, match="100,000,001 bytes; 100,000,000 are read at most"):
         parts_of(shape)
 
 
