@@ -141,7 +141,7 @@ def render(
 
 @app.command()
 def robot(
-    name: Annotated[str, typer.Argument(help="Name of the robot, such as nao, or its URDF.")],
+    name: Annotated[str, typer.Argument(help="Name of the robot, such as nao, its URDF, or robot_descriptions:NAME.")],
     out: Annotated[str, typer.Argument(metavar="[out=DIR]", help="Folder for the files.")] = "out=runs/robot",
     json: Json = False,
 ) -> None:
@@ -151,7 +151,7 @@ def robot(
     write_robot(name, Path(out.removeprefix("out=")), Console(json=json))
 
 
-_INIT = "also out=DIR, joints=A,B (controlled, in order), effort= [N·m] and velocity= [rad/s] over the URDF's"
+_INIT = "also out=DIR, joints=A,B (controlled, in order), effort= [N·m] and velocity= [rad/s] where the URDF says none"
 
 
 @app.command()

@@ -108,7 +108,7 @@ def assemble(reference: str, subject: Subject, words: Sequence[str], console: Co
     kind = manifest.read(folder).kind
     console.status(f"{folder.as_posix()}: {kind}")
     cast = _play_logs(folder, subject, trust) if kind in LOGS else _walk(folder, kind, subject, trust, console)
-    if not any(link.shapes for link in cast.robot.links.values()):
+    if not any(link.looks for link in cast.robot.links.values()):
         raise InputError(f"{cast.robot.name}: none of its links has a shape that could be shown")
     return cast
 

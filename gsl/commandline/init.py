@@ -6,7 +6,7 @@ import os
 import re
 import shlex
 import shutil
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,8 +19,11 @@ from gsl.core.validation import make
 from gsl.errors import ConfigError, InputError
 from gsl.report.console import Console
 from gsl.robots.catalogue import names
+from gsl.robots.descriptions import PREFIX
 from gsl.robots.hinges import JointSettings, drivable, from_description
-from gsl.robots.urdf_xml import Description, read_description
+from gsl.robots.joint_limits import is_limit, is_range
+from gsl.robots.robot_file import urdf_of
+from gsl.robots.urdf_xml import Description, Hinge, read_description
 from gsl.storage.whole import explain_refusal
 
 ROBOT, WORLD = "robot.yaml", "world/{}.yaml"
@@ -44,18 +47,18 @@ _DYNAMICS = {"damping": ("viscous_friction", "coefficient"), "friction": ("coulo
 
 @component
 class Init:
-    """What `gsl init` is told."""
+    """What `gsl init` is told; of joints that slide, in m for rad and N for N·m."""
 
-    urdf: Annotated[str, setting("your robot", min_length=1)]
+    urdf: Annotated[str, setting("your robot: a file, or robot_descriptions:NAME", min_length=1)]
     name: Annotated[str, setting("what its world will be called", min_length=1)]
     out: Annotated[str | None, setting("folder to write; the name by default", min_length=1)] = None
-    joints: Annotated[tuple[str, ...], setting("controlled joints in order; all that turn by default")] = field(
+    joints: Annotated[tuple[str, ...], setting("controlled joints in order; all that move by default")] = field(
         default=()
     )
-    effort: Annotated[float | None, setting("peak torque of all, over the URDF's", unit="N·m", gt=0)] = None
-    velocity: Annotated[float | None, setting("speed without load of all, over the URDF's", unit="rad/s", gt=0)] = None
-    lower: Annotated[float | None, setting("least position of all, over the URDF's", unit="rad")] = None
-    upper: Annotated[float | None, setting("greatest position of all, over the URDF's", unit="rad")] = None
+    effort: Annotated[float | None, setting("peak torque where the URDF says none", unit="N·m", gt=0)] = None
+    velocity: Annotated[float | None, setting("speed without load where it says none", unit="rad/s", gt=0)] = None
+    lower: Annotated[float | None, setting("least position where it says no range", unit="rad")] = None
+    upper: Annotated[float | None, setting("greatest position where it says no range", unit="rad")] = None
     period: Annotated[float, setting("control period of your logs", unit="s", gt=0)] = 0.02
 
 
@@ -71,7 +74,7 @@ def write_configuration(arguments: Sequence[str], worlds: Collection[str], conso
         InputError: A setting is wrong, the URDF cannot be read, or the folder is there already.
     """
     told: Init = make(Init, _settings(arguments))
-    folder, urdf = Path(told.out or told.name), Path(told.urdf)
+    folder, urdf = Path(told.out or told.name), urdf_of(told.urdf)
     if not re.fullmatch(r"[A-Za-z_][\w-]*", told.name):
         raise ConfigError(
             "name", "must be a word of letters, digits, _ and -, not beginning with a digit", given=told.name
@@ -81,12 +84,18 @@ def write_configuration(arguments: Sequence[str], worlds: Collection[str], conso
     if folder.exists():
         raise InputError(f"{folder}: exists; choose another folder with out=")
     description = read_description(urdf)
-    known = JointSettings(effort=told.effort, velocity=told.velocity, lower=told.lower, upper=told.upper)
+    hinges = {hinge.name: hinge for hinge in description.hinges}
+    added = {name: _stand_in(told, hinges.get(name)) for name in told.joints or drivable(description.hinges)}
+    for key in ("effort", "velocity", "lower", "upper"):
+        if getattr(told, key) is not None and all(getattr(settings, key) is None for settings in added.values()):
+            problem = "stands in for what a URDF leaves open, and this one says it of every joint; edit the robot file"
+            raise ConfigError(key, problem)
     try:
-        robot = from_description(description, dict.fromkeys(told.joints or drivable(description.hinges), known), {}, {})
+        robot = from_description(description, added, {}, {})
     except ConfigError as error:
         raise InputError(f"{urdf}: {error}") from error
-    _write(folder, told, urdf, robot, _effects(description, robot))
+    joints = {name: {**_servo(robot, name), **_range(added[name])} for name in robot.controlled}
+    _write(folder, told, urdf, robot, joints, _effects(description, robot))
     _tell(folder, told, robot, console)
 
 
@@ -98,6 +107,21 @@ def _settings(arguments: Sequence[str]) -> dict[str, Any]:
             raise ConfigError(argument, "has no value; write key=value")
         found[key] = value.strip("[]").split(",") if key == "joints" else value
     return found
+
+
+def _stand_in(told: Init, hinge: Hinge | None) -> JointSettings:
+    """Return what was told of a joint and its URDF does not say, or only by a placeholder."""
+    if hinge is None:  # whoever makes a robot of it will say so
+        return JointSettings()
+    limit, slides = hinge.limit, hinge.slides
+    missing = {key for key in ("effort", "velocity") if not is_limit(key, limit.get(key, 0.0), slides=slides)}
+    missing |= set() if is_range(limit, slides=slides) else {"lower", "upper"}
+    return JointSettings(**{key: getattr(told, key) for key in missing})
+
+
+def _range(settings: JointSettings) -> dict[str, float]:
+    ends = {"lower": settings.lower, "upper": settings.upper}
+    return {key: value for key, value in ends.items() if value is not None}
 
 
 def _effects(description: Description, robot: Robot) -> str:
@@ -115,14 +139,18 @@ def _effects(description: Description, robot: Robot) -> str:
     return "\n".join(["   # of <dynamics>", *lines]) if lines else " {}"
 
 
-def _write(folder: Path, told: Init, urdf: Path, robot: Robot, effects: str) -> None:
+def _write(
+    folder: Path, told: Init, urdf: Path, robot: Robot, joints: Mapping[str, Mapping[str, float]], effects: str
+) -> None:
     """Write the folder whole or not at all."""
     place = folder.with_name(f".{folder.name}.tmp-{os.getpid()}")
     world = place / WORLD.format(told.name)
     with explain_refusal(folder):
         try:
             world.parent.mkdir(parents=True)
-            (place / ROBOT).write_text(_robot_text(robot, Path(os.path.relpath(urdf, folder)), told), encoding="utf-8")
+            seen = told.urdf if told.urdf.startswith(PREFIX) else Path(os.path.relpath(urdf, folder)).as_posix()
+            text = _robot_text(robot, urdf.name, seen, joints)
+            (place / ROBOT).write_text(text, encoding="utf-8")
             known = {"name": told.name, "robot": (folder / ROBOT).as_posix(), "period": told.period}
             known["effects"] = effects
             world.write_text(_WORLD_TEXT.format(**known), encoding="utf-8")
@@ -131,16 +159,16 @@ def _write(folder: Path, told: Init, urdf: Path, robot: Robot, effects: str) -> 
             shutil.rmtree(place, ignore_errors=True)
 
 
-def _robot_text(robot: Robot, urdf: Path, told: Init) -> str:
-    ends = {key: value for key, value in (("lower", told.lower), ("upper", told.upper)) if value is not None}
-    joints = "".join(f"  {_plain(name)}: {_flow({**_servo(robot, name), **ends})}\n" for name in robot.controlled)
+def _robot_text(robot: Robot, name: str, urdf: str, values: Mapping[str, Mapping[str, float]]) -> str:
+    joints = "".join(f"  {_plain(name)}: {_flow(values[name])}\n" for name in robot.controlled)
     held = "".join(f"# {remark}\n" for remark in robot.remarks)
     units = "  # kp [N·m/rad], kd [N·m·s/rad], effort [N·m], velocity without load [rad/s], armature [kg·m²]\n"
+    units += "  # of those that slide: m for rad, N for N·m, kg for kg·m²\n" if robot.slides else ""
     return (
-        _ROBOT_HEAD.format(urdf=urdf.name)
+        _ROBOT_HEAD.format(urdf=name)
         + held
-        + f"urdf: {_plain(urdf.as_posix())}   # as seen from this file\njoints:\n{units}{joints}"
-        + "held: {}   # where the other joints stand [rad]: 0 or as near as they go if nothing is said\n"
+        + f"urdf: {_plain(urdf)}   # as seen from this file\njoints:\n{units}{joints}"
+        + "held: {}   # where the other joints stand [rad], [m]: 0 or as near as they go if nothing is said\n"
         + "groups: {}   # names for several joints, scopes of effects: {wrist: [roll, pitch]}\n"
         + "ranges: {}   # where effects may be larger on your robot: {backlash: {width: [0, 0.05]}}\n"
     )

@@ -10,6 +10,7 @@ from gsl.errors import InputError
 from gsl.report.console import Console
 from gsl.report.render import portrait
 from gsl.robots.catalogue import robot
+from gsl.robots.meshes import problems_of
 from gsl.robots.urdf import urdf
 from gsl.storage.whole import claim, explain_refusal
 
@@ -28,9 +29,10 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
     find_own_modules(modules_in({"robot": name}))
     body = robot(name)
     model, picture = folder / f"{body.name}.urdf", folder / f"{body.name}.png"
-    shown = any(link.shapes for link in body.links.values())
+    shown = any(link.looks for link in body.links.values())
     files = [str(model), str(picture)] if shown else [str(model)]
-    remarks = [*body.remarks, *([] if shown else ["no picture: none of its links has a shape that could be shown"])]
+    remarks = [*body.remarks, *(f"not drawn: {problem}" for problem in problems_of(body))]
+    remarks += [] if shown else ["no picture: none of its links has a shape that could be shown"]
     with claim(folder):
         folder.mkdir(parents=True, exist_ok=True)
     with explain_refusal(folder):

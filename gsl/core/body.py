@@ -7,12 +7,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+MESH = "mesh"
+
 
 @dataclass(frozen=True)
 class Shape:
-    """A primitive on a link [m]: a `box` of full edges, a `sphere` (radius,) or a `cylinder` (radius, length).
+    """A shape on a link [m]: a `box` of full edges, a `sphere` (radius,), a `cylinder` (radius, length) or a `mesh`.
 
-    It is turned by `turn`: roll, pitch and yaw about the link's x, y and z, in this order [rad].
+    A mesh is in a file, scaled by `size`; it collides as its convex hull. A shape is turned by `turn`: roll, pitch and
+    yaw about the link's x, y and z, in this order [rad].
     """
 
     kind: str
@@ -22,6 +25,8 @@ class Shape:
     colour: tuple[float, float, float] = (0.9, 0.9, 0.92)
     along: str = "z"  # a cylinder's axis
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    file: str = ""
+    shown: bool = True
 
 
 @dataclass(frozen=True)
@@ -41,10 +46,21 @@ class Link:
     inertia: np.ndarray
     shapes: tuple[Shape, ...] = ()
 
+    @property
+    def looks(self) -> tuple[Shape, ...]:
+        """The shapes that show."""
+        return tuple(shape for shape in self.shapes if shape.shown)
+
+
+LONGEST = 0.25  # way of a slide that counts as much as a radian of a hinge, at most [m]: about the arm of a robot
+_USUAL = 2.0  # range of a hinge [rad]: the whole way of a short slide counts as much
+
 
 @dataclass(frozen=True)
 class Joint:
-    """A hinge between two links; with `fixed_at` [rad] it is rigid at that angle.
+    """A hinge between two links, or a slide; with `fixed_at` [rad] it is rigid at that angle.
+
+    All units of a slide are those of a hinge with m for rad and N for N·m: [m], [m/s], [N], [N/m], [kg].
 
     Attributes:
         origin: Of the child's frame in the parent's axes [m], shape (3,).
@@ -53,6 +69,7 @@ class Joint:
         max_velocity: [rad/s].
         effort: Peak torque [N·m].
         armature: Inertia of the rotor seen at the output [kg·m²].
+        slides: Whether it slides along its axis in place of turning about it.
     """
 
     name: str
@@ -66,6 +83,15 @@ class Joint:
     effort: float
     armature: float = 0.0
     fixed_at: float | None = None
+    slides: bool = False
+
+    @property
+    def size(self) -> float:
+        """What counts as much as a radian of a hinge: 1 [rad], or a length [m] of a slide that fits its range.
+
+        Margins, amplitudes and noise that are said in radians are by so much smaller for a slide.
+        """
+        return min(LONGEST, (self.upper - self.lower) / _USUAL) if self.slides else 1.0
 
 
 @dataclass(frozen=True)
@@ -137,6 +163,16 @@ class Robot:
         """Return the joint called `name`."""
         return next(joint for joint in self.joints if joint.name == name)
 
+    @property
+    def slides(self) -> tuple[str, ...]:
+        """The motors that slide."""
+        return tuple(name for name in self.motors if self.joint(name).slides)
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """What counts as much as a radian of each motor, see `Joint.size`, shape (n_motors,)."""
+        return np.array([self.joint(name).size for name in self.motors])
+
     def bound_commands(self, name: str) -> tuple[float, float]:
         """Return the range that commands of a motor keep [rad]."""
         joint = self.joint(name)
@@ -154,7 +190,7 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
 def with_mass(link: Link, mass: float, com: np.ndarray, inertia: np.ndarray) -> Link:
     """Return `link` with another rigid body (mass, com, inertia about com; link axes) welded on."""
     total = link.mass + mass
-    joint_com = (link.mass * link.com + mass * com) / total
+    joint_com = (link.mass * link.com + mass * com) / total if total > 0.0 else link.com
     moved = [
         _move_inertia(i, m, c - joint_com) for i, m, c in ((link.inertia, link.mass, link.com), (inertia, mass, com))
     ]

@@ -43,6 +43,8 @@ HEADER_BYTES = 10_000
 URDF_BYTES = 20_000_000
 JOINTS = 500
 """Of a URDF; a humanoid with both hands has about 80."""
+MESH_BYTES = 100_000_000
+"""Of a mesh: two million triangles."""
 SECONDS = 10.0
 """Of CPU for a file or a configuration that should take less than one."""
 GROWTH = 1_500_000_000

@@ -25,12 +25,17 @@ class Frames(NamedTuple):
 
 
 def forward_kinematics(robot: Robot, angles: Mapping[str, float]) -> Frames:
-    """Return the frames of a robot without fixed joints, at joint angles [rad] by name; what is not named is at 0."""
+    """Return the frames of a robot without fixed joints, at positions [rad], [m] by name; what is not named is at 0."""
     turn, origin, axis = {robot.base: np.eye(3)}, {robot.base: np.zeros(3)}, {}
     for joint in robot.joints:
         axis[joint.name] = turn[joint.parent] @ joint.axis
         origin[joint.child] = origin[joint.parent] + turn[joint.parent] @ joint.origin
-        turn[joint.child] = turn[joint.parent] @ rotation(joint.axis, angles.get(joint.name, 0.0))
+        place = angles.get(joint.name, 0.0)
+        if joint.slides:
+            turn[joint.child] = turn[joint.parent]
+            origin[joint.child] = origin[joint.child] + place * axis[joint.name]
+        else:
+            turn[joint.child] = turn[joint.parent] @ rotation(joint.axis, place)
     return Frames(turn, origin, axis)
 
 
@@ -70,8 +75,11 @@ def jacobian(robot: Robot, frames: Frames, link: str, point: np.ndarray) -> tupl
     linear[:, :3] = -_cross(place)
     for joint in _ancestors(robot, link):
         column = 6 + robot.motors.index(joint.name)
-        angular[:, column] = frames.axis[joint.name]
-        linear[:, column] = np.cross(frames.axis[joint.name], place - frames.origin[joint.child])
+        if joint.slides:
+            linear[:, column] = frames.axis[joint.name]
+        else:
+            angular[:, column] = frames.axis[joint.name]
+            linear[:, column] = np.cross(frames.axis[joint.name], place - frames.origin[joint.child])
     return angular, linear
 
 

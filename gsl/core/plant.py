@@ -13,6 +13,7 @@ from gsl.core.servo_law import ServoLaw
 
 GRAVITY = 9.81  # [m/s²]
 Hook = Callable[[np.ndarray, float], np.ndarray]
+_HARD = 100.0  # hardness of what is hard per mass that a slide moves [1/kg]: a hinge of 0.01 kg·m² has 1
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,20 @@ class Plant:
     def with_servo(self, **numbers: np.ndarray) -> Plant:
         """Return the plant with other numbers of the servos."""
         return replace(self, servo=self.servo._replace(**numbers))
+
+
+def hardness(robot: Robot) -> np.ndarray:
+    """Return how hard stops and teeth are against those of a hinge, shape (n_motors,): 1 of all that turn.
+
+    Those of a slide are as hard against the mass that it moves as those of a hinge against its inertia, so that they
+    are as stable at one physics step.
+    """
+    moved = {joint.child: robot.links[joint.child].mass for joint in robot.joints}
+    for joint in reversed(robot.joints):
+        if joint.parent in moved:
+            moved[joint.parent] += moved[joint.child]
+    joints = [robot.joint(name) for name in robot.motors]
+    return np.array([_HARD * (moved[joint.child] + joint.armature) if joint.slides else 1.0 for joint in joints])
 
 
 def nominal(robot: Robot) -> Plant:

@@ -6,7 +6,7 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from gsl.core.body import Joint, Link, Robot, Shape, lump
+from gsl.core.body import MESH, Joint, Link, Robot, Shape, lump
 from gsl.export.parts import UNLIMITED, Export, Simulator, text, unheld
 from gsl.robots.frames import euler
 
@@ -57,7 +57,8 @@ def _add_body(above: xml.Element, robot: Robot, link: Link, joint: Joint | None,
         full = text(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
         xml.SubElement(node, "inertial", pos=text(*link.com), mass=text(link.mass), fullinertia=full)
     for shape in link.shapes:
-        _add_geom(node, shape)
+        if shape.kind != MESH:
+            _add_geom(node, shape)
     for below in robot.joints:
         if below.parent == link.name:
             _add_body(node, robot, robot.links[below.child], below, simulator)
@@ -68,7 +69,8 @@ def _add_joint(node: xml.Element, joint: Joint, simulator: Simulator) -> None:
     k = motors.index(joint.name)
     low, high = max(joint.lower, servo.lower_stop[k]), min(joint.upper, servo.upper_stop[k])
     xml.SubElement(
-        node, "joint", name=joint.name, type="hinge", axis=text(*joint.axis), range=text(low, high),
+        node, "joint", name=joint.name, type="slide" if joint.slides else "hinge",
+        axis=text(*joint.axis), range=text(low, high),
         armature=text(servo.armature[k]), damping=text(servo.viscous[k]), frictionloss=text(servo.coulomb[k]),
     )  # fmt: skip
 

@@ -15,9 +15,9 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.policies.sides import inwards
 
-MARGIN = 0.05  # that a motion of ours keeps from the end of a joint's range [rad]
+MARGIN = 0.05  # that a motion of ours keeps from the end of a joint's range [rad], or `Joint.size`s of a slide
 TO_THE_CENTRE = 0.35  # of the way from the usual posture to the centre of the range: where a joint rests in the air
-REACH = 1.2  # that a motion of ours keeps within of the rest, however wide the range [rad]
+REACH = 1.2  # that a motion of ours keeps within of the rest, however wide the range [rad], or `Joint.size`s
 BOTH_SIDES = 0.3  # of the reach is left to a joint that turns limbs on both sides, one way towards each other
 SPEED_SHARE = 0.5  # of max_velocity
 WINDOW = 0.2  # over which the speed of a target is judged [s]
@@ -36,7 +36,7 @@ class Breach(NamedTuple):
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds of the targets of the controlled joints; every field but the first has shape (n_joints,).
+    """Bounds of the targets of the controlled joints, m for rad of slides; an array has shape (n_joints,).
 
     Attributes:
         joints: Their names.
@@ -46,6 +46,7 @@ class Limits:
         speed: Most of the mean speed over `WINDOW` [rad/s].
         jump: Most of the change in one control step, where the speed allows no more [rad].
         small: Size of a jump that leaves the servo well inside its torque limit [rad].
+        slides: Names of those that slide.
     """
 
     joints: tuple[str, ...]
@@ -57,6 +58,11 @@ class Limits:
     speed: np.ndarray
     jump: np.ndarray
     small: np.ndarray
+    slides: tuple[str, ...] = ()
+
+    def unit(self, joint: str) -> str:
+        """Return the unit of a joint's position."""
+        return "m" if joint in self.slides else "rad"
 
 
 def limits(robot: Robot) -> Limits:
@@ -81,6 +87,7 @@ def limits(robot: Robot) -> Limits:
         speed=speed,
         jump=jump,
         small=np.minimum(SMALL * full, 0.3 * jump),
+        slides=robot.slides,
     )
 
 
@@ -88,8 +95,9 @@ def _rooms(
     robot: Robot, lower: np.ndarray, upper: np.ndarray, usual: np.ndarray, rest: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return how far a motion may go below and above the rest; no limb gets further inwards than in usual posture."""
-    most = REACH * np.where(np.bincount(robot.drive) > 1, BOTH_SIDES, 1.0)
-    down, up = (np.clip(np.minimum(most, room - MARGIN), 0.0, None) for room in (rest - lower, upper - rest))
+    size = narrowest(robot, [robot.joint(name).size for name in robot.motors])
+    most = REACH * size * np.where(np.bincount(robot.drive) > 1, BOTH_SIDES, 1.0)
+    down, up = (np.clip(np.minimum(most, room - MARGIN * size), 0.0, None) for room in (rest - lower, upper - rest))
     inside = inwards(robot, dict(zip(robot.controlled, rest.tolist(), strict=True)))
     inner = np.maximum(0.0, -inside * (rest - usual))
     return np.where(inside < 0.0, np.minimum(down, inner), down), np.where(inside > 0.0, np.minimum(up, inner), up)
@@ -111,10 +119,20 @@ def breach(bounds: Limits, targets: np.ndarray, period: float) -> Breach | None:
     path[steps:] -= path[:-steps].copy()
     most, far = np.maximum(bounds.jump, bounds.speed * period), bounds.speed * steps * period
     rules = (
-        (bounds.lower - targets, targets, bounds.lower, "the target of {:.4g} rad is below the limit of {:.4g} rad"),
-        (targets - bounds.upper, targets, bounds.upper, "the target of {:.4g} rad is above the limit of {:.4g} rad"),
-        (change - most, change, most, "the target jumps by {:.4g} rad, more than the {:.4g} rad allowed"),
-        (path - far, path, far, "the target moves {:.4g} rad in 0.2 s, more than the {:.4g} rad allowed"),
+        (
+            bounds.lower - targets,
+            targets,
+            bounds.lower,
+            "the target of {:.4g} {unit} is below the limit, {:.4g} {unit}",
+        ),
+        (
+            targets - bounds.upper,
+            targets,
+            bounds.upper,
+            "the target of {:.4g} {unit} is above the limit, {:.4g} {unit}",
+        ),
+        (change - most, change, most, "the target jumps by {:.4g} {unit}, more than the {:.4g} {unit} allowed"),
+        (path - far, path, far, "the target moves {:.4g} {unit} in 0.2 s, more than the {:.4g} {unit} allowed"),
     )
     breaches = (_first(bounds, excess > _ROUNDING, text, values, bound) for excess, values, bound, text in rules)
     return next((breach for breach in breaches if breach is not None), None)
@@ -125,10 +143,11 @@ def _first(bounds: Limits, wrong: np.ndarray, text: str, *quantities: np.ndarray
     if not wrong.any():
         return None
     step, joint = (int(index) for index in np.argwhere(wrong)[0])
+    numbers = (np.broadcast_to(quantity, wrong.shape)[step, joint] for quantity in quantities)
     return Breach(
         step,
         bounds.joints[joint],
-        text.format(*(np.broadcast_to(quantity, wrong.shape)[step, joint] for quantity in quantities)),
+        text.format(*numbers, unit=bounds.unit(bounds.joints[joint])),
     )
 
 

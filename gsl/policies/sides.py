@@ -25,12 +25,14 @@ class Pair(NamedTuple):
 
 
 def pairs(robot: Robot) -> tuple[Pair, ...]:
-    """Return the controlled joints that are mirror images of each other; an axis is a pseudo-vector."""
+    """Return the controlled joints that are mirror images of each other; the axis of a hinge is a pseudo-vector."""
     frames = forward_kinematics(lump(robot), {})
     joints = [robot.joint(name) for name in robot.controlled]
     places = np.array([frames.origin[joint.child] for joint in joints])
     axes = np.array([frames.axis[joint.name] for joint in joints])
-    along = axes @ (-_MIRROR * axes).T
+    slides = np.array([joint.slides for joint in joints])
+    mirrored = np.where(slides[:, None], _MIRROR, -_MIRROR) * axes
+    along = np.where(slides[:, None] == slides, axes @ mirrored.T, 0.0)
     apart = np.linalg.norm(places[:, None] - _MIRROR * places, axis=2)
     fits = (apart < SAME_PLACE) & (np.abs(along) > 1.0 - SAME_PLACE) & (places[:, 1:2] > SAME_PLACE)
     return tuple(Pair(int(i), int(j), float(np.sign(along[i, j]))) for i, j in np.argwhere(fits))

@@ -86,7 +86,7 @@ def film(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], path: Path,
         if path.suffix == ".png":
             _save_sheet(strips, moments, path)
             return
-        background, place = draw_traces(joints, shots, scene.width * (len(shots) if scene.beside else 1))
+        background, place = draw_traces(joints, shots, scene.width * (len(shots) if scene.beside else 1), robot.slides)
         pictures = (
             compose([strip.picture(moment) for strip in strips], scene, see(background, place(moment)))
             for moment in moments

@@ -52,15 +52,17 @@ class Scene:
         low, high = extent(lump(robot), np.array([robot.stance.get(name, 0.0) for name in robot.motors]))
         size = high - low
         way = np.concatenate([places(trajectory) for trajectory in trajectories])
-        first, last = way[:, 0].min() - 0.75 * size[2], way[:, 0].max() + 0.75 * size[2]
-        floor = 0.0 if any(walks(trajectory) for trajectory in trajectories) else HELD_AT + low[2]
-        tall = ROOM * size[2]
+        walking = any(walks(trajectory) for trajectory in trajectories)
+        span = size[2] if walking else max(size[2], size[0])  # in the air limbs may turn from lying to standing
+        first, last = way[:, 0].min() - 0.75 * span, way[:, 0].max() + 0.75 * span
+        floor = 0.0 if walking else HELD_AT + low[2]
+        tall = ROOM * span
         ratio = float(np.clip((last - first) / tall, 0.8, WIDEST))
         beside = ratio < FLATTEST
         wide = _even(width / 2.0) if beside else width
         distance = min(max(tall, (last - first) / ratio) / 2.0 / math.tan(math.radians(OPENING / 2.0)), FARTHEST)
         side = float(way[:, 1].mean())
-        middle = (0.5 * float(first + last), side, float(floor) + 0.31 * tall)
+        middle = (0.5 * float(first + last), side, float(floor) + 0.31 * ROOM * float(size[2]))
         start = float(places(trajectories[0])[0, 0])
         view = View(middle, distance, yaw=90.0, pitch=-8.0, opening=OPENING)
         along = _ruler(float(first), float(last), start)

@@ -1,45 +1,51 @@
-"""The strip below a film: the command and the angle of the joint that moves most, over the time of the film."""
+"""The strip below a film: the command and the position of the joint that moves most, over the time of the film."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
 
+from gsl.report.shown import scale_of
 from gsl.report.style import COMMAND, look
 
 HEIGHT, DPI = 130, 100  # [pixels], [1/in]
 LEFT, RIGHT, NARROW = 64, 200, 600  # margins; a film without room for a legend [pixels]
 
 
-def draw_traces(joints: Sequence[str], shots: Sequence[Any], width: int) -> tuple[np.ndarray, Callable[[float], float]]:
+def draw_traces(
+    joints: Sequence[str], shots: Sequence[Any], width: int, slides: Collection[str] = ()
+) -> tuple[np.ndarray, Callable[[float], float]]:
     """Return a picture of the traces, shape (HEIGHT, width, 3) of uint8, and the column [pixels] of a time [s].
 
     Args:
         joints: Names of the columns of positions.
         shots: What is shown in the film; the command is of the first.
         width: [pixels].
+        slides: Names of the joints that slide.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     first = shots[0].trajectory
-    joint = int(np.argmax(np.ptp(first.position, axis=0)))
+    scales = [scale_of(name, slides) for name in joints]
+    ways = np.ptp(first.position, axis=0) * [scale.factor for scale in scales]
+    joint = int(np.argmax(ways))
+    factor, unit = scales[joint]
     with look():
         figure = Figure(figsize=(width / DPI, HEIGHT / DPI), dpi=DPI)
         canvas = FigureCanvasAgg(figure)
         labelled = width > NARROW
         right = width - (RIGHT if labelled else LEFT / 2)
         axes = figure.add_axes((LEFT / width, 0.28, (right - LEFT) / width, 0.64))
-        axes.plot(
-            first.time[:-1], np.degrees(first.action[:, joint]), "--", color=COMMAND, linewidth=1.0, label="command"
-        )
+        asked = factor * first.action[:, joint]
+        axes.plot(first.time[:-1], asked, "--", color=COMMAND, linewidth=1.0, label="command")
         for shot in shots:
-            angle = np.degrees(shot.trajectory.position[:, joint])
-            axes.plot(shot.trajectory.time, angle, color=shot.colour, linewidth=1.4, label=shot.where or shot.who)
+            way = factor * shot.trajectory.position[:, joint]
+            axes.plot(shot.trajectory.time, way, color=shot.colour, linewidth=1.4, label=shot.where or shot.who)
         axes.set_xlim(0.0, max(float(shot.trajectory.time[-1]) for shot in shots))
-        axes.set_ylabel(f"{joints[joint]} [°]", fontsize=8)
+        axes.set_ylabel(f"{joints[joint]} [{unit}]", fontsize=8)
         axes.tick_params(labelsize=8)
         figure.text(right / width, 0.03, "time [s]", fontsize=8, ha="right")
         if labelled:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from gsl.report.shown import DEGREES, Scale
 from gsl.report.style import (
     COMMAND,
     GROUNDED,
@@ -36,6 +36,7 @@ class Traces(NamedTuple):
         grounded: Position in the grounded simulator [rad], if there is one.
         sent: What the grounding sends in place of the command [rad], if that is to be seen.
         name: Of `grounded`, for people.
+        scale: How positions are shown.
     """
 
     time: np.ndarray
@@ -45,6 +46,7 @@ class Traces(NamedTuple):
     grounded: np.ndarray | None = None
     sent: np.ndarray | None = None
     name: str = "grounded simulation"
+    scale: Scale = DEGREES
 
 
 def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = None, rest: int = 0) -> Figure:
@@ -55,7 +57,7 @@ def joint_trace(path: Path, traces: Traces, joint: str, *, title: str | None = N
 def joint_trace_figure(
     traces: Traces, joint: str, *, title: str | None = None, rest: int = 0, width: float = WIDTH
 ) -> Figure:
-    """Return the figure of one joint in degrees; each simulator is labelled with its RMS distance from the real robot.
+    """Return the figure of one joint as people read it; each simulator with its RMS distance from the real robot.
 
     Args:
         traces: What to draw.
@@ -64,12 +66,13 @@ def joint_trace_figure(
         width: Of the figure [in].
         rest: Ticks in the beginning in which nothing moves, and which no distance is of.
     """
-    distances = [_rms_degrees((traces.simulation - traces.real)[rest:])]
+    factor, unit = traces.scale
+    distances = [_measure(traces.scale, (traces.simulation - traces.real)[rest:])]
     lines = [("command", traces.command, COMMAND, 1.3, (0, (5, 3))), ("real", traces.real, REAL, 3.2, "-")]
-    lines.append((f"simulation,\n{distances[0]:.1f}° from real", traces.simulation, SIMULATION, 1.8, "-"))
+    lines.append((f"simulation,\n{_with_unit(distances[0], unit)} from real", traces.simulation, SIMULATION, 1.8, "-"))
     if traces.grounded is not None:
-        distances.append(_rms_degrees((traces.grounded - traces.real)[rest:]))
-        label = f"{traces.name},\n{distances[1]:.1f}° from real"
+        distances.append(_measure(traces.scale, (traces.grounded - traces.real)[rest:]))
+        label = f"{traces.name},\n{_with_unit(distances[1], unit)} from real"
         lines.append((label, traces.grounded, GROUNDED, 1.8, "-"))
     if traces.sent is not None:
         lines.append(("grounded command", traces.sent, GROUNDED, 1.1, (0, (5, 3))))
@@ -77,23 +80,29 @@ def joint_trace_figure(
         whole = curve_figure(width)
         axes = whole.subplots()
         for label, angle, colour, width, style in lines:
-            axes.plot(traces.time, np.degrees(angle), linestyle=style, color=colour, linewidth=width, label=label)
+            axes.plot(traces.time, factor * angle, linestyle=style, color=colour, linewidth=width, label=label)
         axes.set_xlim(traces.time[0], traces.time[-1])
         axes.margins(y=0.08)
         axes.set_xlabel("time [s]")
-        axes.set_ylabel(f"{joint} [°]")
-        ends = [(math.degrees(angle[-1]), label, colour) for label, angle, colour, _, _ in lines]
+        axes.set_ylabel(f"{joint} [{unit}]")
+        ends = [(factor * float(angle[-1]), label, colour) for label, angle, colour, _, _ in lines]
         label_ends(axes, float(traces.time[-1]), ends, gap=label_gap(0.13, whole))
-        headline(whole, _finding(joint, distances) if title is None else title)
+        headline(
+            whole, _finding(joint, [_with_unit(distance, unit) for distance in distances]) if title is None else title
+        )
     return whole
 
 
-def _rms_degrees(difference: np.ndarray) -> float:
-    return math.degrees(float(np.sqrt(np.mean(difference**2))))
+def _measure(scale: Scale, difference: np.ndarray) -> float:
+    return scale.factor * float(np.sqrt(np.mean(difference**2)))
 
 
-def _finding(joint: str, distances: list[float]) -> str:
+def _with_unit(distance: float, unit: str) -> str:
+    return f"{distance:.1f}{unit}" if unit == DEGREES.unit else f"{distance:.1f} {unit}"
+
+
+def _finding(joint: str, distances: list[str]) -> str:
     if len(distances) == 1:
-        return f"{joint}: the simulator is {distances[0]:.1f}° from the real robot (RMS)"
+        return f"{joint}: the simulator is {distances[0]} from the real robot (RMS)"
     before, after = distances
-    return f"{joint}: with grounding {after:.1f}° from the real robot, without {before:.1f}° (RMS)"
+    return f"{joint}: with grounding {after} from the real robot, without {before} (RMS)"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,12 +11,14 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from scipy.spatial.transform import Rotation
 
-from gsl.core.body import Robot, Shape, lump
+from gsl.core.body import MESH, Robot, Shape, lump
 from gsl.core.dynamics import forward_kinematics
 from gsl.core.trajectory import Trajectory
 from gsl.errors import InputError
 from gsl.report.film import Shot
 from gsl.report.film_strip import places, turns, walks
+from gsl.report.shown import scale_of
+from gsl.robots.meshes import Part, draw_parts
 
 if TYPE_CHECKING:
     import rerun
@@ -59,7 +62,7 @@ def record_shots(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], pat
     for part, shot in zip(PARTS, shots, strict=False):
         _log_body(recording, robot, part, shot)
         _log_motion(recording, robot, joints, part, shot.trajectory)
-        _log_curves(recording, joints, part, shot)
+        _log_curves(recording, joints, part, shot, robot.slides)
     recording.flush()
     recording.disconnect()
 
@@ -83,10 +86,24 @@ def _log_body(recording: rerun.RecordingStream, robot: Robot, part: str, shot: S
 
     ghost = part == PARTS[1]
     for name, link in lump(robot).links.items():
-        for number, shape in enumerate(link.shapes):
-            colour = [*(to_rgb(shot.colour) if ghost else shape.colour), CLEAR if ghost else 1.0]
-            recording.log(f"world/{part}/{name}/shape_{number}", _solid(rerun, shape, colour), static=True)
+        for number, (solid, shape_colour) in enumerate(_solids(rerun, link.looks)):
+            colour = [*(to_rgb(shot.colour) if ghost else shape_colour), CLEAR if ghost else 1.0]
+            recording.log(f"world/{part}/{name}/shape_{number}", solid(colour), static=True)
     recording.log(f"world/{part}", rerun.AnyValues(title=shot.title), static=True)
+
+
+def _solids(rerun: Any, shapes: Sequence[Shape]) -> Iterator[tuple[Callable[[Sequence[float]], Any], Sequence[float]]]:
+    """Yield what makes a solid of a colour, and the colour that it has of its own; of a mesh for each of its parts."""
+    for shape in shapes:
+        if shape.kind != MESH:
+            yield partial(_solid, rerun, shape), shape.colour
+        for mesh in draw_parts(shape) if shape.kind == MESH else ():
+            yield partial(_mesh, rerun, mesh), mesh.colour or shape.colour
+
+
+def _mesh(rerun: Any, part: Part, colour: Sequence[float]) -> Any:
+    shade = [round(255 * value) for value in colour]
+    return rerun.Mesh3D(vertex_positions=part.vertices, triangle_indices=part.faces, albedo_factor=shade)
 
 
 def _solid(rerun: Any, shape: Shape, colour: Sequence[float]) -> Any:
@@ -126,7 +143,9 @@ def _log_motion(
         recording.send_columns(f"world/{part}/{name}", [time], frames)
 
 
-def _log_curves(recording: rerun.RecordingStream, joints: Sequence[str], part: str, shot: Shot) -> None:
+def _log_curves(
+    recording: rerun.RecordingStream, joints: Sequence[str], part: str, shot: Shot, slides: Sequence[str]
+) -> None:
     import rerun
 
     colour = [round(255 * value) for value in to_rgb(shot.colour)]
@@ -137,6 +156,8 @@ def _log_curves(recording: rerun.RecordingStream, joints: Sequence[str], part: s
     for name, (values, shade, width) in curves.items():
         time = rerun.TimeColumn("time", duration=trajectory.time[: len(values)])
         for k, joint in enumerate(joints):
-            place = f"joints/{joint}/{name}"
-            recording.log(place, rerun.SeriesLines(colors=[shade], widths=[width], names=name), static=True)
-            recording.send_columns(place, [time], rerun.Scalars.columns(scalars=np.degrees(values[:, k])))
+            place, scale = f"joints/{joint}/{name}", scale_of(joint, slides)
+            recording.log(
+                place, rerun.SeriesLines(colors=[shade], widths=[width], names=f"{name} [{scale.unit}]"), static=True
+            )
+            recording.send_columns(place, [time], rerun.Scalars.columns(scalars=scale.factor * values[:, k]))

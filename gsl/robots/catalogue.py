@@ -9,11 +9,25 @@ from pathlib import Path
 from gsl.core.body import Robot
 from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError, InputError
-from gsl.robots.robot_file import SUFFIXES, files_of, from_file
+from gsl.robots.descriptions import PREFIX
+from gsl.robots.mesh_files import SUFFIXES as MESHES
+from gsl.robots.robot_file import SUFFIXES, files_of, from_file, urdf_of
 
 _NOT_ROBOTS = (
-    *("catalogue", "defaults", "frames", "hinges", "joint_limits", "mimic", "nao_legs", "nao_shapes", "robot_file"),
-    *("so101_published", "so101_shapes", "urdf", "urdf_remarks", "urdf_xml", "xl330_published"),
+    *(
+        "catalogue",
+        "defaults",
+        "descriptions",
+        "frames",
+        "hinges",
+        "joint_limits",
+        "mesh_files",
+        "meshes",
+        "mimic",
+        "nao_legs",
+    ),
+    *("nao_shapes", "robot_file", "so101_published", "so101_shapes", "urdf", "urdf_numbers", "urdf_remarks"),
+    *("urdf_shapes", "urdf_xml", "xl330_published"),
 )
 
 
@@ -26,7 +40,7 @@ def names() -> tuple[str, ...]:
 
 def is_file(name: str) -> bool:
     """Whether a name is that of a file."""
-    return name.lower().endswith(SUFFIXES)
+    return name.lower().endswith(SUFFIXES) or name.startswith(PREFIX)
 
 
 def files(name: str) -> tuple[Path, ...]:
@@ -38,7 +52,7 @@ def read_files(name: str) -> dict[str, Path]:
     """Return what a robot is read from, by the setting that names it: its files are part of what a world is."""
     first, *others = files(name) or (None,)
     named = {} if first is None else {"robot": first}
-    return named | {f"robot.{path.suffix[1:]}": path for path in others}
+    return named | {f"robot.{path.name if path.suffix.lower() in MESHES else path.suffix[1:]}": path for path in others}
 
 
 def robot(name: str) -> Robot:
@@ -52,7 +66,7 @@ def robot(name: str) -> Robot:
         return from_file(_there(name))
     place, _, function = name.rpartition(".") if "." in name else (f"gsl.robots.{name}", "", name)
     if not (name in names() or "." in name):
-        hint = f"{did_you_mean(name, names(), listed=True)}, or a file such as arm.urdf"
+        hint = f"{did_you_mean(name, names(), listed=True)}, a file such as arm.urdf, or robot_descriptions:NAME"
         raise ConfigError("robot", f"no robot called '{name}'{hint}")
     try:
         built: Robot = getattr(importlib.import_module(place), function)()
@@ -62,7 +76,7 @@ def robot(name: str) -> Robot:
 
 
 def _there(name: str) -> Path:
-    path = Path(name)
+    path = urdf_of(name)
     if not path.exists():
         where = (
             ""

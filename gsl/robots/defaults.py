@@ -1,7 +1,7 @@
 """What a description of a body does not say of its servos, derived from what it says: start values for a diagnosis.
 
     armature = TIME_CONSTANT effort / velocity      the time in which full torque brings a free rotor up to speed
-    kp       = effort / FULL_AT                     full torque at an error of FULL_AT
+    kp       = effort / FULL_AT                     full torque at an error of FULL_AT; of a slide see `Joint.size`
     kd       = 2 DAMPING sqrt(kp inertia)           inertia of rotor and of all that the joint carries, others still
 
 `gsl diagnose` fits gains, friction and inertia of every joint anew before it looks for a cause, so that these need to
@@ -24,8 +24,13 @@ TIME_CONSTANT = 0.02  # [s]: .006 (Go2) to .046 (STS3215), see the robots; motor
 FULL_AT, SOFTEST = 0.2, 0.9  # [rad]: .02 (NAO) to .9 (XL330 at factory gains)
 DAMPING = 0.7  # of an oscillator: hardly any overshoot
 LOAD_MASS = 1.0  # of a lone servo's load [kg]; what of it is off the axis is the effect centre_of_mass
+INERT = 300.0  # times what a joint moves: a rotor of more is hardly that of its motor
 WORTH = 0.5  # of a lone servo's torque that an unknown load may take
 NAO = 3.35  # peak torque of a NAO's legs, of which the torque unit is 1 [N·m]
+_HEAVY_ROTORS = (
+    "rotors are far heavier than what they move, and the robot may swing: {}; look at effort and velocity of these "
+    "joints, say their armature in a robot file, or hold them"
+)
 _GRAVITY = 9.81  # [m/s²]
 
 
@@ -44,18 +49,20 @@ def with_gains(robot: Robot, settings: Mapping[str, tuple[float | None, float | 
 
     Args:
         robot: With everything else.
-        settings: kp [N·m/rad] and kd [N·m·s/rad] by motor, None where it is left open.
+        settings: kp [N·m/rad] and kd [N·m·s/rad] by motor, [N/m] and [N·s/m] of slides, None where it is left open.
     """
     body = lump(robot)
     carried = np.diag(mass_matrix(body, robot.stance))[6:]
-    gains = {}
+    gains, light = {}, list[str]()
     for name, inertia in zip(robot.motors, carried.tolist(), strict=True):
         joint, (kp, kd) = robot.joint(name), settings.get(name, (None, None))
-        kp = joint.effort / FULL_AT if kp is None else kp
+        kp = joint.effort / (FULL_AT * joint.size) if kp is None else kp
         kd = 2.0 * DAMPING * float(np.sqrt(kp * (inertia + joint.armature))) if kd is None else kd
         gains[name] = (kp, kd)
-    peak = max(robot.joint(name).effort for name in robot.motors)
-    made = replace(robot, gains=gains, torque_unit=torque_unit(peak))
+        light += [name] if joint.armature > INERT * inertia and not joint.slides else []
+    remarks = robot.remarks if not light else (*robot.remarks, _HEAVY_ROTORS.format(", ".join(light)))
+    peak = max(joint.effort * joint.size for joint in map(robot.joint, robot.motors))
+    made = replace(robot, gains=gains, torque_unit=torque_unit(peak), remarks=remarks)
     return replace(
         made, ranges={**(softer_gains(made) if any(kp for kp, _ in settings.values()) else {}), **made.ranges}
     )
@@ -67,7 +74,8 @@ def softer_gains(robot: Robot) -> dict[str, dict[str, tuple[float, float]]]:
     Simulators of position servos are often far stiffer than any servo: kp may be as low as that of the softest that we
     know, which has its full torque at an error of SOFTEST, and kd may be lower by as much.
     """
-    least = min(robot.joint(name).effort / (SOFTEST * robot.gains[name][0]) for name in robot.motors)
+    motors = [robot.joint(name) for name in robot.motors]
+    least = min(joint.effort / (SOFTEST * joint.size * robot.gains[joint.name][0]) for joint in motors)
     usual = settings_of(effect_class("servo_gain"))["kp"]
     assert usual.lower is not None and usual.upper is not None
     return {} if least >= usual.lower else {"servo_gain": dict.fromkeys(("kp", "kd"), (least, usual.upper))}

@@ -17,7 +17,7 @@ from gsl.robots.defaults import armature_of, lone_servos, unknown_loads, with_ga
 from gsl.robots.frames import Mount, align
 from gsl.robots.joint_limits import is_range, limits_problem
 from gsl.robots.mimic import Follows, leader_of, limits_like_leader
-from gsl.robots.urdf_xml import TURNING, Description, Hinge
+from gsl.robots.urdf_xml import DRIVEN, TURNING, Description, Hinge
 
 ENDLESS = 2.0 * math.pi  # limit of a continuous joint, either way [rad]
 
@@ -26,7 +26,7 @@ Number = float | None
 
 @component
 class JointSettings:
-    """What is known of a controlled joint, over what the URDF says."""
+    """What is known of a controlled joint, over what the URDF says; of a slide in m for rad and N for N·m."""
 
     kp: Annotated[Number, setting("proportional gain", unit="N·m/rad", gt=0)] = None
     kd: Annotated[Number, setting("derivative gain", unit="N·m·s/rad", ge=0)] = None
@@ -51,9 +51,9 @@ def from_description(
 
     Args:
         description: What the file says.
-        joints: The controlled joints in order, with what is known of them; None for all that turn and follow no other.
+        joints: The controlled joints in order, with what is known of them; None for all that move and follow no other.
         held: Where others are held [rad], or [m] if they slide.
-        stance: A usual posture [rad].
+        stance: A usual posture [rad], [m].
 
     Raises:
         ConfigError: A joint does not exist, cannot be driven, or lacks a limit; or a link that moves has no mass.
@@ -65,7 +65,7 @@ def from_description(
     coupled = {
         name: way.leader
         for name, way in follows.items()
-        if way.leader in chosen and abs(way.ratio) == 1.0 and hinges[name].kind in TURNING
+        if way.leader in chosen and abs(way.ratio) == 1.0 and hinges[name].slides == hinges[way.leader].slides
     }
     driven = {name: _make_driven(hinges[name], settings) for name, settings in chosen.items()}
     mounts, remarks, soft = [], [*description.remarks], dict[str, tuple[float, float]]()
@@ -83,6 +83,8 @@ def from_description(
             mounts.append(_hold(hinge, place := _place(hinge, held, follows, hinges)))
             if hinge.kind != "fixed" and hinge.name not in held:
                 remarks.append(_remark(hinge, place, follows.get(hinge.name), hinges))
+    if sliding := [mount.joint.name for mount in mounts if mount.joint.slides]:
+        remarks.append(f"joints that slide, their commands in m and forces in N: {', '.join(sliding)}")
     links, placed = align(description.links, mounts)
     robot = Robot(
         description.name, links, placed, tuple(chosen), coupled, stance=dict(stance), remarks=tuple(remarks), soft=soft,
@@ -118,8 +120,8 @@ def lone(name: str, joints: Mapping[str, JointSettings]) -> Robot:
 
 
 def drivable(hinges: Sequence[Hinge]) -> list[str]:
-    """Return the joints that can be controlled: all that turn and follow no other."""
-    return [hinge.name for hinge in hinges if hinge.kind in TURNING and hinge.follows is None]
+    """Return the joints that can be controlled: all that turn or slide and follow no other."""
+    return [hinge.name for hinge in hinges if hinge.kind in DRIVEN and hinge.follows is None]
 
 
 def _check(chosen: Mapping[str, JointSettings], held: Mapping[str, float], hinges: Mapping[str, Hinge]) -> None:
@@ -135,28 +137,28 @@ def _check(chosen: Mapping[str, JointSettings], held: Mapping[str, float], hinge
         hinge = hinges[name]
         if settings.inertia is not None:
             raise ConfigError(f"joints.{name}.inertia", "is for servos without a body; the URDF says it of the links")
-        if hinge.kind not in TURNING:
-            problem = f"is {hinge.kind}; only joints that turn can be controlled, others are held"
-            raise ConfigError(f"joints.{name}", problem)
+        if hinge.kind not in DRIVEN:
+            raise ConfigError(f"joints.{name}", f"is {hinge.kind}: it cannot be controlled; leave it out")
         if hinge.follows:
             raise ConfigError(f"joints.{name}", f"follows {hinge.follows[0]} (<mimic>); control that one")
     if not chosen:
-        raise ConfigError("joints", "the URDF has no joint that turns, so nothing can be controlled")
+        raise ConfigError("joints", "the URDF has no joint that turns or slides, so nothing can be controlled")
 
 
 def _make_driven(hinge: Hinge, settings: JointSettings) -> Joint:
     own = {"effort": settings.effort, "velocity": settings.velocity, "lower": settings.lower, "upper": settings.upper}
     limit = hinge.limit
-    if hinge.kind == "continuous" and not is_range(limit):  # a URDF need not say one then
+    if hinge.kind == "continuous" and not is_range(limit, slides=False):  # a URDF need not say one then
         limit = {**limit, "lower": -ENDLESS, "upper": ENDLESS}
     limit = {**limit, **{key: value for key, value in own.items() if value is not None}}
-    if problem := limits_problem(limit):
+    if problem := limits_problem(limit, slides=hinge.slides):
         raise ConfigError(f"joints.{hinge.name}", problem)
     lower, upper = limit["lower"], limit["upper"]
     effort, velocity = limit["effort"], limit["velocity"]
     armature = armature_of(effort, velocity) if settings.armature is None else settings.armature
     origin, axis = hinge.origin, hinge.axis
-    return Joint(hinge.name, hinge.parent, hinge.child, origin, axis, lower, upper, velocity, effort, armature)
+    place, limits = (hinge.name, hinge.parent, hinge.child, origin, axis), (lower, upper, velocity, effort, armature)
+    return Joint(*place, *limits, slides=hinge.slides)
 
 
 def _soft(hinge: Hinge, joint: Joint, follows: Follows) -> dict[str, tuple[float, float]]:
@@ -168,28 +170,32 @@ def _soft(hinge: Hinge, joint: Joint, follows: Follows) -> dict[str, tuple[float
     lower, upper = sorted(follows.ratio * (end - follows.offset) for end in own)
     lower, upper = max(lower, joint.lower), min(upper, joint.upper)
     if not (own[0] < own[1] and lower < upper):
-        problem = f"its soft limits {own[0]:g} and {own[1]:g} rad leave no range; mend its <safety_controller>"
+        problem = f"its soft limits {own[0]:g} and {own[1]:g} {hinge.unit} leave no range; mend its <safety_controller>"
         raise ConfigError(f"joints.{hinge.name}", problem)
     return {hinge.name: (lower, upper)}
 
 
 def _couple(hinge: Hinge, follows: Follows, leader: JointSettings) -> Mount:
-    """Return a joint that follows another, turned and shifted such that its angle is that of the leader."""
+    """Return a joint that follows another, turned and shifted such that its position is that of the leader."""
     joint = _make_driven(hinge, replace(leader, lower=None, upper=None))
     lower, upper = sorted(follows.ratio * (end - follows.offset) for end in (joint.lower, joint.upper))
-    shifted = hinge.turn @ rotation(hinge.axis, follows.offset)
-    return Mount(replace(joint, axis=follows.ratio * joint.axis, lower=lower, upper=upper), shifted)
+    shifted = _move_to(hinge, follows.offset)
+    axis = follows.ratio * joint.axis
+    return Mount(replace(joint, origin=shifted.origin, axis=axis, lower=lower, upper=upper), shifted.turn)
 
 
 def _hold(hinge: Hinge, place: float) -> Mount:
     """Return a joint that does not move, its frames those that it has where it is held."""
-    turn, origin = hinge.turn, hinge.origin
-    if hinge.kind in TURNING:
-        turn = turn @ rotation(hinge.axis, place)
-    elif hinge.kind == "prismatic":
-        origin = origin + turn @ hinge.axis * place
-    joint = Joint(hinge.name, hinge.parent, hinge.child, origin, hinge.axis, 0.0, 0.0, 0.0, 0.0, fixed_at=0.0)
-    return Mount(joint, turn)
+    held = _move_to(hinge, place)
+    joint = Joint(hinge.name, hinge.parent, hinge.child, held.origin, hinge.axis, 0.0, 0.0, 0.0, 0.0, fixed_at=0.0)
+    return Mount(joint, held.turn)
+
+
+def _move_to(hinge: Hinge, place: float) -> Hinge:
+    """Return a joint with the frame that its child has where it is at `place` [rad], or [m] if it slides."""
+    if hinge.slides:
+        return replace(hinge, origin=hinge.origin + hinge.turn @ hinge.axis * place)
+    return replace(hinge, turn=hinge.turn @ rotation(hinge.axis, place)) if hinge.kind in TURNING else hinge
 
 
 def _place(
@@ -209,12 +215,14 @@ def _place(
 
 
 def _remark(hinge: Hinge, place: float, follows: Follows | None, hinges: Mapping[str, Hinge]) -> str:
-    why = f"{hinge.kind}, which cannot be driven" if hinge.kind not in TURNING else "not controlled"
+    why = "not controlled"
     if follows and follows.leader not in hinges:
         why = f"follows {follows.leader}, which does not exist"
     elif follows and abs(follows.ratio) != 1.0:
         why = f"follows {follows.leader} by a factor of {follows.ratio:g}; only 1 and -1 can be driven"
-    return f"joint {hinge.name} is held at {place:g} {'m' if hinge.kind == 'prismatic' else 'rad'} ({why})"
+    elif follows and hinge.slides != hinges[follows.leader].slides:
+        why = f"follows {follows.leader}, of which one turns and the other slides"
+    return f"joint {hinge.name} is held at {place:g} {hinge.unit} ({why})"
 
 
 def _torque_constants(chosen: Mapping[str, JointSettings], coupled: Mapping[str, str]) -> dict[str, float]:
@@ -224,6 +232,10 @@ def _torque_constants(chosen: Mapping[str, JointSettings], coupled: Mapping[str,
 def _check_masses(robot: Robot) -> None:
     body = lump(robot)
     for joint in body.joints:
+        moments = np.linalg.eigvalsh(body.links[joint.child].inertia)
+        if moments[0] < -1e-9 * moments[-1]:
+            problem = f"it moves the link '{joint.child}', with a principal moment of inertia of {moments[0]:.3g} kg·m²"
+            raise ConfigError(f"joints.{joint.name}", f"{problem}; no body has one below 0: mend its <inertial>")
         if body.links[joint.child].mass <= 0.0:
             problem = f"it moves the link '{joint.child}', which has no mass; give that an <inertial>"
             raise ConfigError(f"joints.{joint.name}", problem)

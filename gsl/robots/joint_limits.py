@@ -4,31 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-PLACEHOLDERS = {"effort": 1e4, "velocity": 1e3}  # [N·m], [rad/s]: no joint of a robot has as much
-BOUNDLESS = 1e3  # an end of a range beyond this stands for none [rad]
-MEANING = {"effort": "peak torque [N·m]", "velocity": "speed without load [rad/s]"}
+PLACEHOLDERS = {False: {"effort": 1e4, "velocity": 1e3}, True: {"effort": 1e6, "velocity": 1e2}}
+"""What no joint of a robot reaches: [N·m], [rad/s] of those that turn; [N], [m/s] of those that slide."""
+BOUNDLESS = {False: 1e3, True: 1e2}  # an end of a range beyond this stands for none [rad], or [m] of a slide
+MEANING = {
+    False: {"effort": "peak torque [N·m]", "velocity": "speed without load [rad/s]"},
+    True: {"effort": "peak force [N]", "velocity": "speed without load [m/s]"},
+}
 
 
-def is_limit(key: str, value: float) -> bool:
-    """Whether a torque or speed is that of a motor."""
-    return 0.0 < value < PLACEHOLDERS[key]
+def is_limit(key: str, value: float, *, slides: bool) -> bool:
+    """Whether a torque, force or speed is that of a motor."""
+    return 0.0 < value < PLACEHOLDERS[slides][key]
 
 
-def is_range(limit: Mapping[str, float]) -> bool:
-    """Whether a range says where a joint can move [rad]."""
-    return -BOUNDLESS < limit.get("lower", 0.0) < limit.get("upper", 0.0) < BOUNDLESS
+def is_range(limit: Mapping[str, float], *, slides: bool) -> bool:
+    """Whether a range says where a joint can move."""
+    far = BOUNDLESS[slides]
+    return -far < limit.get("lower", 0.0) < limit.get("upper", 0.0) < far
 
 
-def limits_problem(limit: Mapping[str, float]) -> str:
+def limits_problem(limit: Mapping[str, float], *, slides: bool) -> str:
     """Return what is wrong with the limits of a driven joint and what to do, nothing if all is well."""
-    for key, what in MEANING.items():
-        if not is_limit(key, limit.get(key, 0.0)):
-            has = f"has no {key}" if key not in limit else f"has {key} {limit[key]:g}, a placeholder"
-            return f"{has}; write its motor's {what} in <limit>, or in a robot file (gsl init ... {key}=...)"
-    if is_range(limit):
+    missing = [key for key in MEANING[slides] if not is_limit(key, limit.get(key, 0.0), slides=slides)]
+    if missing:
+        lacks = [f"no {key}" if key not in limit else f"{key} {limit[key]:g}, a placeholder" for key in missing]
+        what, typed = [MEANING[slides][key] for key in missing], " ".join(f"{key}=..." for key in missing)
+        advice = f"write its motor's {' and '.join(what)} in <limit>, or in a robot file (gsl init ... {typed})"
+        return f"has {' and '.join(lacks)}; {advice}"
+    if is_range(limit, slides=slides):
         return ""
-    lower, upper = limit.get("lower", 0.0), limit.get("upper", 0.0)
-    has = f"its limits are {lower:g} and {upper:g} rad"
+    lower, upper, unit = limit.get("lower", 0.0), limit.get("upper", 0.0), "m" if slides else "rad"
+    has = f"its limits are {lower:g} and {upper:g} {unit}"
     has += ", a placeholder" if lower < upper else ": it could not move"
     has = has if {"lower", "upper"} & set(limit) else "has no range"
-    return f"{has}; write lower and upper [rad] in <limit>, or in a robot file (gsl init ... lower=... upper=...)"
+    return f"{has}; write lower and upper [{unit}] in <limit>, or in a robot file (gsl init ... lower=... upper=...)"

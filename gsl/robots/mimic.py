@@ -16,7 +16,7 @@ from gsl.robots.urdf_xml import Hinge
 
 
 class Follows(NamedTuple):
-    """Whom a joint follows in the end, and how: ratio, and offset [rad]."""
+    """Whom a joint follows in the end, and how: ratio, and offset [rad], or [m] of a slide."""
 
     leader: str
     ratio: float
@@ -44,12 +44,12 @@ def leader_of(hinge: Hinge, joints: Mapping[str, Hinge]) -> Follows | None:
 def limits_like_leader(hinge: Hinge, follows: Follows, leader: Joint) -> tuple[Hinge, str]:
     """Return a follower with its leader's limits where its own say nothing, and the names of those in a sentence."""
     limit, missing = dict(hinge.limit), []
-    if not is_range(limit):
+    if not is_range(limit, slides=hinge.slides):
         ends = (follows.ratio * end + follows.offset for end in (leader.lower, leader.upper))
         limit["lower"], limit["upper"] = sorted(ends)
         missing.append("range")
-    for key, value in zip(MEANING, (leader.effort, leader.max_velocity), strict=True):
-        if not is_limit(key, limit.get(key, 0.0)):
+    for key, value in zip(MEANING[hinge.slides], (leader.effort, leader.max_velocity), strict=True):
+        if not is_limit(key, limit.get(key, 0.0), slides=hinge.slides):
             limit[key] = value
             missing.append(key)
     return replace(hinge, limit=limit), ", ".join(missing)

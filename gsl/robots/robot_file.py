@@ -25,6 +25,7 @@ from gsl.core.validation import did_you_mean, make
 from gsl.core.yaml_tree import yaml_tree
 from gsl.effects.effect import check_ranges
 from gsl.errors import ConfigError, InputError
+from gsl.robots.descriptions import PREFIX, find_description
 from gsl.robots.hinges import JointSettings, from_description, lone
 from gsl.robots.urdf_xml import read_description
 
@@ -36,7 +37,10 @@ SUFFIXES = ROBOT_FILES
 class RobotSettings:
     """What a robot's yaml file may say."""
 
-    urdf: Annotated[str | None, setting("the body, beside this file; none for servos of unknown load")] = None
+    urdf: Annotated[
+        str | None, setting("the body: a file beside this one, or robot_descriptions:NAME; none for lone servos")
+    ] = None
+    hulls: Annotated[bool, setting("whether the URDF's <collision> meshes collide, as convex hulls")] = False
     name: Annotated[str | None, setting("of the robot; that of the URDF by default", min_length=1)] = None
     joints: Annotated[Mapping[str, Any] | None, setting("controlled joints in order, with what is known of them")] = (
         None
@@ -45,7 +49,7 @@ class RobotSettings:
         default_factory=dict
     )
     groups: Annotated[Mapping[str, tuple[str, ...]], setting("names for sets of joints")] = field(default_factory=dict)
-    stance: Annotated[Mapping[str, float], setting("a usual posture, others at 0", unit="rad")] = field(
+    stance: Annotated[Mapping[str, float], setting("a usual posture, others at 0 [rad], [m]")] = field(
         default_factory=dict
     )
     encoder_step: Annotated[float, setting("resolution of the encoders", unit="rad", ge=0)] = 2.0 * math.pi / 4096
@@ -57,10 +61,22 @@ class RobotSettings:
     ] = field(default_factory=dict)
 
 
+def urdf_of(name: str, folder: Path = Path()) -> Path:
+    """Return a URDF: a file, as seen from a folder, or one of robot_descriptions.
+
+    Raises:
+        InputError: There is none of that name in robot_descriptions.
+    """
+    return find_description(name) if name.startswith(PREFIX) else folder / name
+
+
 def files_of(path: Path) -> tuple[Path, ...]:
-    """Return the files that a robot is read from: the file itself, and the URDF that it names."""
-    named = _settings(path).urdf if path.suffix in YAML else None
-    return (path,) if named is None else (path, path.parent / named)
+    """Return the files that a robot is read from: the file itself, the URDF that it names, and meshes that collide."""
+    settings = _settings(path) if path.suffix in YAML else RobotSettings()
+    if settings.urdf is None:
+        return (path,)
+    urdf = urdf_of(settings.urdf, path.parent)
+    return (path, urdf, *(read_description(urdf, hulls=True).hulls if settings.hulls else ()))
 
 
 def from_file(path: Path) -> Robot:
@@ -73,11 +89,11 @@ def from_file(path: Path) -> Robot:
     try:
         joints = None if settings.joints is None else _joints(settings.joints)
         if settings.urdf is not None:
-            if not (path.parent / settings.urdf).exists():
+            urdf = urdf_of(settings.urdf, path.parent)
+            if not urdf.exists():
                 raise ConfigError("urdf", "there is no such file, as seen from the robot's file", given=settings.urdf)
-            robot = from_description(
-                read_description(path.parent / settings.urdf), joints, settings.held, settings.stance
-            )
+            description = read_description(urdf, hulls=settings.hulls)
+            robot = from_description(description, joints, settings.held, settings.stance)
         else:
             robot = lone(settings.name or path.stem, joints or {})
         return _complete(robot, settings)

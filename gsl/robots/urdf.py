@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from xml.etree import ElementTree as xml
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gsl.core.body import Joint, Link, Robot, Shape
+from gsl.core.body import MESH, Joint, Link, Robot, Shape
 from gsl.robots.frames import euler, rpy
+from gsl.robots.meshes import draw_parts, hull_of, write_stl
 
 _ALONG = {"x": (0.0, np.pi / 2, 0.0), "y": (np.pi / 2, 0.0, 0.0), "z": (0.0, 0.0, 0.0)}
 
 
-def urdf(robot: Robot, *, visuals: bool = True) -> str:
-    """Return the robot as URDF text; fixed joints stay joints, `visuals=False` leaves out what only shows."""
+def urdf(robot: Robot, *, visuals: bool = True, meshes: Path | None = None) -> str:
+    """Return the robot as URDF text; fixed joints stay joints.
+
+    Args:
+        robot: To be written.
+        visuals: Whether what only shows is written too.
+        meshes: Folder that the parts of its meshes are written to, as STL files; without it meshes are left out.
+
+    Raises:
+        InputError: A mesh cannot be read.
+    """
     root = xml.Element("robot", name=robot.name)
     for link in robot.links.values():
-        _add_link(root, link, visuals)
+        _add_link(root, link, visuals, meshes)
     for joint in robot.joints:
         _add_joint(root, joint, robot.soft.get(joint.name))
     xml.indent(root)  # Bullet reads lines of at most 8191 characters
@@ -33,7 +44,7 @@ def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return moments, axes
 
 
-def _add_link(root: xml.Element, link: Link, visuals: bool) -> None:
+def _add_link(root: xml.Element, link: Link, visuals: bool, meshes: Path | None) -> None:
     node = xml.SubElement(root, "link", name=link.name)
     inertial = xml.SubElement(node, "inertial")
     moments, axes = principal_axes(link.inertia)
@@ -44,10 +55,22 @@ def _add_link(root: xml.Element, link: Link, visuals: bool) -> None:
     names = {"ixx": moments[0], "iyy": moments[1], "izz": moments[2], "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
     xml.SubElement(inertial, "inertia", {name: _text(value) for name, value in names.items()})
     for shape in link.shapes:
-        if visuals:
-            _add_shape(node, "visual", shape)
-        if shape.collides:
-            _add_shape(node, "collision", shape)
+        for role, wanted in (("visual", visuals and shape.shown), ("collision", shape.collides)):
+            if wanted and shape.kind == MESH:
+                _add_mesh(node, role, shape, meshes)
+            elif wanted:
+                _add_shape(node, role, shape)
+
+
+def _add_mesh(node: xml.Element, role: str, shape: Shape, folder: Path | None) -> None:
+    if folder is None:
+        return
+    for part in [hull_of(shape)] if role == "collision" or shape.collides else draw_parts(shape):
+        file = folder / f"mesh_{len(list(folder.iterdir()))}.stl"
+        write_stl(file, part)
+        element = xml.SubElement(node, role)
+        xml.SubElement(xml.SubElement(element, "geometry"), "mesh", filename=str(file))
+        _add_colour(element, role, part.colour or shape.colour)
 
 
 def _add_shape(node: xml.Element, role: str, shape: Shape) -> None:
@@ -61,9 +84,13 @@ def _add_shape(node: xml.Element, role: str, shape: Shape) -> None:
     else:
         radius, length = shape.size
         xml.SubElement(geometry, "cylinder", radius=_text(radius), length=_text(length))
+    _add_colour(element, role, shape.colour)
+
+
+def _add_colour(element: xml.Element, role: str, colour: Sequence[float]) -> None:
     if role == "visual":
-        name = "rgb_" + "_".join(f"{round(255 * c)}" for c in shape.colour)
-        xml.SubElement(xml.SubElement(element, "material", name=name), "color", rgba=_text(*shape.colour, 1.0))
+        name = "rgb_" + "_".join(f"{round(255 * c)}" for c in colour)
+        xml.SubElement(xml.SubElement(element, "material", name=name), "color", rgba=_text(*colour, 1.0))
 
 
 def _attitude(shape: Shape) -> Sequence[float] | np.ndarray:
@@ -75,7 +102,8 @@ def _attitude(shape: Shape) -> Sequence[float] | np.ndarray:
 
 def _add_joint(root: xml.Element, joint: Joint, soft: tuple[float, float] | None) -> None:
     fixed = joint.fixed_at is not None
-    node = xml.SubElement(root, "joint", name=joint.name, type="fixed" if fixed else "revolute")
+    kind = "fixed" if fixed else "prismatic" if joint.slides else "revolute"
+    node = xml.SubElement(root, "joint", name=joint.name, type=kind)
     xml.SubElement(node, "parent", link=joint.parent)
     xml.SubElement(node, "child", link=joint.child)
     turn = Rotation.from_rotvec(joint.axis * joint.fixed_at).as_euler("xyz") if fixed else (0.0, 0.0, 0.0)

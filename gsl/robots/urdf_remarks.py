@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as xml
 
@@ -21,7 +20,7 @@ ROUNDED = 1.01  # by which a moment of a thin plate may exceed the other two as 
 
 def remarks(root: xml.Element, links: Iterable[Link], hinges: Iterable[Hinge]) -> list[str]:
     """Return what there is to say of a file and what it holds."""
-    return [*_meshes(root), *_dynamics(root), *_floating(root), *_limits(hinges), *_soft(hinges), *_inertias(links)]
+    return [*_dynamics(root), *_floating(root), *_limits(hinges), *_soft(hinges), *_inertias(links)]
 
 
 def _limits(hinges: Iterable[Hinge]) -> Iterator[str]:
@@ -34,10 +33,11 @@ def _limits(hinges: Iterable[Hinge]) -> Iterator[str]:
 
 def _soft(hinges: Iterable[Hinge]) -> Iterator[str]:
     for hinge in hinges:
-        if any(hinge.soft.values()):
+        narrower = [key for key, end in hinge.soft.items() if end != hinge.limit.get(key)]
+        if any(hinge.soft.values()) and narrower:
             ends = " and ".join(f"{hinge.soft[key]:g}" for key in ("lower", "upper") if key in hinge.soft)
-            yield f"commands of joint {hinge.name} keep the soft limits of its <safety_controller>: {ends} rad"
-        elif hinge.soft:
+            yield f"commands of joint {hinge.name} keep the soft limits of its <safety_controller>: {ends} {hinge.unit}"
+        elif not any(hinge.soft.values()) and hinge.soft:
             yield f"joint {hinge.name} has soft limits of 0 in its <safety_controller>: taken as not set"
 
 
@@ -50,14 +50,6 @@ def _inertias(links: Iterable[Link]) -> Iterator[str]:
                 f"link {link.name} has the principal moments {three} kg·m²: no body has one that is more than the "
                 "other two together; look at its <inertia>"
             )
-
-
-def _meshes(root: xml.Element) -> list[str]:
-    files = sorted({mesh.get("filename", "") for mesh in root.iter("mesh")})
-    if not files:
-        return []
-    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
-    return [f"meshes are not read ({Path(files[0]).name}{more}): they do not show, and nothing collides with them"]
 
 
 def _dynamics(root: xml.Element) -> list[str]:

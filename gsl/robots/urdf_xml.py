@@ -4,29 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from gsl.core.body import Link, Shape
+from gsl.core.body import Link
 from gsl.core.budget import JOINTS, URDF_BYTES, check_file, within
 from gsl.core.validation import did_you_mean
 from gsl.errors import InputError
-from gsl.robots.frames import euler, rpy
+from gsl.robots.urdf_numbers import read_number, read_numbers, read_origin
 from gsl.robots.urdf_remarks import remarks
+from gsl.robots.urdf_shapes import Looks
 
 T = TypeVar("T")
 
-PRIMITIVES = ("box", "sphere", "cylinder")
 TURNING = ("revolute", "continuous")
+SLIDING = "prismatic"
+DRIVEN = (*TURNING, SLIDING)
 _LIMITS = ("lower", "upper", "effort", "velocity")
 _SOFT = {"lower": "soft_lower_limit", "upper": "soft_upper_limit"}
 _LEFT = ("${", "$(")  # how an expression begins that xacro would have replaced
-_GREY = (0.75, 0.77, 0.8, 1.0)
 FLOATING = "floating"
-KINDS = (*TURNING, "fixed", "prismatic")
+KINDS = (*DRIVEN, "fixed")
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,8 @@ class Hinge:
         soft: What <safety_controller> says of the range that commands keep: lower, upper [rad].
         follows: Joint, multiplier and offset [rad] of <mimic>, if there is one.
         dynamics: What <dynamics> says: damping [N·m·s/rad], friction [N·m].
+
+    If it slides, m stands for rad and N for N·m.
     """
 
     name: str
@@ -56,6 +60,16 @@ class Hinge:
     follows: tuple[str, float, float] | None
     dynamics: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def slides(self) -> bool:
+        """Whether it moves along its axis."""
+        return self.kind == SLIDING
+
+    @property
+    def unit(self) -> str:
+        """Of its position."""
+        return "m" if self.slides else "rad"
+
 
 @dataclass(frozen=True)
 class Description:
@@ -66,28 +80,34 @@ class Description:
         links: By name, the base first.
         hinges: Parents before children.
         remarks: What was left out.
+        hulls: Files of the meshes that collide.
     """
 
     name: str
     links: dict[str, Link]
     hinges: tuple[Hinge, ...]
     remarks: tuple[str, ...]
+    hulls: tuple[Path, ...] = ()
 
 
-def read_description(path: Path) -> Description:
+def read_description(path: Path, *, hulls: bool = False) -> Description:
     """Read a URDF.
+
+    Args:
+        path: Of the file.
+        hulls: Whether meshes collide, as convex hulls.
 
     Raises:
         InputError: It cannot be read, or is not a tree of links with names, numbers and known joints.
     """
     root = _root(path)
     try:
-        links = {link.name: link for link in _each(root, "link", _link)}
+        looks = Looks(path, root, hulls=hulls)
+        links = {link.name: link for link in _each(root, "link", partial(_link, looks))}
         base, hinges = _tree(links, _each(root, "joint", _hinge))
         ordered = {name: links[name] for name in (base, *(hinge.child for hinge in hinges))}
-        return Description(
-            root.get("name") or path.stem, ordered, hinges, tuple(remarks(root, ordered.values(), hinges))
-        )
+        lines = (*looks.remarks(), *remarks(root, ordered.values(), hinges))
+        return Description(root.get("name") or path.stem, ordered, hinges, lines, looks.hull_files())
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
 
@@ -147,39 +167,20 @@ def _each(root: xml.Element, tag: str, read: Callable[[str, xml.Element], T]) ->
     return parts
 
 
-def _link(name: str, node: xml.Element) -> Link:
+def _link(looks: Looks, name: str, node: xml.Element) -> Link:
     inertial = node.find("inertial")
-    shapes = [shape for role in ("visual", "collision") for part in node.findall(role) for shape in _shape(part, role)]
+    shapes = looks.read(node)
     if inertial is None:
-        return Link(name, 0.0, np.zeros(3), np.zeros((3, 3)), tuple(shapes))
-    com, turn = _origin(inertial)
-    mass = _number(inertial.find("mass"), "value", "<mass>")
+        return Link(name, 0.0, np.zeros(3), np.zeros((3, 3)), shapes)
+    com, turn = read_origin(inertial)
+    mass = read_number(inertial.find("mass"), "value", "<mass>")
     xx, xy, xz, yy, yz, zz = (
-        _number(inertial.find("inertia"), f"i{pair}", "<inertia>") for pair in ("xx", "xy", "xz", "yy", "yz", "zz")
+        read_number(inertial.find("inertia"), f"i{pair}", "<inertia>") for pair in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if mass < 0.0 or np.linalg.eigvalsh(inertia).min() < -1e-9 * np.abs(inertia).max():
-        raise ValueError("a mass or a principal moment of inertia is negative; no body is like that")
-    return Link(name, mass, com, turn @ inertia @ turn.T, tuple(shapes))
-
-
-def _shape(node: xml.Element, role: str) -> list[Shape]:
-    """Return the primitive that a <visual> or <collision> is; a mesh is none."""
-    form = next((form for kind in PRIMITIVES if (form := node.find(f"geometry/{kind}")) is not None), None)
-    if form is None:
-        return []
-    centre, turn = _origin(node)
-    if form.tag == "box":
-        size = _numbers(form.get("size", ""), 3, "size of a <box>")
-    else:
-        names = ("radius",) if form.tag == "sphere" else ("radius", "length")
-        size = tuple(_number(form, name, f"<{form.tag}>") for name in names)
-    (x, y, z), attitude = centre.tolist(), rpy(turn)
-    if role == "collision":
-        return [Shape(form.tag, size, (x, y, z), collides=True, turn=attitude)]
-    colour = node.find("material/color")
-    red, green, blue, _ = _numbers(colour.get("rgba", ""), 4, "rgba of a <color>") if colour is not None else _GREY
-    return [Shape(form.tag, size, (x, y, z), turn=attitude, colour=(red, green, blue))]
+    if mass < 0.0:
+        raise ValueError("its mass is negative; no body is like that")
+    return Link(name, mass, com, turn @ inertia @ turn.T, shapes)
 
 
 def _hinge(name: str, node: xml.Element) -> Hinge:
@@ -194,32 +195,32 @@ def _hinge(name: str, node: xml.Element) -> Hinge:
     if not (parent and child):
         raise ValueError("names no parent or no child link")
     axis = node.find("axis")
-    way = np.array(_numbers(axis.get("xyz", ""), 3, "axis") if axis is not None else (1.0, 0.0, 0.0))
+    way = np.array(read_numbers(axis.get("xyz", ""), 3, "axis") if axis is not None else (1.0, 0.0, 0.0))
     if kind != "fixed" and not np.linalg.norm(way) > 1e-9:
         raise ValueError("its axis has no direction")
     limit, mimic = node.find("limit"), node.find("mimic")
     limits = {
-        key: _number(limit, key, "<limit>") for key in _LIMITS if limit is not None and limit.get(key) is not None
+        key: read_number(limit, key, "<limit>") for key in _LIMITS if limit is not None and limit.get(key) is not None
     }
     safety, follows = node.find("safety_controller"), None
     soft = {
-        key: _number(safety, name, "<safety_controller>")
+        key: read_number(safety, name, "<safety_controller>")
         for key, name in _SOFT.items()
         if safety is not None and safety.get(name) is not None
     }
     if mimic is not None:
         ratio, offset = (
-            _number(mimic, key, "<mimic>", missing) for key, missing in (("multiplier", 1.0), ("offset", 0.0))
+            read_number(mimic, key, "<mimic>", missing) for key, missing in (("multiplier", 1.0), ("offset", 0.0))
         )
         follows = (mimic.get("joint", ""), ratio, offset)
     unit = way / np.linalg.norm(way) if way.any() else np.array([1.0, 0.0, 0.0])
     drag = node.find("dynamics")
     dynamics = {
-        key: _number(drag, key, "<dynamics>")
+        key: read_number(drag, key, "<dynamics>")
         for key in ("damping", "friction")
         if drag is not None and drag.get(key) is not None
     }
-    return Hinge(name, kind, parent, child, *_origin(node), unit, limits, soft, follows, dynamics)
+    return Hinge(name, kind, parent, child, *read_origin(node), unit, limits, soft, follows, dynamics)
 
 
 def _tree(links: dict[str, Link], hinges: Sequence[Hinge]) -> tuple[str, tuple[Hinge, ...]]:
@@ -250,31 +251,3 @@ def _knot(roots: Sequence[str], children: Sequence[str]) -> str:
         return f"{' and '.join(roots)} hang on nothing; one link alone is the base"
     twice = [name for name in children if children.count(name) > 1]
     return f"{twice[0]} is the child of two joints" if twice else "its links hang in a loop"
-
-
-def _origin(node: xml.Element) -> tuple[np.ndarray, np.ndarray]:
-    origin = node.find("origin")
-    if origin is None:
-        return np.zeros(3), np.eye(3)
-    place = _numbers(origin.get("xyz", "0 0 0"), 3, "xyz of an <origin>")
-    return np.array(place), euler(*_numbers(origin.get("rpy", "0 0 0"), 3, "rpy of an <origin>"))
-
-
-def _number(node: xml.Element | None, key: str, where: str, missing: float | None = None) -> float:
-    text = None if node is None else node.get(key)
-    if text is None and missing is not None:
-        return missing
-    if text is None:
-        raise ValueError(f"{where} lacks {key}")
-    return _numbers(text, 1, f"{key} of {where}")[0]
-
-
-def _numbers(text: str, count: int, where: str) -> tuple[float, ...]:
-    try:
-        values = tuple(float(word) for word in text.split())
-    except ValueError:
-        values = ()
-    if len(values) != count or not np.isfinite(values).all():
-        wanted = "a finite number" if count == 1 else f"{count} finite numbers"
-        raise ValueError(f"{where} must be {wanted}, not '{text}'")
-    return values

@@ -47,6 +47,7 @@ from gsl.storage import documents
 from gsl.training.servo_folds import servo_errors
 from gsl.validation.learned_replay import LearnedReplay, Simulated
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.fits import check_turning
 from gsl.worlds.held import refuse_hook
 from gsl.worlds.velocity_motors import check_servos
 
@@ -96,6 +97,7 @@ class CrossValidate:
     def __post_init__(self) -> None:
         """Refuse what cannot be fitted to all joints, or is to be left out, or replayed."""
         check_servos(self.sim.motors)
+        check_turning(self.sim.plant.robot)
         refuse_hook(self.sim.plant)
         if not self.usual:
             raise ConfigError("usual", "names at least one effect to compare with")

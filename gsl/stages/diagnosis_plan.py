@@ -26,6 +26,7 @@ from gsl.storage.artifact import Artifact
 from gsl.tasks.excite import Excite
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot, asking
+from gsl.worlds.fits import check_turning
 from gsl.worlds.velocity_motors import check_servos
 
 EXCITATION = "collect_excitation"
@@ -54,6 +55,7 @@ class DiagnosisPlan:
         if not isinstance(sim, BulletWorld):
             raise ConfigError("grounding", ROBOTS_ONLY)
         check_servos(sim.motors)
+        check_turning(sim.plant.robot)
         log = self.flown(real, home, workers=workers, seed=seed, console=console)
         stage: Diagnose | Identify = Identify(
             str(log.folder), sim, without=self.without, evaluations=self.evaluations, workers=workers, seed=seed
@@ -84,6 +86,7 @@ class DiagnosisPlan:
         if not isinstance(sim, BulletWorld):
             raise ConfigError("grounding", ROBOTS_ONLY)
         check_servos(sim.motors)
+        check_turning(sim.plant.robot)
         log = self.flown(real, home, workers=workers, seed=seed, console=console)
         below = sim if effects is None else switch_on(sim, effects)
         assert isinstance(below, BulletWorld), "effects leave a world what it is"

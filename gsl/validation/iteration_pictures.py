@@ -22,6 +22,7 @@ from gsl.report.film import Shot, film
 from gsl.report.footfalls import Walk
 from gsl.report.iteration_page import Seen
 from gsl.report.joint_trace import Traces, joint_trace
+from gsl.report.shown import scale_of
 from gsl.report.style import GROUNDED, REAL
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.validation.replay import PAST, Place, replay
@@ -161,6 +162,7 @@ def draw_joint(folder: Path, plain: Way, grounded: Way, real: Trajectory) -> dic
             bare[:, k],
             other[:, k],
             sent[:, k] if changed else None,
+            scale=scale_of(layout.joints[k], plain.world.plant.robot.slides),
         )
         for k in np.argsort(-np.ptp(real.position[shown], axis=0), kind="stable")
     }

@@ -39,7 +39,10 @@ FALLEN_TILT = 0.5  # cosine of the tilt beyond which the robot has fallen
 class BulletWorld:
     """A world's configuration; `make` builds the environment."""
 
-    robot: Annotated[str, setting("name of the robot, or one's own: a URDF or yaml file, or package.module.function")]
+    robot: Annotated[
+        str,
+        setting("its name, a URDF or yaml file, robot_descriptions:NAME, or package.module.function"),
+    ]
     effects: Annotated[Mapping[str, Any], setting("what this world adds to the nominal robot, by name")]
     floating: Annotated[bool, setting("base on the ground (true) or held in the air (false)")] = True
     step: Annotated[float, setting("physics period", unit="s", gt=0, le=0.02)] = 0.002
@@ -233,6 +236,7 @@ class BulletEnv(gymnasium.Env):
 
     def _at_rest(self, posture: np.ndarray) -> Start:
         targets = posture[self._drive]
-        positions = targets + self.world.start_noise * self.np_random.standard_normal(self._n)[self._drive]
+        noise = self.world.start_noise * self.np_random.standard_normal(self._n)[self._drive]
+        positions = targets + noise * self._robot.sizes
         positions = np.clip(positions, self._plant.servo.lower_stop, self._plant.servo.upper_stop)
         return resting(self._robot, positions, targets, floating=self.world.floating)

@@ -51,7 +51,7 @@ class Camera:
             import pybullet
 
             self._bullet, self._client = pybullet, pybullet.connect(pybullet.DIRECT)
-            for name, text in (("floor", _floor()), ("robot", urdf(robot))):
+            for name, text in (("floor", _floor()), ("robot", urdf(robot, meshes=Path(folder)))):
                 Path(folder, f"{name}.urdf").write_text(text)
             load = {"useFixedBase": True, "physicsClientId": self._client}
             self._floor = pybullet.loadURDF(f"{folder}/floor.urdf", **load)

@@ -33,6 +33,7 @@ class Chain(NamedTuple):
         parent: Motor above each motor, -1 for the base, shape (n,).
         order: Motors, parents before children, shape (n,).
         axis: Of each motor in its parent's axes, shape (n, 3).
+        slides: Whether each motor slides along its axis in place of turning about it, shape (n,).
         origin: Of each link's frame in its parent's axes [m], shape (n, 3).
         mass: [kg], shape (n,).
         com: Centres of mass in link axes [m], shape (n, 3).
@@ -44,6 +45,7 @@ class Chain(NamedTuple):
     parent: np.ndarray
     order: np.ndarray
     axis: np.ndarray
+    slides: np.ndarray
     origin: np.ndarray
     mass: np.ndarray
     com: np.ndarray
@@ -93,6 +95,7 @@ def _links(robot: Robot) -> Chain:
         parent=np.array([above.get(joint.parent, -1) for joint in joints]),
         order=np.array([welded.motors.index(joint.name) for joint in welded.joints]),
         axis=np.array([joint.axis for joint in joints], dtype=float),
+        slides=np.array([joint.slides for joint in joints]),
         origin=np.array([joint.origin for joint in joints], dtype=float),
         mass=np.array([link.mass for link in links]),
         com=np.array([link.com for link in links], dtype=float),
@@ -145,7 +148,7 @@ def accelerate(
 def _place(chain: Chain, i: int, angle: float, work: np.ndarray) -> None:
     """Fill in link i's rotation, origin and joint screw, and its own inertia about the base's origin."""
     row, above, axis = work[i], chain.parent[i], chain.axis[i]
-    s, c = sine_cosine(angle)
+    s, c = sine_cosine(0.0 * angle if chain.slides[i] else angle)
     t, x, y, z = 1.0 - c, axis[0], axis[1], axis[2]
     local = (
         c + t * x * x, t * x * y - s * z, t * x * z + s * y,
@@ -163,7 +166,13 @@ def _place(chain: Chain, i: int, angle: float, work: np.ndarray) -> None:
         row[3 * k] = a * local[0] + b * local[3] + d * local[6]
         row[3 * k + 1] = a * local[1] + b * local[4] + d * local[7]
         row[3 * k + 2] = a * local[2] + b * local[5] + d * local[8]
-    _cross(row, _PLACE, row, _AXIS, row, _ARM)
+    for k in range(3):
+        first, second = (k + 1) % 3, (k + 2) % 3
+        row[_ARM + k] = row[_PLACE + first] * row[_AXIS + second] - row[_PLACE + second] * row[_AXIS + first]
+    if chain.slides[i]:
+        for k in range(3):
+            row[_PLACE + k] += angle * row[_AXIS + k]
+            row[_ARM + k], row[_AXIS + k] = row[_AXIS + k], 0.0 * angle
     _own_inertia(chain, i, row)
 
 
@@ -289,10 +298,3 @@ def _solve(chain: Chain, matrix: np.ndarray, right: np.ndarray) -> None:
         while i >= 0:
             right[k] -= matrix[k, i] * right[i]
             i = chain.parent[i]
-
-
-@compile_inner
-def _cross(one: np.ndarray, a: int, two: np.ndarray, b: int, result: np.ndarray, to: int) -> None:
-    result[to] = one[a + 1] * two[b + 2] - one[a + 2] * two[b + 1]
-    result[to + 1] = one[a + 2] * two[b] - one[a] * two[b + 2]
-    result[to + 2] = one[a] * two[b + 1] - one[a + 1] * two[b]

@@ -25,7 +25,7 @@ class Drive(NamedTuple):
     Attributes:
         servo: Parameters of the servos, from `servo.packed`.
         base_axes: Of the base's inertial frame in its link axes, columns, shape (3, 3).
-        parent, order, axis, carried, armature, gain: See `rotor.Rotors`.
+        parent, order, axis, turns, carried, armature, gain: See `rotor.Rotors`.
     """
 
     servo: ServoParameters
@@ -33,6 +33,7 @@ class Drive(NamedTuple):
     parent: np.ndarray
     order: np.ndarray
     axis: np.ndarray
+    turns: np.ndarray
     carried: np.ndarray
     armature: np.ndarray
     gain: np.ndarray
@@ -40,7 +41,8 @@ class Drive(NamedTuple):
     @classmethod
     def of(cls, servo: ServoParameters, rotor: Rotors, base_axes: np.ndarray) -> Drive:
         """Put together what `torques` needs."""
-        return cls(servo, base_axes, rotor.parent, rotor.order, rotor.axis, rotor.carried, rotor.armature, rotor.gain)
+        constants = (rotor.parent, rotor.order, rotor.axis, rotor.turns, rotor.carried, rotor.armature, rotor.gain)
+        return cls(servo, base_axes, *constants)
 
 
 class Memory(NamedTuple):
@@ -110,7 +112,7 @@ def torques(drive: Drive, memory: Memory, turn: np.ndarray, k: int, step: float,
     for k in range(3):
         base[k] = world[0] * turn[0, k] + world[1] * turn[1, k] + world[2] * turn[2, k]
     compensation(
-        drive.parent, drive.order, drive.axis, drive.carried, drive.armature, drive.gain,
+        drive.parent, drive.order, drive.axis, drive.turns, drive.carried, drive.armature, drive.gain,
         memory.motion, base, step, memory.rotor, memory.work, memory.torque,
     )  # fmt: skip
     wanted, axes = memory.rotor[0], drive.base_axes

@@ -33,7 +33,7 @@ def limit_torque(u: float, v: float, bound: float, no_load: float) -> float:
 @compile_inner
 def through_gear(
     rotor: np.ndarray, i: int, motion: np.ndarray, u: float, bound: float, no_load: float, inertia: float,
-    play: float, compliance: float, step: float,
+    play: float, compliance: float, hardness: float, step: float,
 ) -> float:  # fmt: skip
     """Return the mean torque that arrives at the output [N·m] and move the rotor by one physics step, in substeps.
 
@@ -49,10 +49,11 @@ def through_gear(
         inertia: Of the rotor [kg·m²].
         play: Full width [rad].
         compliance: Of the spring [rad/(N·m)]; the teeth themselves count if there is play.
+        hardness: Of the teeth against those of a hinge.
         step: Physics period [s].
     """
     q, v, h, half = motion[0, i], motion[1, i], step / SUBSTEPS, 0.5 * play
-    stiffness = 1.0 / (compliance + (1.0 / TOOTH_STIFFNESS if play > 0.0 else 0.0))
+    stiffness = 1.0 / (compliance + (1.0 / (TOOTH_STIFFNESS * hardness) if play > 0.0 else 0.0))
     damping = DAMPING * np.sqrt(stiffness * inertia)
     angle, speed, passed = rotor[0, i], rotor[1, i], 0.0
     for k in range(SUBSTEPS):

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Robot, lump
-from gsl.core.plant import Plant
+from gsl.core.plant import Plant, hardness
 from gsl.core.scratch import Scratch
 from gsl.robots.urdf import principal_axes, urdf
 from gsl.worlds.base_frame import base_motion
@@ -62,7 +62,7 @@ class Engine:
         self.body = NOTHING
         self.plant, self.physics, self.robot = plant, physics, lump(plant.robot)
         self.handle = client_handle(pybullet.__file__, self.client)
-        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law)
+        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law, hardness(plant.robot))
         apart, moved = servo.rows[ROTOR], physics.motors == "servo"
         armature = plant.servo.armature - apart if moved else np.zeros(len(apart))
         self._motors = None if moved else VelocityMotors.of(plant, servo.rows)
@@ -75,7 +75,8 @@ class Engine:
         self._pushes = aim(plant, self._loaded)
         self._link_from_inertial = Rotation.from_matrix(axes.T).as_quat().tolist()
         self._folder = Scratch()
-        for name, text in (("robot", urdf(self._loaded, visuals=False)), ("ground", PLANE)):
+        model = urdf(self._loaded, visuals=False, meshes=Path(self._folder.name))
+        for name, text in (("robot", model), ("ground", PLANE)):
             Path(self._folder.name, f"{name}.urdf").write_text(text)
 
     def close(self) -> None:

@@ -48,6 +48,25 @@ def check_plant(plant: Plant, step: float, period: float) -> None:
             raise ConfigError(f"effects.{name}.joints", f"{joint} has no rotor; effects.armature.inertia gives it one")
 
 
+def check_turning(robot: Robot, setting: str = "sim.robot") -> None:
+    """Refuse a robot whose motors slide, where logs are compared in radians: its statistics are those of hinges.
+
+    Args:
+        robot: Of the simulator.
+        setting: That the user would have to change.
+
+    Raises:
+        ConfigError: Some of them do.
+    """
+    if robot.slides:
+        turning = ",".join(name for name in robot.controlled if name not in robot.slides)
+        problem = f"logs are compared in radians, and {', '.join(robot.slides)} slide"
+        advice = (
+            f"hold them by a robot file: gsl init ... joints=[{turning}]" if turning else "no joint is left to look at"
+        )
+        raise ConfigError(setting, f"{problem}; {advice}")
+
+
 def check_base(robot: Robot, *, floating: bool) -> None:
     """Refuse to let a robot go that has no weight of its own, or no feet to stand on.
 

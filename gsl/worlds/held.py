@@ -14,7 +14,7 @@ import numpy as np
 from gsl.core.body import Robot, carrier
 from gsl.core.compiled import compile_inner, compile_kernel
 from gsl.core.lanes import LANES, side_by_side, zeros_in_lanes
-from gsl.core.plant import Plant, Push
+from gsl.core.plant import Plant, Push, hardness
 from gsl.core.servo_law import HIDDEN, LAYERS
 from gsl.errors import ConfigError
 from gsl.worlds.chain import COLUMNS, Chain, Pushed, accelerate, chain
@@ -94,7 +94,7 @@ class Held:
             ConfigError: It has a torque hook, which only Bullet calls.
         """
         refuse_hook(plant)
-        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law)
+        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law, hardness(plant.robot))
         pushes = [row for push in plant.pushes for row in _aim(push, plant.robot)]
         tree = chain(plant, plant.servo.armature - servo.rows[ROTOR])
         return cls(servo, tree, np.array(pushes).reshape(-1, 9), plant.sensors.bias, step, period, accurate)

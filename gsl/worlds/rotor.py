@@ -3,7 +3,8 @@
 A motor's rotor adds its reflected inertia A to the diagonal of the mass matrix and to nothing else. Bullet can only
 make links heavier to turn. A link with extra inertia about its joint's axis, however, resists every rotation of that
 link: of the joints above it (hip, knee and ankle pitch axes are parallel) and of the base. So each link carries a share
-of the rotor, which keeps the integration stable, and a torque takes the surplus away:
+of the rotor, which keeps the integration stable, and a torque takes the surplus away. The link of a slide carries none,
+for its mass would weigh: there the force does all of it.
 
     (M + E) a = tau + (E - A) a          E from the links, A the rotors, a = generalised acceleration
 
@@ -44,6 +45,7 @@ class Rotors:
         parent: Motor above each motor in the tree, -1 for the base, shape (n_motors,); parents come first in `order`.
         order: Motors from the base outwards, shape (n_motors,).
         axis: Of each motor in its parent's axes, shape (n_motors, 3).
+        turns: 1 for each motor that turns, 0 for one that slides, shape (n_motors,).
     """
 
     carried: np.ndarray
@@ -52,6 +54,7 @@ class Rotors:
     parent: np.ndarray
     order: np.ndarray
     axis: np.ndarray
+    turns: np.ndarray
 
 
 def rotors(robot: Robot, armature: np.ndarray, *, floating: bool, apart: np.ndarray | float = 0.0) -> Rotors:
@@ -63,7 +66,8 @@ def rotors(robot: Robot, armature: np.ndarray, *, floating: bool, apart: np.ndar
         floating: Whether the base is free to move.
         apart: Further rotor inertia, which turns on its own behind play or a spring [kg·m²], shape (n_motors,).
     """
-    carried = LINK_SHARE * (armature + apart)
+    turns = np.array([not robot.joint(name).slides for name in robot.motors], dtype=float)
+    carried = LINK_SHARE * (armature + apart) * turns
     surplus = _carry_matrix(robot, carried) - np.diag(np.r_[np.zeros(3), armature])
     return Rotors(
         carried,
@@ -72,6 +76,7 @@ def rotors(robot: Robot, armature: np.ndarray, *, floating: bool, apart: np.ndar
         parent=np.array([_motor_above(robot, name) for name in robot.motors]),
         order=np.array([robot.motors.index(joint.name) for joint in robot.joints]),
         axis=np.array([robot.joint(name).axis for name in robot.motors]),
+        turns=turns,
     )
 
 
@@ -86,6 +91,7 @@ def compensation(
     parent: np.ndarray,
     order: np.ndarray,
     axis: np.ndarray,
+    turns: np.ndarray,
     carried: np.ndarray,
     armature: np.ndarray,
     gain: np.ndarray,
@@ -102,6 +108,7 @@ def compensation(
         parent: Of `Rotors`, as the next five.
         order: Motors from the base outwards.
         axis: In the parent's axes.
+        turns: 1, or 0 of slides.
         carried: By the links [kg·m²].
         armature: Of the rotors [kg·m²].
         gain: The matrix G.
@@ -117,7 +124,7 @@ def compensation(
     wanted = memory[6]
     wanted[:] = 0.0
     for i in order:
-        _place(work, parent[i], i, axis[i], motion[0, i], motion[1, i], spin)
+        _place(work, parent[i], i, axis[i], turns[i] * motion[0, i], turns[i] * motion[1, i], spin)
         speed = 0.0
         for k in range(3):
             speed += work[i, 9 + k] * work[i, 12 + k]
@@ -201,7 +208,8 @@ def _carry_matrix(robot: Robot, carried: np.ndarray) -> np.ndarray:
     for i, name in enumerate(robot.motors):
         row = np.r_[frames.axis[name], np.zeros(len(carried))]
         while i >= 0:
-            row[3 + i] = frames.axis[name] @ frames.axis[robot.motors[i]]
+            if not robot.joint(robot.motors[i]).slides:
+                row[3 + i] = frames.axis[name] @ frames.axis[robot.motors[i]]
             i = _motor_above(robot, robot.motors[i])
         total += carried[robot.motors.index(name)] * np.outer(row, row)
     return total

@@ -36,6 +36,7 @@ from gsl.worlds.servo_state import (
     DRIVE,
     FRICTION,
     GROUP,
+    HARDNESS,
     LAG_SHARE,
     LAW_BENT,
     OUTPUT_ARMATURE,
@@ -254,13 +255,12 @@ def output_torque(
     if parameters[ROTOR, i] > 0.0:
         through = through_gear(
             memory[ROTOR_ANGLE : ROTOR_SPEED + 1], i, motion, u, bound, no_load, parameters[ROTOR, i],
-            parameters[ROW.play, i], parameters[ROW.compliance, i], step,
+            parameters[ROW.play, i], parameters[ROW.compliance, i], parameters[HARDNESS, i], step,
         )  # fmt: skip
     friction = parameters[ROW.viscous, i] * v + _dry(parameters, memory, i, v, through, step) - output
     memory[DRIVE, i], memory[THROUGH, i], memory[FRICTION, i], memory[SPEED, i] = drive, through, friction, v
-    return (
-        through - friction + _stop(q - parameters[ROW.upper_stop, i], v) - _stop(parameters[ROW.lower_stop, i] - q, -v)
-    )
+    above, below = q - parameters[ROW.upper_stop, i], parameters[ROW.lower_stop, i] - q
+    return through - friction + parameters[HARDNESS, i] * (_stop(above, v) - _stop(below, -v))
 
 
 @compile_inner

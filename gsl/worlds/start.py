@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsl.core.body import Robot, Shape
+from gsl.core.body import MESH, Robot, Shape
 from gsl.core.dynamics import forward_kinematics
 from gsl.robots.frames import euler
+from gsl.robots.meshes import draw_parts, hull_of
 from gsl.worlds.physics import Reading
 
 CLEARANCE = 5e-4  # of the lowest sole above the ground [m]
@@ -45,7 +46,7 @@ def resting(robot: Robot, positions: np.ndarray, targets: np.ndarray, *, floatin
 
 
 def lowest_point(robot: Robot, positions: np.ndarray, turn: np.ndarray | None = None) -> float:
-    """Return the height of the lowest corner of a colliding box over the base's origin [m].
+    """Return the height of the lowest corner of a colliding box or hull over the base's origin [m].
 
     Args:
         robot: Without fixed joints.
@@ -53,7 +54,7 @@ def lowest_point(robot: Robot, positions: np.ndarray, turn: np.ndarray | None = 
         turn: From base to world axes, shape (3, 3), by default upright.
     """
     up = np.array([0.0, 0.0, 1.0]) if turn is None else turn[2]
-    soles = [up @ box for shape, box in _boxes(robot, positions) if shape.collides and shape.kind == "box"]
+    soles = [up @ box for shape, box in _boxes(robot, positions) if shape.collides and shape.kind in ("box", MESH)]
     return min([0.0, *(float(heights.min()) for heights in soles)])
 
 
@@ -64,17 +65,27 @@ def extent(robot: Robot, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         robot: Without fixed joints.
         positions: Of the motors [rad], shape (n_motors,).
     """
-    corners = np.concatenate([np.zeros((3, 1)), *(box for _, box in _boxes(robot, positions))], axis=1)
+    corners = np.concatenate([np.zeros((3, 1)), *(box for s, box in _boxes(robot, positions) if s.shown)], axis=1)
     return corners.min(axis=1), corners.max(axis=1)
 
 
 def _boxes(robot: Robot, positions: np.ndarray) -> Iterator[tuple[Shape, np.ndarray]]:
-    """Yield every shape with the corners of the box around it in base axes [m], shape (3, 8)."""
+    """Yield every shape with points in base axes whose hull it fills [m], shape (3, n)."""
     frames = forward_kinematics(robot, dict(zip(robot.motors, positions.tolist(), strict=True)))
     for name, link in robot.links.items():
         for shape in link.shapes:
-            box = euler(*shape.turn) @ (_edges(shape)[:, None] * _CORNERS) + np.array(shape.centre)[:, None]
-            yield shape, frames.origin[name][:, None] + frames.turn[name] @ box
+            yield shape, frames.origin[name][:, None] + frames.turn[name] @ _corners(shape)
+
+
+def _corners(shape: Shape) -> np.ndarray:
+    """Return points in link axes whose hull a shape fills [m], shape (3, n)."""
+    if shape.kind != MESH:
+        return euler(*shape.turn) @ (_edges(shape)[:, None] * _CORNERS) + np.array(shape.centre)[:, None]
+    if shape.collides:
+        return hull_of(shape).vertices.T
+    points = np.concatenate([np.array([shape.centre]), *(part.vertices for part in draw_parts(shape))])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return (high - low)[:, None] * _CORNERS + 0.5 * (low + high)[:, None]
 
 
 def _edges(shape: Shape) -> np.ndarray:

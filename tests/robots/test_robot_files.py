@@ -91,7 +91,7 @@ def test_what_is_left_open_is_derived_and_what_is_left_out_is_told() -> None:
     assert (
         "column.stl" in remarks
         and "<dynamics> is friction, and the world's (elbow)" in remarks
-        and "slide is held at 0.01 m" in remarks
+        and "slide is held at 0.01 m (follows left_finger by a factor of 0.02; only 1 and -1 can be driven)" in remarks
     )
 
 
@@ -185,6 +185,8 @@ WHOLE = (
     "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint></robot>"
 )
 
+SLIDE = WHOLE.replace("revolute", "prismatic")
+
 
 def but(old: str, new: str) -> str:
     """The robot of two links with something else in it."""
@@ -224,12 +226,24 @@ def with_more(name: str) -> str:
         (but("0 0 1", "0 1"), "joint 'j': axis must be 3 finite numbers, not '0 1'"),
         (
             but("revolute", "planar"),
-            "joint 'j': type 'planar' is not supported; there are revolute, continuous, fi",
+            "joint 'j': type 'planar' is not supported; there are revolute, continuous, pr",
         ),
-        (but("revolute", "fixed"), "joints: the URDF has no joint that turns, so nothing can be controlled"),
-        (but("revolute", "prismatic"), "joints: the URDF has no joint that turns, so nothing can be controlled"),
+        (but("revolute", "fixed"), "joints: the URDF has no joint that turns or slides, so nothing can be controlled"),
+        (
+            SLIDE.replace("effort='1'", "effort='1e6'"),
+            "joints.j: has effort 1e+06, a placeholder; write its motor's peak force [N] in <limit>, or in a robot",
+        ),
+        (SLIDE.replace("velocity='1'", ""), "joints.j: has no velocity; write its motor's speed without load [m/s] in"),
+        (
+            SLIDE.replace("upper='1'", "upper='100'"),
+            "joints.j: its limits are -1 and 100 m, a placeholder; write lower",
+        ),
+        (SLIDE.replace("lower='-1' upper='1'", ""), "joints.j: has no range; write lower and upper [m] in <limit>, or"),
         (but("mass value='1'", "mass value='0'"), "joints.j: it moves the link 'b', which has no mass; give that an"),
-        (but("izz='1'", "izz='-1'"), "link 'b': a mass or a principal moment of inertia is negative; no body is like"),
+        (
+            but("izz='1'", "izz='-1'"),
+            "joints.j: it moves the link 'b', with a principal moment of inertia of -1",
+        ),
         (but("izz='1'", ""), "link 'b': <inertia> lacks izz"),
         (with_more("j"), "two joints are called 'j'"),
         (with_more("k"), "it is no tree: b is the child of two joints"),
@@ -258,7 +272,7 @@ def test_a_urdf_that_describes_no_robot(text: str, line: str, tmp_path: Path) ->
         ("urdf: arm.urdf\njoints: {elbo: {}}", "joints.elbo: the URDF has no such joint; did you mean elbow?"),
         ("urdf: arm.urdf\njoints: {elbow: {kp: -1}}", "joints.elbow.kp = -1: must be above 0"),
         ("urdf: arm.urdf\njoints: {elbow: 3}", "joints.elbow = 3: must map its settings to values"),
-        ("urdf: arm.urdf\njoints: {slide: {}}", "joints.slide: is prismatic; only joints that turn can be controlled"),
+        ("urdf: arm.urdf\njoints: {slide: {}}", "joints.slide: follows left_finger (<mimic>); control that one"),
         ("urdf: arm.urdf\njoints: {right_finger: }", "joints.right_finger: follows left_finger (<mimic>); control"),
         ("urdf: arm.urdf\nheld: {wrist: 1}", "held.wrist: the URDF has no such joint"),
         ("urdf: arm.urdf\nheld: {elbow: 1}", "held.elbow: the joint is controlled; leave it out"),
