@@ -11,6 +11,7 @@ The same for one robot and for robots side by side (`lanes`): then what changes 
 
 A desired speed and a feed-forward torque are zero unless the commands have columns of them. They come with the target
 and are as late; smoothing and rounding are of the target alone. With kp = 0 a servo follows a speed or bears a torque.
+Shares of kp and kd come in two more columns where gains are sent row by row.
 
 A learned law, if there is one, adds to u and to the torque (gsl/core/servo_law.py).
 
@@ -54,6 +55,7 @@ from gsl.worlds.servo_state import (
 )
 
 BRISTLE = 1e-3  # deflection at which dry friction slips [rad]: below an encoder's noise, stable at 2 ms with our rotors
+BESIDE = 3  # columns a motor before the shares of its gains: target, desired speed, feed-forward torque
 STOP_STIFFNESS, STOP_DAMPING = 500.0, 2.0  # of a hard stop [N·m/rad], [N·m·s/rad]: stable at 2 ms with our rotors
 
 
@@ -138,10 +140,14 @@ def compute_wanted_torque(
     """Return the torque that motor i's servo wants and what a learned law adds at the output [N·m]."""
     parameters = servos.rows
     error -= min(parameters[ROW.deadband, i], max(-parameters[ROW.deadband, i], error))
-    u, output = compute_gain(parameters, state, i, elapsed) * error - parameters[ROW.kd, i] * v, 0.0 * v
-    if state.commands.shape[1] > motion.shape[1]:
-        speed, feed = command_beside(parameters, state.commands, i, motion.shape[1], elapsed, step, period)
+    gain, motors = compute_gain(parameters, state, i, elapsed), motion.shape[1]
+    u, output = gain * error - parameters[ROW.kd, i] * v, 0.0 * v
+    if state.commands.shape[1] > motors:
+        speed, feed = command_beside(parameters, state.commands, i, motors, elapsed, step, period)
         u += parameters[ROW.kd, i] * speed + feed
+        if state.commands.shape[1] > BESIDE * motors:
+            of_kp, of_kd = gain_shares(parameters, state.commands, i, motors, elapsed, step, period)
+            u += (of_kp - 1.0) * gain * error + (of_kd - 1.0) * parameters[ROW.kd, i] * (speed - v)
     if parameters[GROUP, i] != NOBODY:
         since = elapsed - parameters[ROW.delay, i]
         for k in range(LAGS):
@@ -214,6 +220,18 @@ def command_beside(
     start, length = (elapsed - parameters[ROW.delay, i]) / period, step / period
     speed = delay_command(commands, motors + i, start, length)
     return speed, delay_command(commands, 2 * motors + i, start, length)
+
+
+@compile_kernel
+def gain_shares(
+    parameters: np.ndarray, commands: np.ndarray, i: int, motors: int, elapsed: float, step: float, period: float
+) -> tuple[float, float]:
+    """Return which shares of its kp and kd motor i is sent, as late as its target is; 1 where none are sent."""
+    start, length, whole = (elapsed - parameters[ROW.delay, i]) / period, step / period, 1.0 + 0.0 * commands[0, i]
+    if commands.shape[1] <= BESIDE * motors:
+        return whole, whole
+    of_kp = delay_command(commands, BESIDE * motors + i, start, length)
+    return of_kp, delay_command(commands, (BESIDE + 1) * motors + i, start, length)
 
 
 @compile_kernel
