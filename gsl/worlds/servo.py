@@ -29,7 +29,7 @@ from gsl.core.compiled import compile_kernel
 from gsl.core.lanes import where
 from gsl.core.servo import ROW
 from gsl.core.servo_law import LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, act, network
-from gsl.worlds.drive_train import limit_torque, through_gear
+from gsl.worlds.drive_train import limit_torque, stop_torque, through_gear
 from gsl.worlds.encoder import REMEMBERED, read_encoder
 from gsl.worlds.servo_state import (
     BENT,
@@ -56,7 +56,6 @@ from gsl.worlds.servo_state import (
 
 BRISTLE = 1e-3  # deflection at which dry friction slips [rad]: below an encoder's noise, stable at 2 ms with our rotors
 BESIDE = 3  # columns a motor before the shares of its gains: target, desired speed, feed-forward torque
-STOP_STIFFNESS, STOP_DAMPING = 500.0, 2.0  # of a hard stop [N·m/rad], [N·m·s/rad]: stable at 2 ms with our rotors
 
 
 @compile_kernel
@@ -227,11 +226,10 @@ def gain_shares(
     parameters: np.ndarray, commands: np.ndarray, i: int, motors: int, elapsed: float, step: float, period: float
 ) -> tuple[float, float]:
     """Return which shares of its kp and kd motor i is sent, as late as its target is; 1 where none are sent."""
-    start, length, whole = (elapsed - parameters[ROW.delay, i]) / period, step / period, 1.0 + 0.0 * commands[0, i]
-    if commands.shape[1] <= BESIDE * motors:
-        return whole, whole
-    of_kp = delay_command(commands, BESIDE * motors + i, start, length)
-    return of_kp, delay_command(commands, (BESIDE + 1) * motors + i, start, length)
+    if commands.shape[1] <= BESIDE * motors:  # lanes where commands are
+        return 1.0 + 0.0 * commands[0, i], 1.0 + 0.0 * commands[0, i]
+    start, length, k = (elapsed - parameters[ROW.delay, i]) / period, step / period, BESIDE * motors + i
+    return delay_command(commands, k, start, length), delay_command(commands, k + motors, start, length)
 
 
 @compile_kernel
@@ -277,7 +275,10 @@ def output_torque(
     friction = parameters[ROW.viscous, i] * v + _dry(parameters, memory, i, v, through, step) - output
     memory[DRIVE, i], memory[THROUGH, i], memory[FRICTION, i], memory[SPEED, i] = drive, through, friction, v
     return (
-        through - friction + _stop(q - parameters[ROW.upper_stop, i], v) - _stop(parameters[ROW.lower_stop, i] - q, -v)
+        through
+        - friction
+        + stop_torque(q - parameters[ROW.upper_stop, i], v)
+        - stop_torque(parameters[ROW.lower_stop, i] - q, -v)
     )
 
 
@@ -296,9 +297,3 @@ def _dry(parameters: np.ndarray, memory: np.ndarray, i: int, v: float, through: 
     bent, free = min(BRISTLE, max(-BRISTLE, memory[BENT, i] + v * step)), size == 0.0
     memory[BENT, i] = where(free, memory[BENT, i], bent)
     return where(free, 0.0, size * bent / BRISTLE)
-
-
-@compile_kernel
-def _stop(beyond: float, v: float) -> float:
-    """Return the torque of a stop that only pushes back [N·m], `beyond` it [rad] at speed v away from it."""
-    return where(beyond > 0.0, -max(0.0, STOP_STIFFNESS * beyond + STOP_DAMPING * v), 0.0)
