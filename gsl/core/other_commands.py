@@ -73,9 +73,9 @@ def split_other_commands(commands: np.ndarray, motors: int) -> tuple[np.ndarray,
         motors: n_motors.
     """
     zero = np.zeros((*commands.shape[:-1], motors))
-    parts = np.split(commands, commands.shape[-1] // motors, axis=-1)[1:]
-    speed, torque, kp, kd = [*parts, *(zero, zero, zero + 1.0, zero + 1.0)[len(parts) :]]
-    return speed, torque, kp, kd
+    parts = list(np.split(commands, commands.shape[-1] // motors, axis=-1))[1:]
+    parts += [zero, zero, zero + 1.0, zero + 1.0][len(parts) :]
+    return parts[0], parts[1], parts[2], parts[3]
 
 
 def _columns(episode: Trajectory, group: str, robot: Robot, none: np.ndarray) -> np.ndarray:
