@@ -151,7 +151,7 @@ def fit(model: str, logs: Logs, evaluations: int, seed: int) -> tuple[Mapping[st
     rng, middle = np.random.default_rng(seed), np.full(len(names), 0.5)
     quick = {"tolfun": SETTLED, "tolfunhist": SETTLED}
     starts: list[tuple[Any, dict[str, float]]] = [(middle, {}), (lambda: rng.random(len(names)), quick)]
-    ends: list[tuple[float, Mapping[str, float]]] = []
+    ends: list[tuple[float, dict[str, float]]] = []
     for start, more in starts:
         best, _ = cma.fmin2(
             lambda x: score(to_law(unfold(x)), logs), start, SIGMA, options | more, bipop=True, restarts=RESTARTS
