@@ -15,6 +15,7 @@ STUDIES = {
     "worlds": "The best groundings in worlds that took no part in their choice.",
     "servo": "A learned servo against noise, effects and no grounding, in five worlds.",
     "servos": "Published servo models of the SO-101 and the XL330 against ours, on real motions.",
+    "bam": "The servo models of Rhoban/bam refitted by its own rules, one gain held out.",
     "motion": "Groundings where the real joints lag and are as stiff as the simulated ones.",
     "table3": "Three iterations with either of two simulators, beside the paper's table 3.",
     "table4": "Uneven ground, two grounding steps, beside the paper's table 4.",

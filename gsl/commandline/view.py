@@ -11,7 +11,7 @@ import numpy as np
 
 from gsl.commandline.film import Cast, Subject, assemble, read_settings
 from gsl.core.body import Robot
-from gsl.core.other_commands import read_other_commands
+from gsl.core.other_commands import find_varying_gains, read_other_commands
 from gsl.core.plant import nominal
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
@@ -96,7 +96,8 @@ def replay_in_the_air(robot: Robot, joints: Sequence[str], trajectory: Trajector
         start[robot.controlled.index(name)] = trajectory.position[0, k]
     held = Held.of(nominal(robot), fitting_step(BulletWorld.step, period), period)
     settle = max(round(BulletWorld.settle / period), 1)
-    sent, others = targets[:, robot.drive], read_other_commands(trajectory, robot)
+    varies = next(find_varying_gains([trajectory.sensors], joints), None) is not None
+    sent, others = targets[:, robot.drive], read_other_commands(trajectory, robot, gains=varies)
     if others.any():
         sent, settle = np.hstack([sent, others]), 1  # a speed or a torque is not held before the log begins
     [answer] = held.play([sent], [start[robot.drive]], settle)

@@ -2,11 +2,13 @@
 
 Body, limits, the speed at which torque vanishes and, where a source has none, the rotor's inertia are ours.
 
-Sources, all Apache-2.0 but the second (BSD-3-Clause):
+Sources, all Apache-2.0 but W and D (BSD-3-Clause):
     R  TheRobotStudio/SO-ARM100, Simulation/SO101/joints_properties.xml at 53f2b75, taken from Open_Duck_Playground:
        kp 17.8, kv 0, forces up to 3.35 N·m. Its damping of .60 is the world's.
     W  isaac-sim/Sim-to-Real-SO-101-Workshop, assets/so101.py, `workshop`: gains by hand, 30 N·m, no friction, no rotor.
     A  the same file, `anchorbench_sysid`: the system identification that Isaac Lab's SO-101 has since #7483.
+    D  nvidia/Anchor-Lab, robot_assets/so101_no_camera_new_calib.usd: the drives in the file, which Isaac Lab's keyboard
+       task has as profile `usd_drive`: 100 and 1 for all joints, 10 N·m, no friction, no rotor.
     T  NVIDIA/so101-typing-task, tasks/SO101/data/gtc_berlin.yaml at 7aec2ed: a system identification of another arm,
        best mean squared error 1.07e-4 rad²; it has no limit of the torque, which is that of A here.
     B  Rhoban/bam, params/feetech_sts3215_7_4V (7.4 V) and feetech/actuator.py, here at the register P of 16 that the
@@ -42,6 +44,11 @@ def so101_anchor_lab() -> Robot:
         3.35,
         [0.067620, 0.027645, 0.037720, 0.050714, 0.054898, 0.077625],
     )
+
+
+def so101_usd_drive() -> Robot:
+    """Return the arm with the drives of NVIDIA's USD file, D."""
+    return _arm([100.0] * 6, [1.0] * 6, 10.0, [ARMATURE] * 6)
 
 
 def so101_typing_task() -> Robot:

@@ -65,7 +65,7 @@ def audit_log(batch: Batch, sim: BulletWorld, name: str) -> Found:
     """Audit a log that a diagnosis, too, would take.
 
     Raises:
-        InputError: It is of another robot, or its gains vary.
+        InputError: It is of another robot, or its gains cannot be.
     """
     check_joints(batch, lump(sim.plant.robot), name)
     sim = with_logged_gains(sim, [episode.sensors for episode in batch.episodes], name)

@@ -18,7 +18,7 @@ from gsl.core.trajectory import Batch
 from gsl.diagnosis.design.next_experiment import write_next_experiment
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.log.files import check_log, clock_caveat, log_parents, on_ground, read_logs, share_clock
-from gsl.diagnosis.log.gains import with_logged_gains
+from gsl.diagnosis.log.gains import unseen_gains, with_logged_gains
 from gsl.diagnosis.options import Clocks, Duels, Most, Nulls, Options, PhaseReporter, Tolerance, Without
 from gsl.diagnosis.simulate.simulator import compare_with_bullet
 from gsl.diagnosis.verdict.document import document
@@ -98,7 +98,7 @@ class Diagnose:
             raise InputError(
                 "a reference calibrates logs in the air only; leave reference= out, or log the robot in the air"
             )
-        if warning := self._stranger(logs["real"]):
+        for warning in self._warnings(logs["real"]):
             console.status(f"warning: {warning}")
         tick, options = PhaseReporter(console), self._options(logs["real"])
         plant, step = self.sim.plant, self.sim.step
@@ -123,6 +123,11 @@ class Diagnose:
         if said.lower() in ("", ours.lower(), self.sim.robot.lower()):
             return None
         return f"The log says that it is of the robot {said}, the simulator is {ours}: only the joints' names agree."
+
+    def _warnings(self, batch: Batch) -> Sequence[str]:
+        """Return what the log says of its robot, or does not show, that a user of the result has to know."""
+        unseen = unseen_gains([episode.sensors for episode in batch.episodes], batch.joints)
+        return [*filter(None, [self._stranger(batch), unseen])]
 
     def _options(self, batch: Batch) -> Options:
         return Options(
@@ -159,7 +164,7 @@ class Diagnose:
         )
         if self.limits:
             report["limits"] = [asdict(limit) for limit in limits(findings, report["shrinkage"], tick)]
-        report["caveats"] += filter(None, [*remarks, self._stranger(batch), clock_caveat(batch, self.clocks)])
+        report["caveats"] += filter(None, [*remarks, *self._warnings(batch), clock_caveat(batch, self.clocks)])
         documents.write_json(folder / REPORT, report)
         (folder / PAGE).write_text(report_html(report), encoding="utf-8")
         (folder / WORLD).parent.mkdir()

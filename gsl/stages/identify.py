@@ -16,7 +16,7 @@ from gsl.core.described import describe
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.diagnosis.log.files import log_parents, read_motions
-from gsl.diagnosis.log.gains import with_logged_gains
+from gsl.diagnosis.log.gains import unseen_gains, with_logged_gains
 from gsl.diagnosis.options import Options, Without
 from gsl.diagnosis.search.reference import Nominal
 from gsl.diagnosis.simulate.calibration import no_shifts
@@ -67,6 +67,8 @@ class Identify:
         sim = with_logged_gains(self.sim, [record.sensors for record in log.records], self.real)
         if sim is not self.sim:
             return replace(self, sim=sim).run(folder, console)
+        if warning := unseen_gains([record.sensors for record in log.records], log.joints):
+            console.status(f"warning: {warning}")
         options = Options(self.without, threads=threads(self.workers))
         problem = Nominal(self.sim.plant, self.sim.step).problem(log, options, lambda phase: checkpoint())
         with console.progress(self.evaluations, "fitting all parameters at once") as progress:

@@ -15,7 +15,7 @@ from gsl.core.console import Console
 from gsl.core.described import describe
 from gsl.core.setting import component, setting
 from gsl.diagnosis.log.files import check_log, log_parents, on_ground, read_logs, read_motions
-from gsl.diagnosis.log.gains import with_logged_gains
+from gsl.diagnosis.log.gains import unseen_gains, with_logged_gains
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Tolerance
 from gsl.errors import ConfigError, InputError
@@ -79,6 +79,8 @@ class TrainServo:
         sim = with_logged_gains(self.sim, [record.sensors for record in exp.records], self.real)
         if sim is not self.sim:
             return replace(self, sim=sim).run(folder, console)
+        if warning := unseen_gains([record.sensors for record in exp.records], exp.joints):
+            console.status(f"warning: {warning}")
         if len(exp.held_out) < 2:
             raise InputError(f"{self.real}: one window is held out; a servo needs two, to stop by and to check by")
         exp = exp.with_model_error(np.full(len(exp.joints), self.tolerance))

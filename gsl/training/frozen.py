@@ -17,7 +17,7 @@ class Frozen(NamedTuple):
     """Windows of a log with their rigid-body terms; W windows, T control periods, n motors, of which m are logged.
 
     Attributes:
-        commands: Newest first, see `Windows`, shape (W, T + COMMANDS - 1, n) or three times as wide.
+        commands: Newest first, see `Windows`, shape (W, T + COMMANDS - 1, n), or three or five times as wide.
         motion: At the beginning [rad], [rad/s], shape (W, 2, n).
         clock: Time since the episode began, at the beginning [s], shape (W,).
         mobility: Inverse mass matrix in the middle of each period [1/(kg·m²)], shape (W, T, n, n).

@@ -25,7 +25,16 @@ from gsl.training.gradient import (
 )
 from gsl.training.replay_path import ERROR, OUTPUT, RATE, WANTED, Moment
 from gsl.worlds.drive_train import ROTOR_SHARE
-from gsl.worlds.servo import command_beside, compute_current, compute_gain, delay_command, output_torque, supply_share
+from gsl.worlds.servo import (
+    BESIDE,
+    command_beside,
+    compute_current,
+    compute_gain,
+    delay_command,
+    gain_shares,
+    output_torque,
+    supply_share,
+)
 from gsl.worlds.servo_state import (
     BENT,
     FRICTION,
@@ -196,14 +205,19 @@ def feedback_back(rows: np.ndarray, state: ServoState, now: Moment, adjoint: Adj
     """
     seen, held, sensed, length = now.seen, adjoint.held, adjoint.sensed, now.step / now.period
     for i in range(seen.shape[1]):
-        gain, error, by_u = compute_gain(rows, state, i, now.elapsed), seen[ERROR, i], adjoint.wanted[i]
+        error, by_u, motors = seen[ERROR, i], adjoint.wanted[i], seen.shape[1]
+        of_kp, of_kd = gain_shares(rows, state.commands, i, motors, now.elapsed, now.step, now.period)
+        gain, kd = of_kp * compute_gain(rows, state, i, now.elapsed), of_kd * rows[ROW.kd, i]
         by_error = where(abs(error) > rows[ROW.deadband, i], gain * by_u, 0.0)
-        by_v = -rows[ROW.kd, i] * by_u
+        by_v = -kd * by_u
         kept = error - min(rows[ROW.deadband, i], max(-rows[ROW.deadband, i], error))
         numbers[BY_KP, i] += by_u * gain * kept
         numbers[BY_KD, i] += by_v * seen[RATE, i]
-        if state.commands.shape[1] > seen.shape[1]:
-            _beside_back(rows, state.commands, i, seen.shape[1], now, by_u, numbers)
+        if state.commands.shape[1] > motors:
+            _beside_back(rows, state.commands, i, now, by_u, kd, numbers)
+            if state.commands.shape[1] > BESIDE * motors:
+                by_kp, by_kd = by_u * compute_gain(rows, state, i, now.elapsed) * kept, by_u * rows[ROW.kd, i]
+                _shares_back(rows, state.commands, i, now, by_kp, by_kd, numbers)
         numbers[BY_DEADBAND, i] -= where(error > 0.0, by_error, -by_error)
         start = (now.elapsed - rows[ROW.delay, i]) / now.period
         by_target = _filter_back(rows, held, i, by_error, now.step)
@@ -214,15 +228,27 @@ def feedback_back(rows: np.ndarray, state: ServoState, now: Moment, adjoint: Adj
 
 @compile_inner
 def _beside_back(
-    rows: np.ndarray, commands: np.ndarray, i: int, motors: int, now: Moment, by_u: float, numbers: np.ndarray
+    rows: np.ndarray, commands: np.ndarray, i: int, now: Moment, by_u: float, kd: float, numbers: np.ndarray
 ) -> None:
-    """Add what motor i's desired speed and feed-forward torque make of kd and of the delay."""
-    start, length, kd = (now.elapsed - rows[ROW.delay, i]) / now.period, now.step / now.period, rows[ROW.kd, i]
+    """Add what motor i's desired speed and feed-forward torque make of kd, as it is sent, and of the delay."""
+    start, length, motors = (now.elapsed - rows[ROW.delay, i]) / now.period, now.step / now.period, now.seen.shape[1]
     speed, _ = command_beside(rows, commands, i, motors, now.elapsed, now.step, now.period)
     later = kd * slope_by_delay(commands, motors + i, start, length)
     later += slope_by_delay(commands, 2 * motors + i, start, length)
     numbers[BY_KD, i] += by_u * kd * speed
     numbers[BY_DELAY, i] += by_u * later / now.period
+
+
+@compile_inner
+def _shares_back(
+    rows: np.ndarray, commands: np.ndarray, i: int, now: Moment, by_kp: float, by_kd: float, numbers: np.ndarray
+) -> None:
+    """Add what the shares of motor i's gains make of the delay: `by_kp` a share of kp, `by_kd` one of kd and speed."""
+    start, length, motors = (now.elapsed - rows[ROW.delay, i]) / now.period, now.step / now.period, now.seen.shape[1]
+    speed, _ = command_beside(rows, commands, i, motors, now.elapsed, now.step, now.period)
+    later = by_kp * slope_by_delay(commands, BESIDE * motors + i, start, length)
+    later += by_kd * (speed - now.seen[RATE, i]) * slope_by_delay(commands, (BESIDE + 1) * motors + i, start, length)
+    numbers[BY_DELAY, i] += later / now.period
 
 
 @compile_inner

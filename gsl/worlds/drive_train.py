@@ -1,4 +1,4 @@
-"""What lies between the motor's current and the joint's output: torque limits, and a rotor behind play or a spring."""
+"""What lies between the motor's current and the joint's output: torque limits, stops, and a rotor behind a spring."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ TOOTH_STIFFNESS = 300.0  # of the gear teeth in contact, if there is play [N·m/
 STIFFEST = 1e-3  # compliance below which a spring counts as rigid, for at 2 ms it would not be stable [rad/(N·m)]
 ROTOR_SHARE = 0.7  # of the armature that is beyond the play; the rest moves with the output and keeps 2 ms stable
 SUBSTEPS = 8
+STOP_STIFFNESS, STOP_DAMPING = 500.0, 2.0  # of a hard stop [N·m/rad], [N·m·s/rad]: stable at 2 ms with our rotors
 DAMPING = 0.2  # of the teeth or the spring, as a share of sqrt(stiffness · inertia)
 
 
@@ -68,3 +69,9 @@ def through_gear(
         passed += push / SUBSTEPS
     rotor[0, i], rotor[1, i] = angle, speed
     return passed
+
+
+@compile_inner
+def stop_torque(beyond: float, v: float) -> float:
+    """Return the torque of a stop that only pushes back [N·m], `beyond` it [rad] at speed v away from it."""
+    return where(beyond > 0.0, -max(0.0, STOP_STIFFNESS * beyond + STOP_DAMPING * v), 0.0)

@@ -98,7 +98,7 @@ class Engine:
         Args:
             reading: Where the robot is and how it moves; forces are what follows, not what is set.
             commands: Commands so far, newest first, see `ServoState`: targets [rad], shape (k, n_motors), or others
-                beside them as well, shape (k, 3 n_motors); the oldest one stands for all before.
+                beside them as well, shape (k, 3 or 5 n_motors); the oldest one stands for all before.
             clock: Time since the episode began [s], negative before it.
             heights: Of an uneven ground, its middle where the robot is, see `ground.random_heights`.
             outside: Torques on the motors, in place of those that `run` is given.

@@ -31,7 +31,7 @@ class Windows(NamedTuple):
 
     Attributes:
         commands: Newest first, the last of the window to the oldest before it, see `ServoState`: targets [rad],
-            shape (W, T + COMMANDS - 1, n_motors), or other commands beside them, three times as wide.
+            shape (W, T + COMMANDS - 1, n_motors), or other commands beside them, three or five times as wide.
         motion: Positions [rad] and velocities [rad/s] at the beginning, shape (W, 2, n_motors).
         clock: Time since the episode began, at the beginning [s], shape (W,).
     """

@@ -11,6 +11,7 @@ The same for one robot and for robots side by side (`lanes`): then what changes 
 
 A desired speed and a feed-forward torque are zero unless the commands have columns of them. They come with the target
 and are as late; smoothing and rounding are of the target alone. With kp = 0 a servo follows a speed or bears a torque.
+Shares of kp and kd come in two more columns where gains are sent row by row.
 
 A learned law, if there is one, adds to u and to the torque (gsl/core/servo_law.py).
 
@@ -28,7 +29,7 @@ from gsl.core.compiled import compile_inner
 from gsl.core.lanes import where
 from gsl.core.servo import ROW
 from gsl.core.servo_law import LAG, LAGS, NOBODY, SIGN, SPEED_UNIT, act, network
-from gsl.worlds.drive_train import limit_torque, through_gear
+from gsl.worlds.drive_train import limit_torque, stop_torque, through_gear
 from gsl.worlds.encoder import REMEMBERED, read_encoder
 from gsl.worlds.servo_state import (
     BENT,
@@ -55,7 +56,7 @@ from gsl.worlds.servo_state import (
 )
 
 BRISTLE = 1e-3  # deflection at which dry friction slips [rad]: below an encoder's noise, stable at 2 ms with our rotors
-STOP_STIFFNESS, STOP_DAMPING = 500.0, 2.0  # of a hard stop [N·m/rad], [N·m·s/rad]: stable at 2 ms with our rotors
+BESIDE = 3  # columns a motor before the shares of its gains: target, desired speed, feed-forward torque
 
 
 @compile_inner
@@ -139,10 +140,14 @@ def compute_wanted_torque(
     """Return the torque that motor i's servo wants and what a learned law adds at the output [N·m]."""
     parameters = servos.rows
     error -= min(parameters[ROW.deadband, i], max(-parameters[ROW.deadband, i], error))
-    u, output = compute_gain(parameters, state, i, elapsed) * error - parameters[ROW.kd, i] * v, 0.0 * v
-    if state.commands.shape[1] > motion.shape[1]:
-        speed, feed = command_beside(parameters, state.commands, i, motion.shape[1], elapsed, step, period)
+    gain, motors = compute_gain(parameters, state, i, elapsed), motion.shape[1]
+    u, output = gain * error - parameters[ROW.kd, i] * v, 0.0 * v
+    if state.commands.shape[1] > motors:
+        speed, feed = command_beside(parameters, state.commands, i, motors, elapsed, step, period)
         u += parameters[ROW.kd, i] * speed + feed
+        if state.commands.shape[1] > BESIDE * motors:
+            of_kp, of_kd = gain_shares(parameters, state.commands, i, motors, elapsed, step, period)
+            u += (of_kp - 1.0) * gain * error + (of_kd - 1.0) * parameters[ROW.kd, i] * (speed - v)
     if parameters[GROUP, i] != NOBODY:
         since = elapsed - parameters[ROW.delay, i]
         for k in range(LAGS):
@@ -218,6 +223,17 @@ def command_beside(
 
 
 @compile_inner
+def gain_shares(
+    parameters: np.ndarray, commands: np.ndarray, i: int, motors: int, elapsed: float, step: float, period: float
+) -> tuple[float, float]:
+    """Return which shares of its kp and kd motor i is sent, as late as its target is; 1 where none are sent."""
+    if commands.shape[1] <= BESIDE * motors:  # lanes where commands are
+        return 1.0 + 0.0 * commands[0, i], 1.0 + 0.0 * commands[0, i]
+    start, length, k = (elapsed - parameters[ROW.delay, i]) / period, step / period, BESIDE * motors + i
+    return delay_command(commands, k, start, length), delay_command(commands, k + motors, start, length)
+
+
+@compile_inner
 def shape_target(parameters: np.ndarray, memory: np.ndarray, i: int, target: float, step: float) -> float:
     """Filter and round a target [rad]."""
     if parameters[ROW.smoothing, i] > 0.0:
@@ -260,7 +276,7 @@ def output_torque(
     friction = parameters[ROW.viscous, i] * v + _dry(parameters, memory, i, v, through, step) - output
     memory[DRIVE, i], memory[THROUGH, i], memory[FRICTION, i], memory[SPEED, i] = drive, through, friction, v
     above, below = q - parameters[ROW.upper_stop, i], parameters[ROW.lower_stop, i] - q
-    return through - friction + parameters[HARDNESS, i] * (_stop(above, v) - _stop(below, -v))
+    return through - friction + parameters[HARDNESS, i] * (stop_torque(above, v) - stop_torque(below, -v))
 
 
 @compile_inner
@@ -278,9 +294,3 @@ def _dry(parameters: np.ndarray, memory: np.ndarray, i: int, v: float, through: 
     bent, free = min(BRISTLE, max(-BRISTLE, memory[BENT, i] + v * step)), size == 0.0
     memory[BENT, i] = where(free, memory[BENT, i], bent)
     return where(free, 0.0, size * bent / BRISTLE)
-
-
-@compile_inner
-def _stop(beyond: float, v: float) -> float:
-    """Return the torque of a stop that only pushes back [N·m], `beyond` it [rad] at speed v away from it."""
-    return where(beyond > 0.0, -max(0.0, STOP_STIFFNESS * beyond + STOP_DAMPING * v), 0.0)

@@ -39,7 +39,7 @@ class ServoState(NamedTuple):
     Attributes:
         commands: Targets of the last control periods, newest first [rad], shape (COMMANDS, n_motors), or, where logs
             have other commands beside them, desired speeds [rad/s] and feed-forward torques [N·m] in further columns,
-            shape (COMMANDS, 3 n_motors).
+            shape (COMMANDS, 3 n_motors), and shares of kp and kd where gains vary, shape (COMMANDS, 5 n_motors).
         memory: Bristle deflection [rad]; rotor angle [rad] and speed [rad/s] as seen at the output; filtered target
             [rad]; at the last physics step: output speed [rad/s], motor torque, torque through the gear, friction
             [N·m]; bristle of the learned law [rad]; shape (MEMORY, n_motors).
@@ -82,7 +82,7 @@ def first_state(commands: np.ndarray, motion: np.ndarray, step: float, clock: fl
     """Return the state of servos in motion, their bristles slack, gaps centred and filters settled.
 
     Args:
-        commands: Commands so far, newest first, shape (k, n_motors) or (k, 3 n_motors), see `ServoState`; the oldest
+        commands: Commands so far, newest first, shape (k, n_motors) or wider, see `ServoState`; the oldest
             one is taken to be older still.
         motion: Positions [rad] and velocities [rad/s] at the output, shape (2, n_motors).
         step: Physics period [s].

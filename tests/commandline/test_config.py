@@ -86,8 +86,8 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
             "inverted_pendulum_heavy, inverted_pendulum_noisy, learned, nao_drawn_a, nao_drawn_b, nao_harsh, "
             "nao_ideal, nao_motors, nao_motors_late, nao_uneven, nao_weak, nao_weak_uneven, nao_worn, plain, robot, "
             "so101, so101_anchor_lab, so101_bam_m1, so101_bam_m3, so101_bam_m4, so101_diagnosed, so101_menagerie, "
-            "so101_robotstudio, so101_typing_task, so101_workshop, urdf, walker2d, walker2d_heavy, worn, xl330_bam_m1, "
-            "xl330_bam_m3, xl330_bam_m4, xl330_pendulum",
+            "so101_robotstudio, so101_typing_task, so101_usd_drive, so101_workshop, urdf, walker2d, walker2d_heavy, "
+            "worn, xl330_bam_m1, xl330_bam_m3, xl330_bam_m4, xl330_pendulum",
         ),
         (
             ["experiment=lng"],
@@ -249,8 +249,8 @@ OF_ENVIRONMENTS = {  # what is for gymnasium environments, or for files that som
 }
 HELD = (  # robots without feet
     *("go2_in_air", "so101", "so101_anchor_lab", "so101_bam_m1", "so101_bam_m3", "so101_bam_m4", "so101_diagnosed"),
-    *("so101_menagerie", "so101_robotstudio", "so101_typing_task", "so101_workshop", "urdf", "xl330_bam_m1"),
-    *("xl330_bam_m3", "xl330_bam_m4", "xl330_pendulum"),
+    *("so101_menagerie", "so101_robotstudio", "so101_typing_task", "so101_usd_drive", "so101_workshop", "urdf"),
+    *("xl330_bam_m1", "xl330_bam_m3", "xl330_bam_m4", "xl330_pendulum"),
 )
 EXAMPLE = Path(__file__).parents[2] / "examples/arm.urdf"
 # logs, with servos

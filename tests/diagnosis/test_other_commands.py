@@ -14,6 +14,7 @@ import yaml
 from commands import done
 from swinging_arm import FEW, NOISE, PERIOD, arm, motions
 
+from gsl.core.other_commands import read_other_commands
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.diagnose import diagnose
@@ -29,11 +30,11 @@ from gsl.worlds.held import Held
 pytestmark = pytest.mark.slow
 
 STEP = 0.002
-GROUPS = ("velocity_command", "torque_command")
+GROUPS = ("velocity_command", "torque_command", "kp_command", "kd_command")
 
 
 def log(effects: Mapping[str, Any]) -> Batch:
-    """What the arm with effects logs of commands of all three kinds."""
+    """What the arm with effects logs of commands of all kinds, its gains other ones from row to row."""
     robot, rng = arm(), np.random.default_rng(1)
     held = Held.of(apply_all(nominal(robot), build(effects)), STEP, PERIOD)
     return Batch(
@@ -47,9 +48,12 @@ def log(effects: Mapping[str, Any]) -> Batch:
 def played(held: Held, targets: np.ndarray, rng: np.random.Generator) -> Trajectory:
     time = PERIOD * np.arange(len(targets) + 1)
     waves = [size * np.sin(speed * time[:, None] + rng.uniform(0, 6, 2)) for size, speed in ((1.5, 7.0), (0.8, 11.0))]
-    others = np.hstack(waves)
-    path = held.play([np.hstack([targets, others[:-1]])], [targets[0]], settle=1)[0]
+    shares = [1.0 + size * np.sin(3.0 * time[:, None] + rng.uniform(0, 6, 2)) for size in (0.6, 0.3)]
+    sent = np.hstack([targets, *(wave[:-1] for wave in (*waves, *shares))])
+    path = held.play([sent], [targets[0]], settle=1)[0]
     position = path + NOISE * rng.standard_normal(path.shape)
+    own = nominal(arm()).servo
+    others = np.hstack([*waves, shares[0] * own.kp, shares[1] * own.kd])
     names = [f"{group}.{joint}" for group in GROUPS for joint in arm().controlled]
     return Trajectory(time, targets, position, 0.0 * position, sensors=dict(zip(names, others.T, strict=True)))
 
@@ -65,8 +69,10 @@ def residual(batch: Batch) -> float:
 def test_a_replay_leaves_noise_where_it_sends_what_was_sent() -> None:
     batch = log({})
     assert residual(batch) < 1.3
-    without = replace(batch, episodes=tuple(replace(one, sensors={}) for one in batch.episodes))
-    assert residual(without) > 10.0
+    for group in GROUPS:
+        sensors = [{key: row for key, row in one.sensors.items() if group not in key} for one in batch.episodes]
+        lacking = [replace(one, sensors=left) for one, left in zip(batch.episodes, sensors, strict=True)]
+        assert residual(replace(batch, episodes=tuple(lacking))) > 5.0, group
 
 
 def test_bullet_replays_the_same_commands() -> None:
@@ -102,9 +108,21 @@ def test_a_log_without_gains_or_with_those_of_the_simulator_changes_nothing() ->
         assert with_logged_gains(SIM, told, "log") is SIM
 
 
-def test_gains_that_vary_or_are_below_zero_are_refused_in_one_line() -> None:
-    with pytest.raises(GslError, match=r"log: kp_command\.joint varies from 0 to 8; replays take .* constant"):
-        with_logged_gains(SIM, columns(np.arange(9.0), np.full(9, KD)), "log")
+def test_gains_that_vary_are_sent_as_shares_of_the_robots_own_whatever_the_simulator_has() -> None:
+    other = replace(SIM, effects={"servo_gain": {"kp": 0.5}})
+    sensors = columns(KP * np.arange(9.0), np.full(9, 2.0 * KD))
+    sim = with_logged_gains(other, sensors, "log")
+    np.testing.assert_allclose([sim.plant.servo.kp[0], sim.plant.servo.kd[0]], [KP, KD])
+    zero = np.zeros((10, 1))
+    episode = Trajectory(np.arange(10.0), zero[:-1], zero, zero, sensors=sensors[0])
+    shares = read_other_commands(episode, SIM.plant.robot, gains=True)[:, 2:]
+    np.testing.assert_allclose(shares, np.stack([np.arange(9.0), np.full(9, 2.0)], axis=1))
+
+
+def test_gains_below_zero_or_of_servos_without_any_are_refused_in_one_line() -> None:
+    with pytest.raises(GslError, match=r"log: kp_command\.joint is 8, but kp of the simulator is 0"):
+        free = replace(SIM, effects={"servo_gain": {"kp": 0.0}})
+        with_logged_gains(free, columns(np.arange(9.0), np.full(9, KD)), "log")
     with pytest.raises(GslError, match=r"log: kd_command\.joint is -1; a gain is not below 0"):
         with_logged_gains(SIM, columns(np.full(9, KP), np.full(9, -1.0)), "log")
 
@@ -123,7 +141,9 @@ def test_a_log_of_torques_alone_is_replayed_with_servos_that_pull_to_no_position
     chosen = {"joints": ["joint"], "robot": "pendulum", "time": {"column": "t"}, "signals": signals}
     (tmp_path / "m.yaml").write_text(yaml.safe_dump(chosen))
     done("import", "source=log_*.csv", "mapping=m.yaml", "name=log", folder=tmp_path)
-    done("identify", "real=log", "sim=xl330_pendulum", "name=log", "evaluations=16", "workers=1", folder=tmp_path)
+    made = ("real=log", "sim=xl330_pendulum", "name=log", "workers=1")
+    said = done("identify", *made, "evaluations=16", folder=tmp_path)
+    assert "warning: This log never shows the gains of joint: kp is 0 in every row." in said.err
     world = yaml.safe_load((tmp_path / "runs/log/identify/world/identified.yaml").read_text())
     assert world["effects"]["servo_gain"][0] == {"kp": 0.0, "joints": "joint"}
     report = json.loads((tmp_path / "runs/log/identify/report.json").read_text())

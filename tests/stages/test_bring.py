@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import runpy
 import sys
 import zipfile
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import done, refused
+from pages import commands
 
 import gsl
 from gsl.effects.effect import names
@@ -21,28 +23,45 @@ from gsl.rollout.rl_env import GroundedSimulator
 from gsl.rollout.rollout import Scenario
 from gsl.storage.policies import read_policies
 
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore:::stable_baselines3")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore:::stable_baselines3"),
+    pytest.mark.filterwarnings("ignore:.*torch.jit:DeprecationWarning"),  # the format that Isaac Lab exports
+]
 sb3 = pytest.importorskip("stable_baselines3")
 
 ROOT = Path(__file__).parents[2]
-CONF = f"--config-dir={ROOT}/examples/bring/my_conf"
-TRUST = "trust=[examples.bring.mark,stable_baselines3]"
-MINE = (CONF, "task=mark", "policy=mine", TRUST, "workers=1")
-FEW = ("episodes=2", "check=2", "confirmation=2")
+PAGE = ROOT / "docs/howto/bring-a-policy.md"
+CONF = "--config-dir=examples/bring/my_conf"
+TRUST = "trust=[examples.bring.follow,stable_baselines3]"
+MINE = (CONF, "task=follow", "policy=mine", TRUST, "workers=1")
+STEPS = "1000"  # of every training
+FEW = ("episodes=2", "check=2", "confirmation=2", "workers=1")
+TRIED = sorted(set(names()) - {"command_latency", "coulomb_friction"})
+# What the page's commands are made smaller by; this table says all that is run otherwise than it is printed.
+SHRUNK = {
+    "wiring": (),
+    "collect": ("workers=1",),
+    "diagnose": ("most=1", "duels=0", "nulls=0", "limits=false", "workers=1", f"without={TRIED}"),
+    "evaluate": FEW,
+    "optimize": ("preset=toy", "workers=1"),
+    "iterate": (
+        "preset=toy", "optimizer.steps=500", "optimizer.generations=1", "optimizer.settings.n_steps=250",
+        "diagnosis.excitation.robot=pendulum", "accept=true", "workers=1",
+    ),
+}  # fmt: skip
+EXCITED = ("policy.motions=[steps_large,triangle_slow]", "task.duration=1.5")
 
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder in which a policy was trained in the plain simulator, and the other world was diagnosed."""
+    """A folder in which all commands of the page were run, in their order."""
     folder = tmp_path_factory.mktemp("bring")
+    (folder / "examples").symlink_to(ROOT / "examples")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(ROOT))
-        train(folder, 1000)
-        small = ("policy.motions=[steps_large,triangle_slow]", "task.duration=1.5", "workers=1")
-        done("collect", CONF, "world=real_pendulum", "task=excite", "name=mine", *small, folder=folder)
-        few = f"without={sorted(set(names()) - {'command_latency', 'coulomb_friction'})}"
-        quick = ("most=1", "duels=0", "nulls=0", "limits=false", "workers=1", few)
-        done("diagnose", CONF, "real=mine", "sim=plain_pendulum", "name=mine", *quick, folder=folder)
+        for command in ordered():
+            run(command, folder)
     return folder
 
 
@@ -51,19 +70,59 @@ def importable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(ROOT))
 
 
-def train(folder: Path, steps: int, *more: str) -> None:
-    """Run the example's own loop."""
+def ordered() -> list[tuple[str, ...]]:
+    """The page's commands; the wiring is looked at when there is a policy, and seeds have a test of their own."""
+    typed = [command.words for command in commands(PAGE)]
+    looked, rest = [words for words in typed if "wiring" in words], [words for words in typed if "wiring" not in words]
+    return [rest[0], *looked, *(words for words in rest[1:] if "examples/bring/seeds.py" not in words)]
+
+
+def run(words: tuple[str, ...], folder: Path) -> None:
+    """Run a command of the page at toy size."""
+    program, name, *rest = words
+    if program == "python":
+        script(name, *(STEPS if word.isdigit() else word for word in rest), folder=folder)
+        return
+    small = (*SHRUNK[name], *(EXCITED if "task=excite" in rest else ()))
+    done(name, *rest, *small, folder=folder)
+
+
+def script(path: str, *arguments: str, folder: Path) -> None:
+    """Run a script of the example."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setattr(sys, "argv", ["train.py", str(steps), *more])
-        runpy.run_path(str(ROOT / "examples/bring/train.py"), run_name="__main__")
+        patch.syspath_prepend(str(ROOT / "examples/bring"))
+        patch.setattr(sys, "argv", [path, *arguments])
+        runpy.run_path(str(ROOT / path), run_name="__main__")
 
 
-def test_the_users_own_loop_goes_on_in_the_grounded_simulator(home: Path) -> None:
-    train(home, 500, "mine")
-    for file in ("mine.zip", "better.zip"):
-        world = ("world=real_pendulum", f"policy.file={file}", "policies=null", f"name={file[:-4]}_real")
-        assert "pi0, fresh" in done("evaluate", *MINE, *world, *FEW, folder=home).out
+def test_the_whole_way_of_the_page_runs(home: Path) -> None:
+    for file in ("mine", "better"):
+        assert (home / f"{file}.zip").is_file() and (home / f"{file}.pt").is_file()
+    for name in ("plain", "before", "after", "trimmed", "exported"):
+        metrics = json.loads((home / f"runs/{name}/evaluate/metrics.json").read_text())
+        assert 0.0 < metrics["returned"]["value"] <= 150.0, name
+    assert (home / "runs/whole/iterate/policies.json").is_file()
+
+
+def test_the_two_files_of_an_actor_do_the_same(home: Path) -> None:
+    values = []
+    for policy, trust in (("mine", TRUST), ("mine_torch", "trust=examples.bring.follow")):
+        how = ("world=real_pendulum", "task=follow", f"policy={policy}", "policies=null", trust, f"name=of_{policy}")
+        done("evaluate", CONF, *how, *FEW, folder=home)
+        metrics = json.loads((home / f"runs/of_{policy}/evaluate/metrics.json").read_text())
+        values.append(metrics["returned"]["value"])
+    assert values[0] == pytest.approx(values[1], rel=1e-4)
+
+
+def test_seeds_are_a_row_each(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    script("examples/bring/train.py", STEPS, "--save", "mine_1", folder=tmp_path)
+    (tmp_path / "better_1.zip").write_bytes((tmp_path / "mine_1.zip").read_bytes())  # what is there is not trained
+    script("examples/bring/seeds.py", "1", folder=tmp_path)
+    row = capsys.readouterr().out.splitlines()[-1]
+    seed, plain, came, better = (float(value) for value in row.strip("| ").split("|"))
+    assert seed == 1.0 and came == better and 0.0 < came <= 150.0 and 0.0 < plain <= 150.0
 
 
 def test_optimizer_sb3_goes_on_with_the_zip_in_the_same_simulator(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -73,17 +132,8 @@ def test_optimizer_sb3_goes_on_with_the_zip_in_the_same_simulator(home: Path, mo
     done("optimize", *MINE, *grounded, *small, "rollouts=1", folder=home)
     start, first, second = read_policies(home / "runs/again/optimize/policies.json").records
     assert start.parameters != first.parameters != second.parameters
-    done("evaluate", *MINE, "world=real_pendulum", "name=again", *FEW, folder=home)
-    env = gsl.grounded_env("again", trust=["examples.bring.mark", "stable_baselines3"])
+    env = gsl.grounded_env("again", trust=["examples.bring.follow", "stable_baselines3"])
     sb3.PPO.load(home / "mine.zip", env=env).learn(500)
-
-
-def test_the_whole_chain_takes_a_policy_of_stable_baselines(home: Path) -> None:
-    worlds = ("sim=plain_pendulum", "real=real_pendulum", "grounding=effects", "preset=toy", "name=whole")
-    small = ("optimizer=sb3", "optimizer.steps=500", "optimizer.generations=1", "optimizer.settings.n_steps=250")
-    quick = ("diagnosis.excitation.robot=pendulum", "accept=true")
-    done("iterate", *MINE, *worlds, *small, *quick, folder=home)
-    assert (home / "runs/whole/iterate/policies.json").is_file()
 
 
 def scenario(policy: Sb3Policy) -> Scenario:
@@ -133,9 +183,9 @@ def test_parameters_are_the_actors_weights_alone(tmp_path: Path) -> None:
 
 
 def test_a_zip_is_not_opened_without_trust_and_its_own_settings_are_known(home: Path) -> None:
-    base = (CONF, "world=plain_pendulum", "task=mark", "policy=mine", "grounding=none", "optimizer=sb3")
-    said = refused("optimize", *base, "trust=examples.bring.mark", folder=home)
-    assert "say 'trust=[examples.bring.mark,stable_baselines3]'" in said
+    base = (CONF, "world=plain_pendulum", "task=follow", "policy=mine", "grounding=none", "optimizer=sb3")
+    said = refused("optimize", *base, "trust=examples.bring.follow", folder=home)
+    assert "say 'trust=[examples.bring.follow,stable_baselines3]'" in said
     said = refused("optimize", *base, TRUST, "optimizer.settings.learning_rat=1", "workers=1", folder=home, code=2)
     assert said.endswith("did you mean learning_rate?")
     with zipfile.ZipFile(home / "mine.zip") as file:

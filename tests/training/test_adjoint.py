@@ -109,12 +109,13 @@ def test_derivatives_by_the_numbers_are_those_of_differences(name: str, pieces: 
         assert off(gradient.numbers[row], direction, cost, ahead=ahead) < TOLERANCE.get(name, 2e-4), number
 
 
+@pytest.mark.parametrize("gains", [False, True])
 @pytest.mark.parametrize("name", ["nominal", "command"])
-def test_commands_beside_the_targets_are_part_of_the_derivatives(name: str, pieces: Pieces) -> None:
+def test_commands_beside_the_targets_are_part_of_the_derivatives(name: str, gains: bool, pieces: Pieces) -> None:
     plant, rng = with_fields(NAO, BASES[name] | {"delay": 0.013}), np.random.default_rng(4)
-    wide = np.concatenate(
-        [pieces.windows.commands, rng.standard_normal((*pieces.windows.commands.shape[:2], 2 * N))], axis=2
-    )
+    targets, rows = pieces.windows.commands, pieces.windows.commands.shape[:2]
+    shares = [rng.uniform(0.5, 1.5, (*rows, 2 * N))] if gains else []
+    wide = np.concatenate([targets, rng.standard_normal((*rows, 2 * N)), *shares], axis=2)
     added, data = (
         some_law(plant),
         freeze(plant, replace(pieces, windows=pieces.windows._replace(commands=wide)), FLOOR, PERIOD),

@@ -13,7 +13,12 @@ from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Robot
-from gsl.core.other_commands import has_other_commands, read_other_commands
+from gsl.core.other_commands import (
+    find_varying_gains,
+    has_other_commands,
+    read_other_commands,
+    split_other_commands,
+)
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.transitions import usable
 from gsl.errors import GslError
@@ -41,7 +46,7 @@ class Record:
         sensors: Further columns of the log by name, each of shape (T + 1,).
         about: What the log says of the trajectory: its label.
         beside: Desired speeds [rad/s], then feed-forward torques [N·m], that came with the targets, shape
-            (T, 2 n_motors); None where no trajectory of the log has any.
+            (T, 2 n_motors), and shares of kp and kd where gains vary, (T, 4 n_motors); None where the log has none.
     """
 
     name: str
@@ -56,7 +61,7 @@ class Record:
 
     @property
     def commands(self) -> np.ndarray:
-        """All that the servos were sent, shape (T, n_motors), or (T, 3 n_motors) with what came beside the targets."""
+        """All that the servos were sent, shape (T, n_motors), or 3 or 5 times as wide with what came beside."""
         return self.targets if self.beside is None else np.hstack([self.targets, self.beside])
 
     @property
@@ -108,16 +113,17 @@ def to_records(batch: Batch, robot: Robot, *, walking: bool = False) -> tuple[Re
     labels = batch.metadata.get("episodes") or []
     labels = labels if len(labels) == len(batch) else [{}] * len(batch)
     order = [batch.joints.index(joint) for joint in robot.controlled]
+    varies = next(find_varying_gains([episode.sensors for episode in batch.episodes], batch.joints), None) is not None
     wide = has_other_commands(batch)
     return tuple(
-        _to_record(label, episode, order, robot, batch.control_period, walking=walking, wide=wide)
+        _to_record(label, episode, order, robot, batch.control_period, walking=walking, wide=wide, gains=varies)
         for label, episode in zip(labels, batch.episodes, strict=True)
     )
 
 
 def _to_record(
     label: Mapping[str, Any], episode: Trajectory, order: Sequence[int], robot: Robot, period: float, *,
-    walking: bool, wide: bool,
+    walking: bool, wide: bool, gains: bool,
 ) -> Record:  # fmt: skip
     ticks = usable(episode)
     position = episode.position[: ticks + 1, order]
@@ -126,7 +132,7 @@ def _to_record(
     feet = _columns(episode, "foot_force", ("left", "right"))[: ticks + 1] > LOADED if steps else None
     sensors = {column: values[: ticks + 1] for column, values in episode.sensors.items()}
     targets = episode.action[:ticks][:, order][:, robot.drive]
-    beside = read_other_commands(episode, robot)[:ticks] if wide else None
+    beside = read_other_commands(episode, robot, gains=gains)[:ticks] if wide else None
     name = str(label.get("policy", ""))
     return Record(name, targets, position, slope(position, period), base, feet, sensors, label, beside)
 
@@ -218,12 +224,10 @@ class Pieces:
         """Return what the first joints were commanded in each control period [rad], shape (W, T, joints)."""
         return self.windows.commands[:, : self.real.shape[1], :joints][:, ::-1]
 
-    def beside(self, joints: int) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return desired speeds [rad/s] and feed-forward torques [N·m] as `targets` are, None if there are none."""
+    def beside(self, joints: int) -> tuple[np.ndarray, ...]:
+        """Return desired speeds [rad/s], feed-forward torques [N·m] and shares of kp and kd, each as `targets` are."""
         commands, motors = self.windows.commands[:, : self.real.shape[1]][:, ::-1], self.windows.motion.shape[2]
-        if commands.shape[2] == motors:
-            return None
-        return commands[..., motors : motors + joints], commands[..., 2 * motors : 2 * motors + joints]
+        return tuple(part[..., :joints] for part in split_other_commands(commands, motors))
 
     def take(self, index: np.ndarray) -> Pieces:
         """Return some of the windows."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gsl.core.other_commands import split_other_commands
 from gsl.core.plant import Plant
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.log.log import Log
@@ -122,6 +123,6 @@ def _torque(plant: Plant, record: Record) -> np.ndarray:
     """Return what servos ask for at each command [N·m], latency and friction apart, shape (T, n_motors)."""
     servo, drive = change(plant, record.conditions).servo, plant.robot.drive
     error = record.targets + servo.offset - record.position[:-1][:, drive]
-    speed, feed = (0.0, 0.0) if record.beside is None else np.hsplit(record.beside, 2)
-    wanted = servo.kp * error + servo.kd * (speed - record.velocity[:-1][:, drive]) + feed
+    speed, feed, of_kp, of_kd = split_other_commands(record.commands, len(drive))
+    wanted = of_kp * servo.kp * error + of_kd * servo.kd * (speed - record.velocity[:-1][:, drive]) + feed
     return np.clip(wanted, -servo.limit, servo.limit)

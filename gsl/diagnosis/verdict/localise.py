@@ -87,9 +87,10 @@ def find_regimes(log: Log, plant: Plant, settings: LocaliseSettings | None = Non
     kp, kd, limit, no_load = _servos(cut, plant, n)
     real = cut.real[..., :n]
     speed = _smooth(np.gradient(real, log.period, axis=1))
-    wanted = kp * (cut.targets(n) - real)
-    if (beside := cut.beside(n)) is not None:
-        wanted += kd * (beside[0] - speed) + beside[1]
+    sent_speed, torque, of_kp, of_kd = cut.beside(n)
+    wanted = of_kp * kp * (cut.targets(n) - real) + torque
+    if sent_speed.any() or torque.any():
+        wanted += of_kd * kd * (sent_speed - speed)
     wanted = np.abs(wanted) / limit
     share = np.abs(speed) / no_load
     tick = cut.tick[:, None] + np.arange(real.shape[1])
