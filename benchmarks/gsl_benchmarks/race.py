@@ -78,8 +78,8 @@ def race_again(played: Played, error: float, races: int = RACES) -> Raced:
         there = np.isfinite(race.values)
         winner = np.argmax(np.where(there.all(axis=1), whole, -np.inf))
         another = float(winner != np.argmax(whole))
-        right, given = weigh(whole), weigh(race.worths)
-        change = ((given - right) ** 2).sum() / (right**2).sum()
+        weights = weigh(whole)
+        change = ((weigh(race.worths) - weights) ** 2).sum() / (weights**2).sum()
         races_run.append((another, there.mean(), played.steps[there].sum() / played.steps.sum(), change))
     return Raced(*(float(share) for share in np.mean(races_run, axis=0)))
 

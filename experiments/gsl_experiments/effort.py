@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING
 
-from gsl.core.interfaces import REAL, SIM, Search
+from gsl.core.interfaces import REAL, SIM, Search, World
 from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.effects import is_learned
@@ -76,15 +77,20 @@ def seconds(study: Compare, *, search: bool = True) -> float:
     return (rolled / workers + fitted) * study.trials * len(sims)
 
 
-def seconds_of_rounds(study: NoiseStudy) -> float:
-    """Return an estimate of how long a study in noisy worlds takes from nothing [s], good to a factor of two or so."""
+def seconds_of_rounds(study: NoiseStudy, measure: Callable[[Iterate, World, str], float] = seconds_of_rollout) -> float:
+    """Return an estimate of how long a study in noisy worlds takes from nothing [s], good to a factor of two or so.
+
+    Args:
+        study: With its worlds.
+        measure: Returns how long a rollout takes in a world [s].
+    """
     rounds, noises, learned = study.iterate.iterations, len(study.noises), list(map(is_learned, study.methods.values()))
     budget, places, started, total = study.iterate.budget, rounds * noises, set[str](), 0.0
     for name, real in study.worlds.items():
         sim, key = study.sims.get(name, study.iterate.sim), name if name in study.sims else ""
         own = replace(study.iterate, sim=sim, real=real, policy=size(study.iterate.policy, sim), workers=1)
         further = replace(own, optimizer=study.further)
-        in_sim, in_real = seconds_of_rollout(own, sim, SIM), seconds_of_rollout(own, real, REAL)
+        in_sim, in_real = measure(own, sim, SIM), measure(own, real, REAL)
         alone = 0 if key in started else 1  # what knows no world begins once in a simulator, with the same search
         searches = (places if knows else places - noises + alone for knows in learned)
         rolled = zip(searches, (in_sim * (LEARNED if knows else 1.0) for knows in learned), strict=True)

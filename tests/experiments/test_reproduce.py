@@ -23,8 +23,7 @@ from gsl.tasks.arm import Arm
 from gsl.tasks.distance import Distance
 from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld
-from gsl_experiments import effort
-from gsl_experiments.effort import duration_told
+from gsl_experiments.effort import duration_told, seconds_of_rounds
 from gsl_experiments.ledger import Ledger, recipe
 from gsl_experiments.paper_cells import one_by_one
 from gsl_experiments.paper_table_2 import Table2
@@ -588,9 +587,8 @@ def test_figure_5_is_told_in_degrees() -> None:
     assert "| none | 10.5 | 4.1 to 16.9 |  | 0.5 | 0.5 to 0.5 | 2 of 2 |" in lines[-2]
 
 
-def test_a_study_in_noisy_worlds_knows_beforehand_how_long_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_study_in_noisy_worlds_knows_beforehand_how_long_it_takes() -> None:
     """By hand, where every rollout takes a second."""
-    monkeypatch.setattr(effort, "seconds_of_rollout", lambda *_: 1.0)
     searches = ("optimizer@iterate.optimizer=cma_es", "optimizer@further=cma_es")
     sizes = [
         f"{where}.{size}" for where in ("iterate.optimizer", "further") for size in ("candidates=5", "generations=3")
@@ -603,8 +601,8 @@ def test_a_study_in_noisy_worlds_knows_beforehand_how_long_it_takes(monkeypatch:
     search, measurement = 5 * 3 * 2, 7 + 2 + 2 * 4
     once = 1 + 4  # where all begin, and what knows no world
     at_each_noise = (1 + 2 * LEARNED) * search + 7 * measurement + 30 + 2 * APART  # the reference, gat and sgat
-    assert effort.seconds_of_rounds(study) == pytest.approx(3 * (once * search + 2 * at_each_noise))
-    assert effort.seconds_of_rounds(replace(study, workers=2)) == pytest.approx(
+    assert seconds_of_rounds(study, lambda *_: 1.0) == pytest.approx(3 * (once * search + 2 * at_each_noise))
+    assert seconds_of_rounds(replace(study, workers=2), lambda *_: 1.0) == pytest.approx(
         1.5 * (once * search + 2 * at_each_noise)
     )
 
