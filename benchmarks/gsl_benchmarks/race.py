@@ -2,14 +2,17 @@
 
 `python -m gsl_benchmarks.race` plays the search once. Each generation is then raced on the values that were played, so
 that both have the same seeds. It prints the table of docs/results/speed.md (hours; `--candidates`, `--generations`).
+What was played goes to `--played`, from where a study that was stopped goes on.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +22,7 @@ from gsl.core.interfaces import SIM
 from gsl.core.seeds import derive_seed
 from gsl.grounding.torque_noise import TorqueNoise
 from gsl.optimizers.cma_es import CmaEs
-from gsl.optimizers.race import Race
+from gsl.optimizers.race import Race, weigh
 from gsl.policies.walk_engine import WalkEngine
 from gsl.report.console import Console
 from gsl.rollout.parallel import Job, episodes
@@ -28,8 +31,16 @@ from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld
 
 RACES = 10  # of each generation, with other draws
-COARSE, PAIRS = 0.004, 9  # [s] of the coarser physics, and walks of which both costs are compared
-COLUMNS = ("generation", "best [cm/s]", "falls", "races with another winner", "rollouts played", "physics steps played")
+FINE, COARSE, PAIRS = 0.002, 0.004, 9  # [s] of two physics periods, and walks of which both costs are compared
+COLUMNS = (
+    "generation",
+    "best [cm/s]",
+    "falls",
+    "races with another winner",
+    "rollouts played",
+    "physics steps played",
+    "change of the step",
+)
 
 
 class Played(NamedTuple):
@@ -41,11 +52,12 @@ class Played(NamedTuple):
 
 
 class Raced(NamedTuple):
-    """What races on it come to: shares of races, rollouts and physics steps."""
+    """What races on it come to: shares of races, rollouts, physics steps, and of the search's step, squared."""
 
     another: float
     rollouts: float
     steps: float
+    change: float
 
 
 def play(scenario: Scenario, candidates: Sequence[np.ndarray], seeds: np.ndarray, progress: Progress) -> Played:
@@ -66,13 +78,30 @@ def race_again(played: Played, error: float, races: int = RACES) -> Raced:
         there = np.isfinite(race.values)
         winner = np.argmax(np.where(there.all(axis=1), whole, -np.inf))
         another = float(winner != np.argmax(whole))
-        races_run.append((another, there.mean(), played.steps[there].sum() / played.steps.sum()))
+        weights = weigh(whole)
+        change = ((weigh(race.worths) - weights) ** 2).sum() / (weights**2).sum()
+        races_run.append((another, there.mean(), played.steps[there].sum() / played.steps.sum(), change))
     return Raced(*(float(share) for share in np.mean(races_run, axis=0)))
 
 
-def cost_of_coarse(scenario: Scenario, world: BulletWorld) -> float:
-    """Return CPU time at the coarse physics period / at the world's own, median of pairs of walks."""
-    fine, coarse = scenario.prepare({}), replace(scenario, world=replace(world, step=COARSE)).prepare({})
+def read_played(path: Path | None, shape: tuple[int, int]) -> list[Played]:
+    """Return the generations that a file has; none if there is no file.
+
+    Raises:
+        SystemExit: They are of other sizes.
+    """
+    if path is None or not path.exists():
+        return []
+    with np.load(path) as file:
+        generations = [Played(*rows) for rows in zip(*(file[name] for name in Played._fields), strict=True)]
+    if any(played.values.shape != shape for played in generations):
+        raise SystemExit(f"{path}: was played with other candidates or rollouts; name another file")
+    return generations
+
+
+def cost_of_coarse(world: BulletWorld, scenario: Scenario) -> float:
+    """Return CPU time at the coarse physics period / at the fine one, median of pairs of walks."""
+    fine, coarse = (replace(scenario, world=replace(world, step=step)).prepare({}) for step in (FINE, COARSE))
     envs, theta = [fine.make(), coarse.make()], fine.policy.initial
     taken = np.zeros((PAIRS + 1, 2))
     for seed in range(PAIRS + 1):  # the first one compiles
@@ -89,17 +118,28 @@ def main() -> None:
     for name, default in (("candidates", 150), ("generations", 10), ("rollouts", 20), ("seed", 1)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--error", type=float, default=0.05)
+    parser.add_argument("--step", type=float, default=0.002, help="physics period [s]")
+    parser.add_argument("--played", type=Path, help="npz file of what was played, of the same settings")
     options, console, rows, races = parser.parse_args(), Console(), [], []
-    world, policy = BulletWorld(robot="nao", effects={}, start_noise=0.02), WalkEngine()
+    shape = (options.candidates, options.rollouts)
+    world, policy = BulletWorld(robot="nao", effects={}, start_noise=0.02, step=options.step), WalkEngine()
     plain = Scenario(world, Walk(), policy, SIM, TorqueNoise())
     scenario = plain.prepare({})
     seed = derive_seed(options.seed, "optimize")
     search = CmaEs(options.candidates, options.generations).start(policy.initial, policy.scale, seed)
-    with console.progress(options.candidates * options.generations * options.rollouts, "playing all") as progress:
+    generations = read_played(options.played, shape)
+    with console.progress(options.generations * math.prod(shape), "playing all") as progress:
         for index in range(options.generations):
-            places = np.ndindex(options.candidates, options.rollouts)
-            seeds = np.array([derive_seed(options.seed, "optimize", index, *place) for place in places])
-            played = play(scenario, search.ask(), seeds.reshape(options.candidates, options.rollouts), progress)
+            candidates = search.ask()
+            if index < len(generations):
+                progress.advance(math.prod(shape), worked=False)
+            else:
+                seeds = [derive_seed(options.seed, "optimize", index, *place) for place in np.ndindex(shape)]
+                generations.append(play(scenario, candidates, np.reshape(seeds, shape), progress))
+                if options.played:
+                    columns = zip(*generations, strict=True)
+                    np.savez(options.played, **dict(zip(Played._fields, map(np.stack, columns), strict=True)))
+            played = generations[index]
             search.tell(played.values.mean(axis=1).tolist())
             raced = race_again(played, options.error)
             races.append(raced)
@@ -108,7 +148,8 @@ def main() -> None:
             console.status("\t".join(map(str, rows[-1])))
     rows.append(("mean", "", "", *(f"{share:.3f}" for share in np.mean(races, axis=0))))
     console.table(f"optimizer.race={options.error:g}", COLUMNS, rows)
-    console.status(f"a walk at {1000 * COARSE:g} ms costs {cost_of_coarse(plain, world):.2f} of one at 2 ms")
+    cost = cost_of_coarse(world, plain)
+    console.status(f"a walk at {1000 * COARSE:g} ms costs {cost:.2f} of one at {1000 * FINE:g} ms")
 
 
 if __name__ == "__main__":

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING
 
-from gsl.core.interfaces import REAL, SIM, Search
+from gsl.core.interfaces import REAL, SIM, Search, World
 from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.effects import is_learned
+from gsl.policies.policy import size
 from gsl.rollout.parallel import threads
 from gsl.stages.effort import (
     APART,
@@ -17,6 +20,7 @@ from gsl.stages.effort import (
     count_episodes,
     count_rollouts,
     flights,
+    plan_search,
     seconds_of_rollout,
 )
 from gsl.stages.iterate import Iterate
@@ -24,6 +28,7 @@ from gsl.stages.values import Values
 
 if TYPE_CHECKING:
     from gsl_experiments.compare import Compare
+    from gsl_experiments.noise import NoiseStudy
 
 
 def duration_told(duration: float) -> str:
@@ -70,6 +75,34 @@ def seconds(study: Compare, *, search: bool = True) -> float:
     flown = len(iterate.diagnosis.excitation.motions) * iterate.diagnosis.excitation.duration if flown_by else 0.0
     fitted += worlds * flown * sum(FLOWN[part] for part in set(chain(*flown_by.values())))
     return (rolled / workers + fitted) * study.trials * len(sims)
+
+
+def seconds_of_rounds(study: NoiseStudy, measure: Callable[[Iterate, World, str], float] = seconds_of_rollout) -> float:
+    """Return an estimate of how long a study in noisy worlds takes from nothing [s], good to a factor of two or so.
+
+    Args:
+        study: With its worlds.
+        measure: Returns how long a rollout takes in a world [s].
+    """
+    rounds, noises, learned = study.iterate.iterations, len(study.noises), list(map(is_learned, study.methods.values()))
+    budget, places, started, total = study.iterate.budget, rounds * noises, set[str](), 0.0
+    for name, real in study.worlds.items():
+        sim, key = study.sims.get(name, study.iterate.sim), name if name in study.sims else ""
+        own = replace(study.iterate, sim=sim, real=real, policy=size(study.iterate.policy, sim), workers=1)
+        further = replace(own, optimizer=study.further)
+        in_sim, in_real = measure(own, sim, SIM), measure(own, real, REAL)
+        alone = 0 if key in started else 1  # what knows no world begins once in a simulator, with the same search
+        searches = (places if knows else places - noises + alone for knows in learned)
+        rolled = zip(searches, (in_sim * (LEARNED if knows else 1.0) for knows in learned), strict=True)
+        total += sum(count * plan_search(further, each).seconds for count, each in rolled)
+        total += alone * plan_search(own, in_sim).seconds + places * plan_search(further, in_real).seconds
+        chosen = 0 if study.choice == REAL else study.further.generations  # in simulation: real sees one policy of all
+        episodes = count_episodes(further) - chosen * budget.episodes
+        total += places * (len(learned) + 1) * episodes * in_real
+        if any(learned):
+            total += noises * (sum(budget.real) * in_real + sum(budget.sim) * in_sim) + places * sum(learned) * APART
+        started.add(key)
+    return total * study.trials / min(threads(study.workers), study.trials)
 
 
 def seconds_of_models(iterate: Iterate) -> float:

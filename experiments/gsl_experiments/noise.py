@@ -30,6 +30,7 @@ from gsl.stages.iterate import Iterate, check_aggregate, check_trainable
 from gsl.stages.optimize import BEST
 from gsl.storage.policy_choice import EVALUATION
 from gsl.worlds.gymnasium import GymnasiumWorld, try_out
+from gsl_experiments.effort import seconds_of_rounds
 from gsl_experiments.ledger import GOES_ON, Known, Ledger, list_earlier, recipe
 from gsl_experiments.noise_bars import Bars, noise_bars_figure
 from gsl_experiments.noise_table import REFERENCE, NoiseTable, Place, Point
@@ -99,10 +100,11 @@ class NoiseStudy:
         home = folder.parent
         ledger = Ledger(home / DATA, self.parents(), Point, console)
         keys = self.recipes
-        ledger.announce({key: f"trial {number}" for number, key in keys.items()})
+        names = {key: f"trial {number}" for number, key in keys.items()}
+        duration = ledger.announce(names, lambda: seconds_of_rounds(self))
         ledger.judge({key: {"trial": number} for number, key in keys.items()})
         missing = {number: [number] for number, key in keys.items() if not ledger.take(key)}
-        for number, points in side_by_side(self, folder, missing, self.workers, console):
+        for number, points in side_by_side(self, folder, missing, self.workers, console, duration):
             ledger.add(keys[number], [point._asdict() for point in points])
         points = [Point(**row) for row in ledger.figures]
         self.tell(folder, points, ledger.close(folder / DATA))

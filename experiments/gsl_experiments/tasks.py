@@ -51,7 +51,7 @@ def in_order(
         links: Returns the links of a part of a trial, if anybody knows them.
     """
     if find_cluster() is not None:
-        yield from side_by_side(study, folder, trials, -1, console)
+        yield from side_by_side(study, folder, trials, -1, console, seconds)
         return
     items = [item for items in trials.values() for item in items]
     with console.plan("result", [Part(seconds / max(len(items), 1))] * len(items)):
@@ -63,8 +63,9 @@ def in_order(
 
 
 def side_by_side(
-    study: Study, folder: Path, trials: Mapping[int, Sequence[Any]], workers: Workers, console: Console
-) -> Iterator[tuple[Any, list[Any]]]:
+    study: Study, folder: Path, trials: Mapping[int, Sequence[Any]], workers: Workers, console: Console,
+    seconds: float = 0.0,
+) -> Iterator[tuple[Any, list[Any]]]:  # fmt: skip
     """Yield each part of all trials with its results, trials as they end.
 
     Args:
@@ -73,13 +74,14 @@ def side_by_side(
         trials: Parts by the number of the trial.
         workers: Processes, where no cluster was chosen.
         console: Where progress is shown.
+        seconds: About how long all of it takes [s], 0 if nobody knows.
 
     Raises:
         GslError: A worker does not see the study's folder.
     """
     alone = replace(study, iterate=replace(study.iterate, workers=1))  # type: ignore[type-var]
     tasks = [Task(folder, items) for items in trials.values()]
-    with console.progress(len(tasks), "trials") as progress:
+    with console.plan("", [Part(seconds, len(tasks))]), console.progress(len(tasks), "trials") as progress:
         for index, (results, links) in arriving(_run, alone, tasks, workers, progress):
             for link in links:
                 note(link)

@@ -40,6 +40,10 @@ class Console(Protocol):
     ) -> None:
         """Show a table of results."""
 
+    @property
+    def planned(self) -> bool:
+        """Whether it was said how long the work around takes, or nobody listens: a part of it says nothing then."""
+
     def plan(self, noun: str, parts: Sequence[Part]) -> AbstractContextManager[None]:
         """Within, the work, or a part of the plan around, consists of parts that `noun` names."""
 
@@ -69,6 +73,11 @@ class Silent:
         self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
     ) -> None:
         """Show nothing."""
+
+    @property
+    def planned(self) -> bool:
+        """Nobody listens."""
+        return True
 
     @contextmanager
     def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:

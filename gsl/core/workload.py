@@ -111,6 +111,11 @@ class Workload:
         finally:
             self._plans.pop()
 
+    @property
+    def planned(self) -> bool:
+        """Whether somebody knows how long the present part takes."""
+        return any(plan.seconds for plan in self._plans)
+
     def begin(self, name: str) -> None:
         """Name the part that begins."""
         if self._plans and not self._alone:

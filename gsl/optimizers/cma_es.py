@@ -54,6 +54,11 @@ class CmaEsRun:
             self._search = cma.CMAEvolutionStrategy(np.zeros(len(parameters)), settings.sigma, options)
         self._asked: list[np.ndarray] = []
 
+    @property
+    def mean(self) -> np.ndarray:
+        """The middle of what it asks for next, shape (n_parameters,)."""
+        return np.asarray(self._origin + self._scale * self._search.mean)
+
     def ask(self) -> list[np.ndarray]:
         """Return the candidates of the next generation, each of shape (n_parameters,)."""
         self._asked = self._search.ask()

@@ -1,8 +1,10 @@
-"""A race: a candidate whose rank among all rollouts is settled plays no more of them.
+"""A race: a candidate plays no more rollouts once they would change neither the winner nor the search's next step.
 
 The idea is Heidrich-Meisner's and Igel's (Hoeffding and Bernstein races in CMA-ES, ICML 2009). Their bounds hold for
 any returns within a range. Twenty walks settle nothing by them: a fall costs fifty times the noise of a walk.
-Here the chance is computed instead. The rollouts that a candidate has not played are drawn from Pólya's urn (Blackwell
+Their races settle who is among the better half. A candidate near its border counts almost nothing for CMA-ES, whose
+mean moves by weights that fall with the rank. So what is bounded here is the change of those weights.
+The chance is computed, too. The rollouts that a candidate has not played are drawn from Pólya's urn (Blackwell
 and MacQueen 1973): each is one that it has played, or by a chance of c / (played + c) one of any candidate. So a
 candidate that has not fallen yet may still fall, as often as others did. Bühlmann's credibility (1967) gives c: the
 variance of a candidate's values over that between candidates; the urn's own ball, which stands for the unseen, adds 1.
@@ -23,13 +25,13 @@ DRAWS = 1000  # ways in which a generation may end; a chance below their inverse
 
 Error = Annotated[
     float,
-    setting("chance that a generation has another winner because candidates stop early; 0: none stops", ge=0, lt=1),
+    setting("chance of another winner, and change of the step, as candidates stop early; 0: none stops", ge=0, lt=1),
 ]
 
 
 @runtime_checkable
 class Racing(Protocol):
-    """A search that ranks candidates by half: one whose rank is settled needs no more episodes."""
+    """A search that weighs candidates by rank, as CMA-ES does: those whose weight is settled need no more episodes."""
 
     @property
     def race(self) -> float:
@@ -39,13 +41,16 @@ class Racing(Protocol):
 class Race:
     """The rollouts of a generation, in rounds that double what each candidate has played.
 
-    After a round a candidate stops if both hold: it crosses the border of the better half with a chance of at most
-    `error`, and the chances of all that have stopped to be the winner add up to at most this round's share of `error`.
+    After a round candidates stop, first those whose weight is surest, as long as both hold for all that have stopped:
+    their chances to be the winner add up to at most this round's share of `error`, and so do the expected squares of
+    what their weights would still change, as a share of the sum of all squared weights. Where candidates are drawn
+    independently, the latter is the squared distance between this step of the search and that by all rollouts, over
+    the square of its length.
 
     Args:
         candidates: How many there are, n.
         rollouts: How many each plays that does not stop, k.
-        error: Chance of another winner than all rollouts would have; 0 plays all of them in one round.
+        error: Chance of another winner than all rollouts would have, and share of the step; 0 plays all in one round.
         judge: Returns what the search maximises, shape (m,), of episodes' values, shape (m, k).
         rng: Draws how a generation may end.
 
@@ -65,7 +70,7 @@ class Race:
         self.values = np.full((candidates, rollouts), np.nan)
         self.counts = np.zeros(candidates, dtype=int)
         self._error, self._judge, self._rng = error, judge, rng
-        self._ends = _double(rollouts) if error else [rollouts]
+        self._ends = _double(rollouts) if error and candidates > 1 else [rollouts]
         self._round, self._chance = 0, 0.0
         self._racing = np.ones(candidates, dtype=bool)
 
@@ -97,14 +102,24 @@ class Race:
         ends = draw_ends(self.values, DRAWS, self._rng)
         worths = self._judge(ends.reshape(-1, ends.shape[2])).reshape(ends.shape[:2])
         wins = np.bincount(worths.argmax(axis=1), minlength=len(self.values)) / DRAWS
-        ranks = np.argsort(np.argsort(-worths, axis=1, kind="stable"), axis=1)
-        better = (ranks < len(self.values) // 2).mean(axis=0)
-        settled = np.minimum(better, 1.0 - better) <= self._error
-        allowed = self._error * self._round / (len(self._ends) - 1)
-        for candidate in np.argsort(wins, kind="stable"):
-            if self._racing[candidate] and settled[candidate] and self._chance + wins[candidate] <= allowed:
+        now = weigh(self.worths)
+        lost = ((weigh(worths) - now) ** 2).mean(axis=0) / (now**2).sum()
+        changed, allowed = float(lost[~self._racing].sum()), self._error * self._round / (len(self._ends) - 1)
+        for candidate in np.argsort(lost, kind="stable"):
+            chance, change = self._chance + wins[candidate], changed + lost[candidate]
+            if self._racing[candidate] and max(chance, change) <= allowed:
                 self._racing[candidate] = False
-                self._chance += wins[candidate]
+                self._chance, changed = chance, change
+
+
+def weigh(worths: np.ndarray) -> np.ndarray:
+    """Return by how much each candidate moves CMA-ES's mean, shape (..., n) as the worths.
+
+    Hansen 2016, equations 49 and 53: the logarithm of the rank decides, and the worse half does not count.
+    """
+    ranks = 1.0 + np.argsort(np.argsort(-worths, axis=-1, kind="stable"), axis=-1)
+    weights = np.maximum(0.0, np.log(0.5 * (worths.shape[-1] + 1)) - np.log(ranks))
+    return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
 
 
 def draw_ends(values: np.ndarray, draws: int, rng: np.random.Generator) -> np.ndarray:

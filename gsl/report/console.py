@@ -132,6 +132,11 @@ class Console:
             sys.stderr.write(f"{visible(command)}: {message}\n")
         return exit_code
 
+    @property
+    def planned(self) -> bool:
+        """Whether it was said how long the work around takes."""
+        return self._work.planned
+
     @contextmanager
     def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:
         """Within, the work, or a part of the plan around, consists of parts that `noun` names."""

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 PARTS = ("robot", "ghost")
 CLEAR = 0.35  # opacity of the ghost
+ROOM = 0.2  # of floor around a base [m], a foot's length: the more floor, the smaller the robot in the window
+ABREAST = 3  # curves in a row beside the robot: names of joints can be read on a usual screen
 _ALONG = {"x": Rotation.from_euler("y", 90, degrees=True), "y": Rotation.from_euler("x", -90, degrees=True)}
 _UPRIGHT = Rotation.identity()
 
@@ -38,7 +40,7 @@ def check_viewer() -> None:
     try:
         import rerun  # noqa: F401
     except ImportError as error:
-        raise InputError("the viewer needs gsl[rerun]: pip install 'gsl[rerun]'") from error
+        raise InputError(f"the viewer needs gsl[rerun]: pip install 'gsl[rerun]' ({error})") from error
 
 
 def record_shots(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], path: Path | None) -> None:
@@ -49,7 +51,7 @@ def record_shots(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], pat
     """
     import rerun
 
-    recording = rerun.RecordingStream("gsl", recording_id=shots[0].title)
+    recording = rerun.RecordingStream("gsl")  # with an id of its own: a window may show several of the same log
     if path is not None:
         recording.save(str(path))
     else:
@@ -57,6 +59,8 @@ def record_shots(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], pat
             recording.spawn()
         except (RuntimeError, OSError) as error:
             raise InputError(f"the viewer cannot be started ({error}); write a file with out=motion.rrd") from error
+    recording.send_recording_name(" and ".join(shot.title for shot in shots))
+    _arrange(recording, joints)
     recording.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     _log_floor(recording, shots)
     for part, shot in zip(PARTS, shots, strict=False):
@@ -67,6 +71,24 @@ def record_shots(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], pat
     recording.disconnect()
 
 
+def _arrange(recording: rerun.RecordingStream, joints: Sequence[str]) -> None:
+    """Lay the window out: the robot, and a plot of each joint beside it; the viewer's own guess shows no plot."""
+    from rerun import blueprint
+
+    curves = [
+        blueprint.TimeSeriesView(
+            origin=f"/joints/{joint}",
+            name=f"{joint} [°]",
+            plot_legend=blueprint.PlotLegend(visible=joint == joints[0]),  # it covers curves, and all have the same
+        )
+        for joint in joints
+    ]
+    plots = blueprint.Grid(*curves, grid_columns=ABREAST)
+    robot = blueprint.Spatial3DView(origin="/world", name="robot")
+    panels = (blueprint.BlueprintPanel(state="collapsed"), blueprint.SelectionPanel(state="collapsed"))
+    recording.send_blueprint(blueprint.Blueprint(blueprint.Horizontal(robot, plots), *panels))
+
+
 def _log_floor(recording: rerun.RecordingStream, shots: Sequence[Shot]) -> None:
     """Log lines on the floor, a metre apart, as far as anybody goes; for a base that is held there is none."""
     import rerun
@@ -74,7 +96,7 @@ def _log_floor(recording: rerun.RecordingStream, shots: Sequence[Shot]) -> None:
     if not any(walks(shot.trajectory) for shot in shots):
         return
     way = np.concatenate([places(shot.trajectory)[:, :2] for shot in shots])
-    (left, low), (right, high) = np.floor(way.min(axis=0)) - 1.0, np.ceil(way.max(axis=0)) + 1.0
+    (left, low), (right, high) = np.floor(way.min(axis=0) - ROOM), np.ceil(way.max(axis=0) + ROOM)
     lines = [[[x, low, 0.0], [x, high, 0.0]] for x in np.arange(left, right + 0.5)]
     lines += [[[left, y, 0.0], [right, y, 0.0]] for y in np.arange(low, high + 0.5)]
     recording.log("world/floor", rerun.LineStrips3D(np.array(lines), colors=[150, 150, 150]), static=True)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from gsl.stages.iterate import Iterate
 
 ROLLOUT = 0.3  # of a walk of 7.5 s on one core, where none is tried [s]
-STEP = 0.002  # of a learner with its network [s]
+STEP = 0.0003  # of TRPO with its network, CPU time in the hopper and the cheetah [s]
 LONG = 60.0  # what takes less is begun without a word: a rollout of each world takes seconds to load [s]
 LEARNED = 1.4  # how much longer a rollout takes with a learned grounding
 APART = 25.0  # of a learned grounding: fits and checks [s]
@@ -54,7 +54,7 @@ def links(iterate: Iterate, sim: float = ROLLOUT, real: float = ROLLOUT) -> list
     """Return the links that an iteration builds at most, in their order, with rollouts of so many seconds."""
     budget, workers = iterate.budget, threads(iterate.workers)
     learned = is_learned(iterate.grounding)
-    parts = [_search(iterate, sim)] if iterate.pretrained else []
+    parts = [plan_search(iterate, sim)] if iterate.pretrained else []
     parts += _in_the_air(iterate)
     for _ in range(iterate.iterations):
         for role, count, each in ((REAL, sum(budget.real), real), (SIM, sum(budget.sim), sim)):
@@ -63,8 +63,16 @@ def links(iterate: Iterate, sim: float = ROLLOUT, real: float = ROLLOUT) -> list
         if learned:
             models = 2 if isinstance(innermost(iterate.grounding), ActionTransformation) else 1
             parts += [Part(APART / models)] * models
-        parts += [_search(iterate, sim * (LEARNED if learned else 1.0)), _measurement(iterate, real)]
-    return parts + ([_search(iterate, sim), _measurement(iterate, real)] if iterate.beside else [])
+        parts += [plan_search(iterate, sim * (LEARNED if learned else 1.0)), _measurement(iterate, real)]
+    return parts + ([plan_search(iterate, sim), _measurement(iterate, real)] if iterate.beside else [])
+
+
+def plan_search(iterate: Iterate, each: float) -> Part:
+    """Return a search whose rollouts take `each` [s] as a part of planned work."""
+    count, generations = count_rollouts(iterate), iterate.optimizer.generations
+    if isinstance(iterate.optimizer, Search):
+        return Part(count * each / threads(iterate.workers), count + generations * iterate.budget.screening)
+    return Part(count * STEP + generations * iterate.budget.rollouts * each, count)
 
 
 def count_rollouts(iterate: Iterate) -> int:
@@ -95,13 +103,6 @@ def seconds_of_rollout(iterate: Iterate, world: World, role: str) -> float:
     """Return how long a rollout of π0 takes in a world [s]."""
     scenario = Scenario(world, iterate.task, iterate.policy, role, NoGrounding())
     return measure_rollout(scenario, iterate.policy.initial)
-
-
-def _search(iterate: Iterate, each: float) -> Part:
-    count, generations = count_rollouts(iterate), iterate.optimizer.generations
-    if isinstance(iterate.optimizer, Search):
-        return Part(count * each / threads(iterate.workers), count + generations * iterate.budget.screening)
-    return Part(count * STEP + generations * iterate.budget.rollouts * each, count)
 
 
 def _measurement(iterate: Iterate, each: float) -> Part:

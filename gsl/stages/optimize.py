@@ -51,7 +51,7 @@ class Winner(NamedTuple):
 class Optimize:
     """Candidates are judged by the mean value of `rollouts` episodes each; a killed search goes on where it was.
 
-    With optimizer.race a candidate plays fewer of them once its rank is settled, see gsl/optimizers/race.py.
+    With optimizer.race a candidate plays fewer of them once others would change nothing, see gsl/optimizers/race.py.
 
     With objective=cvar they are judged by the mean of their worst episodes (`quantile`). What is reported as a value in
     simulation is the mean of all episodes in any case, so that searches can be compared.
@@ -123,7 +123,7 @@ class Optimize:
         """Yield the best candidate of each generation of a search."""
         search = optimizer.start(first, self.policy.scale, derive_seed(self.seed, self.kind))
         total = optimizer.generations * optimizer.candidates * self.rollouts
-        if log.read(0) is None and (line := estimate(scenario, first, total, self.workers)):
+        if log.read(0) is None and not console.planned and (line := estimate(scenario, first, total, self.workers)):
             console.status(line)
         error, highest = optimizer.race if isinstance(optimizer, Racing) else 0.0, -np.inf
         with console.progress(total, "optimising in simulation") as progress:

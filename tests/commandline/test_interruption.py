@@ -58,7 +58,7 @@ def test_a_stage_that_is_stopped_leaves_nothing(stage: str, stop: signal.Signals
     said = stopped(stage, stop, chain, tmp_path)
     lines = [line for line in said.splitlines() if not line.startswith("fitting ")]
     estimates = [line for line in lines if " rollouts at most: about " in line or line.startswith("about ")]
-    longest = {"optimize": 1, "iterate": 2, "compare": 2}  # of long work, and of its search; it may be stopped before
+    longest = {"optimize": 1, "iterate": 1, "compare": 1}  # of long work; it may be stopped before
     assert len(estimates) <= longest.get(stage, 0)
     lines = [line for line in lines if line not in estimates]
     assert lines == [f"gsl {stage}: interrupted; what is complete stays, and the same command does the rest"]

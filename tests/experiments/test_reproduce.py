@@ -11,16 +11,19 @@ import pytest
 from browser import check_seen
 from commands import done, gsl
 
+from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.config import prepare, resolve
 from gsl.core.console import Silent
 from gsl.errors import ArtifactError
 from gsl.grounding.gat import ActionTransformation
 from gsl.models.config import ModelConfig
 from gsl.optimizers.cma_es import CmaEs
+from gsl.stages.effort import APART, LEARNED
 from gsl.tasks.arm import Arm
 from gsl.tasks.distance import Distance
 from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld
-from gsl_experiments.effort import duration_told
+from gsl_experiments.effort import duration_told, seconds_of_rounds
 from gsl_experiments.ledger import Ledger, recipe
 from gsl_experiments.paper_cells import one_by_one
 from gsl_experiments.paper_table_2 import Table2
@@ -582,6 +585,26 @@ def test_figure_5_is_told_in_degrees() -> None:
     lines = Figure5().markdown(trials, Arm()).splitlines()
     assert "| gat | 3.0 | -9.7 to 15.7 | -7.5 (-13.9 to -1.1) | 0.5 | 0.5 to 0.5 | 0 of 2 | 7.0 |" in lines[-1]
     assert "| none | 10.5 | 4.1 to 16.9 |  | 0.5 | 0.5 to 0.5 | 2 of 2 |" in lines[-2]
+
+
+def test_a_study_in_noisy_worlds_knows_beforehand_how_long_it_takes() -> None:
+    """By hand, where every rollout takes a second."""
+    searches = ("optimizer@iterate.optimizer=cma_es", "optimizer@further=cma_es")
+    sizes = [
+        f"{where}.{size}" for where in ("iterate.optimizer", "further") for size in ("candidates=5", "generations=3")
+    ]
+    budget = ("rollouts=2", "episodes=7", "check=2", "confirmation=4", "real_episodes=10", "sim_episodes=20")
+    few = ("noises=[0.2,0.5]", "trials=3", "workers=1", *(f"iterate.budget.{size}" for size in budget))
+    with open_hydra(None):
+        study = prepare(resolve(compose("reproduce_fig12", ["preset=toy", *searches, *sizes, *few])))[0]
+    assert [*study.methods] == ["none", "ane_02", "ane_04", "ane_06", "gat", "sgat"] and len(study.worlds) == 1
+    search, measurement = 5 * 3 * 2, 7 + 2 + 2 * 4
+    once = 1 + 4  # where all begin, and what knows no world
+    at_each_noise = (1 + 2 * LEARNED) * search + 7 * measurement + 30 + 2 * APART  # the reference, gat and sgat
+    assert seconds_of_rounds(study, lambda *_: 1.0) == pytest.approx(3 * (once * search + 2 * at_each_noise))
+    assert seconds_of_rounds(replace(study, workers=2), lambda *_: 1.0) == pytest.approx(
+        1.5 * (once * search + 2 * at_each_noise)
+    )
 
 
 @pytest.mark.parametrize(

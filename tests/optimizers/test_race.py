@@ -1,4 +1,4 @@
-"""A race stops candidates and keeps the winner that all rollouts would have."""
+"""A race stops candidates, keeps the winner that all rollouts would have, and hardly changes the search's step."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from gsl.core.statistics import wilson
 from gsl.grounding.ane import ActionNoise
 from gsl.optimizers.cma_es import CmaEs
 from gsl.optimizers.objective import objective_values
-from gsl.optimizers.race import Race, Racing, draw_ends, noise_share
+from gsl.optimizers.race import Race, Racing, draw_ends, noise_share, weigh
 from gsl.stages.optimize import Optimize
 from gsl.storage.policies import read_policies
 from gsl.tasks.arm import Arm
 
 MEAN = partial(objective_values, objective="mean", quantile=0.25)
 CANDIDATES, ROLLOUTS, ERROR = 24, 20, 0.05
+LATITUDE = 3.0  # of what a race expects of the step: 1.5 by the mean, 2.5 by cvar where walks fall
 
 
 def run_race(returns: np.ndarray, error: float, seed: int = 0, judge: partial[np.ndarray] = MEAN) -> Race:
@@ -37,6 +38,12 @@ def winner(race: Race) -> int:
     return int(np.argmax(np.where(race.counts == race.values.shape[1], race.worths, -np.inf)))
 
 
+def change_of_step(race: Race, whole: np.ndarray) -> float:
+    """Squared change of the weights by the race, as a share of all squared weights; worths by all rollouts: (n,)."""
+    right = weigh(whole)
+    return float(((weigh(race.worths) - right) ** 2).sum() / (right**2).sum())
+
+
 def walks(rng: np.random.Generator, noise: float, falls: float) -> np.ndarray:
     """Returns like those of walks [cm/s]: each candidate has its speed and its own share of falls."""
     speed = rng.normal(25.0, 3.0, size=(CANDIDATES, 1))
@@ -49,13 +56,15 @@ def walks(rng: np.random.Generator, noise: float, falls: float) -> np.ndarray:
 @pytest.mark.parametrize(("noise", "falls"), [(0.1, 0.0), (3.0, 0.0), (0.1, 0.2), (1.0, 0.05)])
 def test_another_winner_is_no_more_frequent_than_the_stated_error(noise: float, falls: float, objective: str) -> None:
     judge = partial(objective_values, objective=objective, quantile=0.25)
-    trials, wrong, played = 40, 0, []
+    trials, wrong, played, changes = 40, 0, [], []
     for seed in range(trials):
         returns = walks(np.random.default_rng(seed), noise, falls)
         race = run_race(returns, ERROR, seed, judge)
         wrong += winner(race) != int(np.argmax(judge(returns)))
         played.append(race.counts.sum() / returns.size)
+        changes.append(change_of_step(race, judge(returns)))
     assert wilson(wrong, trials).lower <= ERROR
+    assert np.mean(changes) < LATITUDE * ERROR
     assert np.mean(played) < 0.95
 
 
@@ -66,6 +75,36 @@ def test_candidates_far_apart_play_two_rollouts_and_the_winner_all() -> None:
     assert race.counts[-1] == ROLLOUTS
     assert race.counts[0] <= 8
     assert race.counts.sum() < 0.5 * returns.size
+
+
+def test_candidates_near_the_border_of_the_better_half_play_no_more_than_those_far_below() -> None:
+    """By all rollouts their order is chance, and they count almost nothing: only the leaders have to be told apart."""
+    rng, played = np.random.default_rng(0), np.zeros(CANDIDATES)
+    for seed in range(10):
+        leaders, others = np.linspace(30.0, 27.0, 6), np.full(CANDIDATES - 6, 20.0)
+        returns = np.concatenate([leaders, others])[:, None] + rng.standard_normal((CANDIDATES, ROLLOUTS))
+        played += run_race(returns, ERROR, seed).counts / 10
+    assert played[0] == ROLLOUTS
+    assert played[6:].mean() < 0.5 * ROLLOUTS
+
+
+@pytest.mark.parametrize("candidates", [4, 7, 24, 150])
+def test_weights_are_those_by_which_cma_moves_its_mean(candidates: int) -> None:
+    from cma.recombination_weights import RecombinationWeights
+
+    worths = np.random.default_rng(0).permutation(candidates).astype(float)
+    weights, right = weigh(worths), RecombinationWeights(candidates).positive_weights
+    by_rank = weights[np.argsort(-worths)]
+    np.testing.assert_allclose(by_rank[: len(right)], right)
+    np.testing.assert_allclose(by_rank[len(right) :], 0.0, atol=1e-12)
+    np.testing.assert_array_equal(weigh(np.stack([worths, -worths]))[0], weights)
+
+
+def test_a_search_s_mean_is_that_of_its_candidates_by_these_weights() -> None:
+    search = CmaEs(candidates=8, generations=2, sigma=0.2).start(np.arange(3.0), np.array([1.0, 2.0, 3.0]), 1)
+    asked, values = np.array(search.ask()), np.random.default_rng(0).normal(size=8)
+    search.tell(values.tolist())
+    np.testing.assert_allclose(search.mean, weigh(values) @ asked)
 
 
 def test_without_an_error_every_candidate_plays_everything_in_one_round() -> None:
@@ -82,6 +121,10 @@ def test_nobody_stops_where_a_return_is_no_number(strange: float) -> None:
     returns = np.linspace(0.0, 1.0, CANDIDATES)[:, None] + np.zeros((1, ROLLOUTS))
     returns[3, 1] = strange
     assert (run_race(returns, ERROR).counts == ROLLOUTS).all()
+
+
+def test_a_single_candidate_plays_everything() -> None:
+    assert run_race(np.zeros((1, 5)), 0.3).counts.tolist() == [5]
 
 
 @pytest.mark.parametrize("rollouts", [1, 2, 3, 7])

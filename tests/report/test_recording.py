@@ -38,7 +38,11 @@ def test_a_recording_holds_robot_ghost_and_curves(home: Path) -> None:
     rerun = pytest.importorskip("rerun")
     assert rerun
     assert done("view", "air", "out=air.rrd", folder=home).out == "air.rrd\n"
-    assert (home / "air.rrd").read_bytes()[:3] == b"RRF"
+    written = (home / "air.rrd").read_bytes()
+    assert written[:3] == b"RRF"
+    joints = read(home / "runs/air/collect_real/trajectories.parquet").joints
+    assert written.count(b"TimeSeries") >= len(joints)  # the viewer's own layout has no plot
+    assert all(written.count(f"joints/{joint}/ghost".encode()) for joint in joints)
 
 
 def test_a_wrong_word_or_a_missing_viewer_is_one_line(home: Path) -> None:
