@@ -137,8 +137,8 @@ def main() -> None:
                 seeds = [derive_seed(options.seed, "optimize", index, *place) for place in np.ndindex(shape)]
                 generations.append(play(scenario, candidates, np.reshape(seeds, shape), progress))
                 if options.played:
-                    columns = zip(*generations, strict=True)
-                    np.savez(options.played, **dict(zip(Played._fields, map(np.stack, columns), strict=True)))
+                    values, fell, steps = map(np.stack, zip(*generations, strict=True))
+                    np.savez(options.played, values=values, fell=fell, steps=steps)
             played = generations[index]
             search.tell(played.values.mean(axis=1).tolist())
             raced = race_again(played, options.error)
