@@ -135,7 +135,7 @@ class PlausibilitySettings:
 class LawSettings:
     """How a law for each servo is learned on top of a hypothesis, and what it has to explain to speak against that.
 
-    What is of material size lies between what laws explain on top of true causes (0.012 of all joints, 0.04 of one) and
+    What is of material size lies between what laws explain on top of true causes (0.013 of all joints, 0.04 of one) and
     on top of the nearest effects where a target smoothing is missing (0.15 of all joints, 0.4 of one).
     """
 

@@ -64,7 +64,7 @@ class Fold:
 def table(folds: Sequence[Fold], by: str) -> str:
     """Return the table, and below it how the diagnosis compares with the best of the others."""
     ways = list(folds[0].errors)
-    columns = (f"{by} held out", *(f"{way} [mrad]" for way in ways), "excess removed", "with laws of the servos", "causes")
+    columns = (f"{by} held out", *(f"{way} [mrad]" for way in ways), "excess removed", "with a servo law", "causes")
     rows = [
         (
             fold.held_out,
