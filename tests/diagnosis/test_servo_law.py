@@ -80,7 +80,7 @@ def test_a_calibration_that_explains_surely_less_than_a_servo_could_is_a_gap() -
 
 
 def test_an_answer_is_what_a_replay_of_other_commands_moves() -> None:
-    """A target that is a tenth of the last one moves the arm as the term of one lag says, where torque is not limited."""
+    """A target that is a tenth of the last one moves the arm as one lag's term says, where torque is not limited."""
     batch, bench_of = arm_log(), simulator()
     bench = Bench(bench_of, batch.pieces, batch.comparison)
     replays = replay(bench, {}, no_shifts(2), HOW.lags)
