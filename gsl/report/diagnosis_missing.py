@@ -76,5 +76,5 @@ def missing(document: Document) -> Markup | None:
         "than these. Shares: what terms of one form explain on their own, of what a law explains beyond gains and a "
         "zero of the simulator as it is. Forms that are alike in these motions have about the same share."
     )
-    told = [element("p", prose(missing_sentence(document))), table(("joint", *kinds, "all in all"), rows), *drawn]
-    return section("What is missing", *(told if forms else ()), note=note)
+    parts = [element("p", prose(missing_sentence(document))), table(("joint", *kinds, "all in all"), rows), *drawn]
+    return section("What is missing", *(parts if forms else ()), note=note)
