@@ -100,7 +100,7 @@ class _Joint:
 
     def fit(self, form: str | None = None) -> np.ndarray:
         """Return the factors of all terms, or of one form's, by the ridge that folds of the training windows like."""
-        z, chosen = self.z[0], np.full(len(self.forms), form is None) | np.isin(self.forms, (GAIN, form))
+        z, chosen = self.z[0], np.full(len(self.forms), form is None) | np.isin(self.forms, [GAIN, form or GAIN])
         sizes = np.sqrt((self.answers[0][chosen] ** 2).mean(axis=(1, 2))) + 1e-9
         x = self.answers[0][chosen] / sizes[:, None, None]
         costs = [sum(self._check(x, ridge, fold) for fold in np.unique(self.folds)) for ridge in self.settings.ridges]
