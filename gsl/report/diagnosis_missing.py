@@ -34,8 +34,8 @@ ALIKE = 0.9  # share of the best form's share from which on another one does as 
 
 def missing_sentence(document: Document) -> str:
     """Return of which form what is missing is, joint by joint; nothing if that is not known."""
-    joints = [f"{read_word(form, 'joint')} {_words(form)}" for form in entries(document, "forms")]
-    return f"What is missing looks like this: {list_words(joints)}." if joints else ""
+    joints = [f"{read_word(form, 'joint')}: {_words(form)}" for form in entries(document, "forms")]
+    return f"What is missing looks like this. {'; '.join(joints)}." if joints else ""
 
 
 def _words(form: Document) -> str:

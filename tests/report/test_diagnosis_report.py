@@ -98,8 +98,8 @@ def test_the_first_screen_answers_everything() -> None:
             (
                 "no effect that we know explains it",
                 "The nearest: servo gain of LKneePitch.",
-                "LKneePitch a lag or a function of the error, which the servo's torque follows (20 ms late)",
-                "LHipPitch a function of position.",
+                "LKneePitch: a lag or a function of the error, which the servo's torque follows (20 ms late)",
+                "LHipPitch: a function of position.",
                 "missing torque [N·m]",
                 "grounding=effects_servo",
             ),
