@@ -24,6 +24,7 @@ from gsl.diagnosis.simulate.on_ground import Walking, model_error
 from gsl.diagnosis.simulate.simulator import Bench
 from gsl.diagnosis.verdict.findings import Findings
 from gsl.diagnosis.verdict.self_test import Trial, duel, simulate_nulls
+from gsl.diagnosis.verdict.servo_law import find_forms, learn_laws
 from gsl.diagnosis.verdict.verdict import Judge
 from gsl.errors import InputError
 from gsl.worlds.fits import fitting_step
@@ -66,11 +67,17 @@ def diagnose(
     tick("trying the library on the log")
     selection, refuted = _search(log, problem, none, null_gains, options)
     rivals, trials = _survivors(selection, options.verdict), []
-    if options.duels and not log.walking and selection.chosen.candidates:
+    tick("what a law of any servo would explain")
+    chosen = selection.chosen
+    laws = learn_laws(log, problem.simulator, chosen.effects, chosen.fit.shifts, options.verdict.law)
+    missing = laws.missing if laws else 0.0
+    if options.duels and not log.walking and chosen.candidates:
         tick("self-test: can the causes that are left be told apart")
         trials = duel(log, problem, rivals, options)
-    verdict = _judge(log, rivals, trials, options).judge(selection)
-    return Findings(log, problem, selection, verdict, null_gains, tuple(trials), baseline, shift, refuted, options)
+    verdict = _judge(log, rivals, trials, options).judge(selection, missing)
+    forms = find_forms(log, problem.simulator, options.verdict.law) if missing > 1.0 else ()
+    tested = null_gains, tuple(trials)
+    return Findings(log, problem, selection, verdict, *tested, baseline, shift, refuted, laws, forms, options)
 
 
 def prepare(batch: Batch, robot: Robot, options: Options) -> Log:

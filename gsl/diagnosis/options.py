@@ -52,7 +52,7 @@ class Options:
         threads: That replay side by side.
         clocks: Whether commands and measurements have one clock; else latency is not claimed.
         spread: Of the robot's calibration about the simulator's, as a share of the usual spread of one make.
-        seed: Of the simulated logs and of the learned residual.
+        seed: Of the simulated logs.
         tolerance: Difference of a joint that does not matter, beside the noise [rad]: the model's roughness.
         held_out: Labels of the trajectories that are for checking; empty for every second motion.
         null_gains: What chance gains on these commands in this world, if it was measured already.

@@ -133,6 +133,28 @@ class PlausibilitySettings:
 
 
 @dataclass(frozen=True)
+class LawSettings:
+    """How a law for each servo is learned on top of a hypothesis, and what it has to explain to speak against that.
+
+    What is of material size lies between what laws explain on top of true causes (0.013 of all joints, 0.04 of one) and
+    on top of the nearest effects where a target smoothing is missing (0.15 of all joints, 0.4 of one).
+    """
+
+    windows: int = 400  # of either part of a log, spread over it
+    lags: int = 5  # control periods back
+    plays: tuple[float, ...] = (0.004, 0.016)  # full widths of plays [rad]: below and above those of usual gears
+    ridges: tuple[float, ...] = (1e-4, 1e-3, 1e-2, 0.1, 1.0)  # shares of the residuals
+    folds: int = 4  # of the training windows, by which a ridge is chosen
+    reweightings: int = 3  # of a fit whose residuals count less the larger they are
+    of_all: float = 0.03  # cost of a residual of all joints, where noise costs 0.96, that is of material size. Measured
+    of_joint: float = 0.15  # the same of one joint. Measured
+    samples: int = 1000  # of the bootstrap
+    listed: int = 3  # joints whose form is shown,
+    least_share: float = 0.3  # if they gain as large a share of the largest gain
+    points: int = 12  # of a curve
+
+
+@dataclass(frozen=True)
 class VerdictSettings:
     """What the evidence allows to say."""
 
@@ -169,6 +191,7 @@ class VerdictSettings:
     stuck: float = 0.1  # and share of it, below which a joint that moves less does not move
     rough: float = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
     left: float = 0.1  # share of the held-out excess that is left, from which on something else is at work
+    law: LawSettings = field(default_factory=LawSettings)
 
     def widening(self, remaining: float) -> float:
         """Return how much wider an interval is than noise alone makes it: what is left unexplained widens it.

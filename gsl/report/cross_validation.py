@@ -27,7 +27,7 @@ class Fold:
         causes: Named, or suspected where nothing may be named.
         parameters: Of these, as a world's `effects:`.
         removed: Share of the held-out excess of windows that is gone, if there is any.
-        ceiling: The same with a learned residual.
+        ceiling: The same with a law of each servo on top of the effects.
         names: Of the held-out trajectories.
         errors: Mean absolute error of each of them in a whole replay [rad], by what replays it; NaN where it diverges
             or where the torque is never on.
@@ -64,7 +64,7 @@ class Fold:
 def table(folds: Sequence[Fold], by: str) -> str:
     """Return the table, and below it how the diagnosis compares with the best of the others."""
     ways = list(folds[0].errors)
-    columns = (f"{by} held out", *(f"{way} [mrad]" for way in ways), "excess removed", "learned residual", "causes")
+    columns = (f"{by} held out", *(f"{way} [mrad]" for way in ways), "excess removed", "with a servo law", "causes")
     rows = [
         (
             fold.held_out,

@@ -8,6 +8,7 @@ from typing import Any
 from gsl.report.diagnosis_answers import cards
 from gsl.report.diagnosis_limits import limits
 from gsl.report.diagnosis_method import calibration, caveats, method, noise_floor, self_test
+from gsl.report.diagnosis_missing import missing
 from gsl.report.diagnosis_policies import policies
 from gsl.report.diagnosis_ranking import causes, ranking
 from gsl.report.diagnosis_replays import replays
@@ -26,6 +27,7 @@ _SECTIONS = (
     growth,
     sides,
     causes,
+    missing,
     limits,
     ranking,
     shrinkage,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from markupsafe import Markup
 
+from gsl.report.diagnosis_missing import missing_sentence
 from gsl.report.diagnosis_next import Step, steps
 from gsl.report.diagnosis_verdict import (
     alternatives,
@@ -50,8 +51,8 @@ def _cause(document: Document) -> Markup:
 def _nothing(document: Document) -> str:
     if verdict(document) == "no_gap":
         return "Nothing that this log can show."
-    near = nearest(document)
-    return f"None of the known effects. The nearest: {near}." if near else "None of the known effects."
+    near = f"The nearest: {nearest(document)}." if nearest(document) else ""
+    return " ".join(filter(None, ["None of the known effects.", near, missing_sentence(document)]))
 
 
 def _one(cause: Document) -> Markup:

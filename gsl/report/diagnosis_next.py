@@ -98,9 +98,12 @@ def _training(document: Document) -> str:
 
 
 def _advise_learning(document: Document) -> Step:
+    servo = bool(entries(document, "forms"))  # a law of each servo explains it, so a servo can be learned
+    learn = f"Let a {'servo' if servo else 'grounding'} learn what no effect explains"
+    grounding = "effects_servo" if servo else "gat"
     if _own(document):
-        return Step("Let a grounding learn what no effect explains: `gsl iterate` with your worlds, task and policy.")
-    return Step("Let a grounding learn what no effect explains, and check it.", "gsl iterate grounding=gat")
+        return Step(f"{learn}: `gsl iterate grounding={grounding}` with your worlds, task and policy.")
+    return Step(f"{learn}, and check it.", f"gsl iterate grounding={grounding}")
 
 
 def _own(document: Document) -> Document:

@@ -16,13 +16,13 @@ FLOOR = 1.0
 
 
 def shrinkage(document: Document) -> Markup | None:
-    """Return the gap before, with calibration alone, with the effects, and with a learned residual."""
+    """Return the gap before, with calibration alone, with the effects, and with a law of each servo on top."""
     figures = part(document, "shrinkage")
     drawn = bar_chart(_bars(figures), mark=finite(figures.get("floor")) or FLOOR)
     note = (
         "Gap / noise on held-out records; the dashed line is the noise, below which nothing can be seen. Calibration "
-        "is each joint's own small gains, friction and zero. The learned residual is a black box, the forward model of "
-        "GAT, fitted to the same records: short logs do not teach it much. Percentages are shares of the squared gap."
+        "is each joint's own small gains, friction and zero. The ceiling is what any servo could explain: a small law "
+        "of each joint, learned on top of the best effects. Percentages are shares of the squared gap."
     )
     sentence = element("p", prose(shrinkage_sentence(document))) if drawn else None
     return section("How far the gap shrinks", sentence, drawn, note=note)
@@ -34,7 +34,7 @@ def _bars(figures: Document) -> list[Bar]:
         ("simulator as it was", "before", figures.get("before"), ""),
         ("calibration alone", "other", figures.get("calibration"), ""),
         ("with the effects", "after", figures.get("after"), ""),
-        ("learned residual, no cause named", "quiet", ceiling, f", {share(figures.get('ceiling_fraction'))}"),
+        ("ceiling: a law of each servo on top", "quiet", ceiling, f", {share(figures.get('ceiling_fraction'))}"),
     )
     return [
         Bar(label, [(kind, finite(value))], f"{level(value)}{more}")
@@ -44,7 +44,7 @@ def _bars(figures: Document) -> list[Bar]:
 
 
 def _ceiling(figures: Document) -> float | None:
-    """The gap / noise that the learned residual leaves: shares of the excess are shares of squares."""
+    """The gap / noise that laws of the servos leave: shares of the excess are shares of squares."""
     before, fraction = finite(figures.get("before")), finite(figures.get("ceiling_fraction"))
     if before is None or fraction is None:
         return None

@@ -167,10 +167,10 @@ def shrinkage_sentence(document: Document) -> str:
 
 
 def comparison_sentence(document: Document) -> str:
-    """Return what calibration alone and a learned residual do; nothing if neither was measured."""
+    """Return what calibration alone and a law of each servo do; nothing if neither was measured."""
     figures, sentences = part(document, "shrinkage"), []
     if finite(figures.get("calibration")) is not None:
         sentences.append(f"Calibration alone leaves {level(figures['calibration'])}.")
     if finite(figures.get("ceiling_fraction")) is not None:
-        sentences.append(f"A learned residual, a black box, takes away {share(figures['ceiling_fraction'])}.")
+        sentences.append(f"With a learned law of each servo on top, {share(figures['ceiling_fraction'])} are gone.")
     return " ".join(sentences)

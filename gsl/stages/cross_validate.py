@@ -28,6 +28,7 @@ from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.in_the_air import change
 from gsl.diagnosis.simulate.simulator import mean_errors
 from gsl.diagnosis.verdict.findings import Findings
+from gsl.diagnosis.verdict.servo_law import learn_laws
 from gsl.diagnosis.verdict.shrinkage import ceiling, compute_removed
 from gsl.effects.effect import effect_class
 from gsl.errors import ConfigError, InputError
@@ -184,7 +185,7 @@ class CrossValidate:
             causes=causes,
             parameters=chosen.effects,
             removed=compute_removed(exp, exp.residual(before), exp.residual(after))[0],
-            ceiling=ceiling(exp, before, seed=self.seed),
+            ceiling=ceiling(exp, before, learn_laws(exp, findings.simulator, chosen.effects, chosen.fit.shifts)),
             names=[record.name for record in _check(exp)],
             errors=errors,
             servos=servos,

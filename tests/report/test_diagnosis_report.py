@@ -93,13 +93,29 @@ def test_the_first_screen_answers_everything() -> None:
                 "Play steps_large",
             ),
         ),
-        ("unknown", ("no effect that we know explains it", "The nearest: servo gain of LKneePitch.", "grounding=gat")),
+        (
+            "unknown",
+            (
+                "no effect that we know explains it",
+                "The nearest: servo gain of LKneePitch.",
+                "LKneePitch: a lag or a function of the error, which the servo's torque follows (20 ms late)",
+                "LHipPitch: a function of position.",
+                "missing torque [N·m]",
+                "grounding=effects_servo",
+            ),
+        ),
         ("nothing", ("No verdict", "Not measured")),
     ],
 )
 def test_every_verdict_is_told(kind: str, phrases: tuple[str, ...]) -> None:
     text = words(report_html(DOCUMENTS[kind]()))
     assert [entry for entry in phrases if entry not in text] == []
+
+
+def test_where_no_law_says_what_is_missing_a_grounding_learns_it() -> None:
+    (step, *_) = steps(made.unknown() | {"forms": []})
+    assert step.command == "gsl iterate grounding=gat"
+    assert "What is missing" not in words(report_html(made.unknown() | {"forms": []}))
 
 
 def test_what_was_given_to_do_is_what_is_told() -> None:
@@ -153,9 +169,11 @@ def test_a_cause_is_named_with_what_was_chosen_of_it() -> None:
     assert cause_name({"effect": "supply_sag", "scope": "", "joints": []}) == "supply sag"
 
 
-def test_what_a_learned_residual_leaves_is_a_share_of_squares() -> None:
+def test_what_a_ceiling_leaves_is_a_share_of_squares() -> None:
     shrinkage = {"before": 3.0, "after": 1.0, "fraction": 1.0, "ceiling_fraction": 0.625}  # 9 - 0.625 (9 - 1) = 2²
-    assert "learned residual, no cause named 3.00 × 1.00 × 2.00 ×, 62 %" in words(report_html({"shrinkage": shrinkage}))
+    assert "ceiling: a law of each servo on top 3.00 × 1.00 × 2.00 ×, 62 %" in words(
+        report_html({"shrinkage": shrinkage})
+    )
 
 
 def poisoned(document: Any, key: str = "") -> Any:

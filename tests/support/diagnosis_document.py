@@ -251,12 +251,21 @@ def inseparable() -> dict[str, Any]:
     }
 
 
+def forms() -> list[dict[str, Any]]:
+    """What is missing of two joints: a lag of one, a function of position of the other."""
+    shares = {"gain": 0.0, "inertia": 0.2, "lag": 0.97, "speed": 0.0, "load": 0.9, "position": 0.1, "time": 0.0}
+    knee = {"joint": "LKneePitch", "form": "lag", "shares": shares, "late": 0.0203, "x": [], "y": []}
+    other = {**shares, "lag": 0.1, "load": 0.2, "position": 0.99}
+    curve = {"x": [-0.4, 0.0, 0.4], "y": [0.2, 0.0, -0.2]}
+    return [knee, {"joint": "LHipPitch", "form": "position", "shares": other, "late": -0.001, **curve}]
+
+
 def unknown() -> dict[str, Any]:
     """A diagnosis that finds a gap and no cause."""
     report = document()
     shrinkage = report["shrinkage"] | {"after": 2.1, "fraction": 0.5, "low": 0.42, "high": 0.57}
     ranking = copy.deepcopy(report["ranking"])[1:]
-    summary = "The gap is far above the noise, and the best effect explains half of what a learned residual explains."
+    summary = "The gap is far above the noise, and the best effect explains half of what a servo could explain."
     return report | {
         "verdict": "unknown",
         "summary": summary,
@@ -265,4 +274,5 @@ def unknown() -> dict[str, Any]:
         "ranking": ranking,
         "shrinkage": shrinkage,
         "next_experiment": None,
+        "forms": forms(),
     }

@@ -34,7 +34,7 @@ class Mark:
         extra: Causes that are named beyond those of the truth.
         errors: Relative errors of the parameters, by effect, where the name is right; of what the effect does.
         covered: Whether each one's interval holds the truth.
-        shrinkage: Share of the gap that is gone, over what a learned residual takes away; None where there is none.
+        shrinkage: Share of the gap that is gone, over the ceiling's; None where there is none.
         seconds: That the answer took.
     """
 

@@ -67,6 +67,7 @@ def document(findings: Findings, **about: Any) -> dict[str, Any]:
         },
         "invisible": list(findings.selection.screening.invisible),
         "unexplained": far,
+        "forms": [asdict(form) for form in findings.forms],
         "caveats": caveats(findings, unsure, shrunk, far),
         "limits": [],
         "next_experiment": None,

@@ -19,6 +19,7 @@ from gsl.diagnosis.simulate.calibration import calibrate, to_effects
 from gsl.diagnosis.simulate.in_the_air import change
 from gsl.diagnosis.simulate.simulator import Simulator
 from gsl.diagnosis.verdict.self_test import Trial
+from gsl.diagnosis.verdict.servo_law import Form, Laws
 from gsl.diagnosis.verdict.verdict import Verdict
 from gsl.effects.effect import together
 from gsl.storage.diagnosis_report import DIGITS
@@ -38,6 +39,8 @@ class Findings:
         baseline: From the reference, if there is one.
         shift: Between the clocks of commands and measurements, taken out first [s], if they are apart.
         refuted: Effects that fitted but lost their claim to the name, with the reason.
+        laws: What a law of each servo explains on top of the chosen hypothesis, where it can be learned.
+        forms: What joints do that the simulator does not, where no effect explains it and a law does.
         options: How it was made.
     """
 
@@ -50,6 +53,8 @@ class Findings:
     baseline: Baseline | None
     shift: float = 0.0
     refuted: Mapping[str, str] = field(default_factory=dict)
+    laws: Laws | None = None
+    forms: tuple[Form, ...] = ()
     options: Options = field(default_factory=Options)
 
     @property

@@ -1,8 +1,6 @@
-"""Shrinkage: how far the held-out gap goes down with the diagnosed effects, beside what a learned residual reaches.
+"""Shrinkage: how far the held-out gap goes down with the diagnosed effects, beside what any servo could reach.
 
-The learned residual is the ceiling, with no physics and the same data: the model of GAT's forward model (linear or MLP,
-whichever does better on a part of the training windows) predicts from the last simulated positions and commands how far
-the robot is from the simulator.
+The ceiling is the best hypothesis with a law of each servo on top, learned from the same data: see servo_law.py.
 """
 
 from __future__ import annotations
@@ -16,16 +14,11 @@ from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.settings import VerdictSettings
 from gsl.diagnosis.verdict.findings import Findings
 from gsl.diagnosis.verdict.localise import find_regimes
-from gsl.models.choice import best, fit_network
-from gsl.models.config import ModelConfig
-from gsl.models.network import Network, Samples
+from gsl.diagnosis.verdict.servo_law import Laws
 
 SAMPLES = 1000  # of the bootstrap
 WORDS = {"high_load": "asked for much torque", "reversal": "turning round"}  # for regimes
-LAGS = (0, 1, 2, 3, 5, 8, 12)  # ticks back at which the learned residual sees command less position
-CONFIG = ModelConfig(hidden=(64, 64), epochs=40, patience=6, ridge=1.0)
-VALIDATION = 4  # every fourth training window
-CLIP = 50.0  # of its targets, in units of the floor
+CLIP = 50.0  # of residuals beside a ceiling [floors]: what runs away counts as much
 FEW = 50  # residuals of a regime, of which fewer say nothing
 
 
@@ -50,7 +43,7 @@ def shrinkage(findings: Findings, before: np.ndarray, after: np.ndarray) -> dict
         "calibration_fraction": compute_removed(log, z["before"], z["calibration"])[0],
         "low": low,
         "high": high,
-        "ceiling_fraction": ceiling(log, before, seed=findings.options.seed),
+        "ceiling_fraction": ceiling(log, before, findings.laws),
         "by_joint": [
             {"joint": joint, "before": float(np.sqrt(mean["before"][k])), "after": float(np.sqrt(mean["after"][k]))}
             for k, joint in enumerate(log.channels)
@@ -116,48 +109,18 @@ def _by_regime(findings: Findings, z: Mapping[str, np.ndarray]) -> list[dict[str
     return rows
 
 
-def ceiling(log: Log, before: np.ndarray, *, seed: int = 0) -> float | None:
-    """Return the share of the held-out excess that a learned residual takes away; None without one, or if joints shake.
+def ceiling(log: Log, before: np.ndarray, laws: Laws | None) -> float | None:
+    """Return the share of the held-out excess that goes with a law of each servo; None without laws or an excess.
 
     Args:
         log: The log.
         before: Replays of all windows by the simulator as it was [rad], shape (W, T, n_joints).
-        seed: Of the fit.
+        laws: On top of the best hypothesis.
     """
-    z, used = log.residual(before)[log.held_out], log.used
-    if _excess(z, used) < VerdictSettings.no_excess or log.comparison.shaking.any() or not np.isfinite(before).all():
+    if laws is None or not np.isfinite(before).all():
         return None
-    learned = _learn_residual(log, before, seed=seed)
-    return 1.0 - max(0.0, _excess(learned, used)) / _excess(np.clip(z, -CLIP, CLIP), used)
-
-
-def _learn_residual(log: Log, replayed: np.ndarray, *, seed: int) -> np.ndarray:
-    """Return held-out residuals after the learned correction, in units of the floor, shape (W, scored, n_joints)."""
-    inputs, targets = _samples(log, replayed)
-    check = np.arange(len(log.train)) % VALIDATION == 0
-    sets = _flat(inputs, targets, log.train[~check]), _flat(inputs, targets, log.train[check])
-
-    def fit(config: ModelConfig, whole: bool) -> Network:
-        return fit_network(*sets, config, seed=seed, whole=whole)
-
-    def score(network: Network) -> float:
-        return float(np.mean((network.predict_many(sets[1][0]) - sets[1][1]) ** 2))
-
-    network, _ = best(CONFIG, fit, score)
-    z = -targets[log.held_out]
-    return z + network.predict_many(inputs[log.held_out].reshape(-1, inputs.shape[2])).reshape(z.shape)
-
-
-def _samples(log: Log, replayed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return inputs, shape (W, scored, n_inputs), and what is to be predicted, shape (W, scored, n_joints)."""
-    cut, first, joints = log.pieces, log.pieces.warm_up, len(log.joints)
-    behind = cut.targets(joints) - replayed[..., :joints]
-    lagged = [behind[:, first - lag : behind.shape[1] - lag] for lag in LAGS if lag <= first]
-    speed = np.gradient(replayed, axis=1)[:, first:]
-    targets = np.clip((cut.real - replayed) / log.comparison.floor, -CLIP, CLIP)[:, first:]
-    place = replayed[:, first:] - np.where(np.arange(replayed.shape[2]) < joints, 0.0, replayed[:, first : first + 1])
-    return np.concatenate([*lagged, speed, place, np.sign(speed)], axis=2), targets
-
-
-def _flat(inputs: np.ndarray, targets: np.ndarray, windows: np.ndarray) -> Samples:
-    return inputs[windows].reshape(-1, inputs.shape[2]), targets[windows].reshape(-1, targets.shape[2])
+    used = log.used
+    was = _excess(np.clip(log.residual(before)[laws.windows], -CLIP, CLIP), used)
+    if was < VerdictSettings.no_excess:
+        return None
+    return 1.0 - max(0.0, _excess(np.clip(laws.z, -CLIP, CLIP), used)) / was

@@ -14,6 +14,7 @@ from gsl.effects.effect import TWINS
 
 ALIKE = tuple(frozenset(pair) for pair in TWINS.items())  # in the air
 SHARPNESS = 2.0  # of log-odds, over a margin in its spread
+FAR = 100.0  # beyond which a strangeness is no stranger
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class Verdict:
         explained: Share of the excess that the chosen hypothesis explains.
         remaining: Its cost of a residual over that of noise.
         complete: Probability that nothing else is at work.
+        missing: What a law of each servo explains beyond it: see `Laws.missing`.
         whole: Share of the excess from which on causes are all there is.
     """
 
@@ -57,6 +59,7 @@ class Verdict:
     remaining: float
     complete: float
     whole: float = VerdictSettings.whole
+    missing: float = 0.0
 
     @property
     def names_causes(self) -> bool:
@@ -91,8 +94,13 @@ class Judge:
     settings: VerdictSettings = field(default_factory=VerdictSettings)
     noise_cost: float = SearchSettings.noise_cost
 
-    def judge(self, selection: Selection) -> Verdict:
-        """Return what a selection allows to say."""
+    def judge(self, selection: Selection, missing: float = 0.0) -> Verdict:
+        """Return what a selection allows to say.
+
+        Args:
+            selection: What a search came to.
+            missing: What a law of each servo explains beyond it: see `Laws.missing`.
+        """
         how, chosen, none = self.settings, selection.chosen, selection.none
         least = self.expected * float(none.counts.sum())
         excess = max(none.cost - least, 1e-9)
@@ -101,14 +109,15 @@ class Judge:
         worst_joint = chosen.levels.max() / max(1.0, self.expected)
         strange = max(np.log(remaining) / np.log(how.foreign), np.log(worst_joint) / np.log(how.local))
         if not chosen.candidates:
-            return Verdict("unknown" if strange > 1.0 else "no_gap", (), (), 0.0, remaining, 1.0, how.whole)
+            word = "unknown" if max(strange, missing) > 1.0 else "no_gap"
+            return Verdict(word, (), (), 0.0, remaining, 1.0, how.whole, missing)
         causes = tuple(self._cause(selection, k) for k in range(chosen.size))
-        complete = self._completeness(explained, float(strange))
+        complete = self._completeness(explained, float(strange), missing)
         groups = self._inseparable(chosen, causes)
         sure = complete * (how.lone if self.lone else 1.0)
         scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
         word = "unknown" if complete < 0.5 else "inseparable" if groups else "causes"
-        return Verdict(word, scaled, groups, explained, remaining, complete, how.whole)
+        return Verdict(word, scaled, groups, explained, remaining, complete, how.whole, missing)
 
     def _inseparable(self, chosen: Hypothesis, causes: tuple[Cause, ...]) -> tuple[tuple[str, ...], ...]:
         alike = () if self.walking else ALIKE
@@ -119,11 +128,15 @@ class Judge:
                 groups.append((name, str(cause.rival)))
         return tuple(dict.fromkeys(tuple(sorted(set(group))) for group in groups))
 
-    def _completeness(self, explained: float, strange: float) -> float:
-        """Return the probability that the library holds what is at work: much is left only where that is missing."""
-        missing, enough = strange - 1.0, self.settings.explained
-        unexplained = (enough - explained) / (1.0 - enough)
-        return float(1.0 / (1.0 + np.exp(min(missing, unexplained) / self.settings.soft)))
+    def _completeness(self, explained: float, strange: float, missing: float) -> float:
+        """Return the probability that the library holds what is at work.
+
+        Where it does not, a law of each servo explains more than the effects do; or, where no servo has such a law,
+        much is left of a gap that they hardly explain.
+        """
+        enough = self.settings.explained
+        left = min(strange - 1.0, (enough - explained) / (1.0 - enough))
+        return float(1.0 / (1.0 + np.exp(min(max(missing - 1.0, left), FAR) / self.settings.soft)))
 
     def _cause(self, selection: Selection, k: int) -> Cause:
         chosen, none = selection.chosen, selection.none
