@@ -56,11 +56,7 @@ def compare(first: str, second: str, console: Console) -> None:
 
 def _differ(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Pair]:
     names = [*before, *(name for name in after if name not in before)]
-    return {
-        name: (before.get(name), after.get(name))
-        for name in names
-        if (name in before) != (name in after) or before.get(name) != after.get(name)
-    }
+    return {name: (before.get(name), after.get(name)) for name in names if before.get(name) != after.get(name)}
 
 
 def _show(pair: Pair) -> tuple[str, str]:

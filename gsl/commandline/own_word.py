@@ -6,6 +6,7 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from importlib.machinery import PathFinder
 from typing import Any
 
@@ -17,6 +18,7 @@ from gsl.core.trust import TRUST, modules_in
 from gsl.errors import ConfigError
 
 VARIABLE = "GSL_TRUST"
+ALIKE = 0.75  # trsut is trust; trial is not
 _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _TRUTH = ("true", "false")
 _USUAL = {
@@ -32,10 +34,12 @@ def find_trust(arguments: Sequence[str]) -> tuple[str, ...]:
     """Return the modules that a command line names: in `trust=`, and wherever it says itself which class to take.
 
     Raises:
-        ConfigError: `trust` names no module.
+        ConfigError: `trust` names no module, or is misspelt.
     """
     named = [word for word in os.environ.get(VARIABLE, "").replace(",", " ").split()]
     for key, value in _split_words(arguments):
+        if key != TRUST and get_close_matches(key, [TRUST], cutoff=ALIKE):
+            raise ConfigError(key, f"no such setting; did you mean {TRUST}?")
         named += modules_of(value) if key == TRUST else modules_in({key.rpartition(".")[2]: value})
     return tuple(dict.fromkeys(named))
 
@@ -43,8 +47,19 @@ def find_trust(arguments: Sequence[str]) -> tuple[str, ...]:
 def find_misspelt(arguments: Sequence[str]) -> list[str]:
     """Return the modules that `trust=` names on a command line and that are nowhere to be imported from."""
     typed = [module for key, value in _split_words(arguments) if key == TRUST for module in modules_of(value)]
-    places = [os.getcwd(), *sys.path]
-    return [module for module in typed if PathFinder.find_spec(module.partition(".")[0], places) is None]
+    return [module for module in typed if not _is_there(module)]
+
+
+def _is_there(module: str) -> bool:
+    """Whether a module can be imported, without importing it or what it lies in."""
+    places: Sequence[str] | None = [os.getcwd(), *sys.path]
+    words = module.split(".")
+    for count in range(1, len(words) + 1):
+        spec = None if places is None else PathFinder.find_spec(".".join(words[:count]), places)
+        if spec is None:
+            return False
+        places = spec.submodule_search_locations
+    return True
 
 
 def modules_of(value: Any) -> tuple[str, ...]:

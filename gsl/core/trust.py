@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import sys
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import is_dataclass
 from typing import Any
@@ -24,6 +25,7 @@ _ROOMS = (
     *("validation", "worlds", "studies", "blind"),
 )
 _OURS = (*_PACKAGES, *(f"gsl.{room}" for room in _ROOMS))
+_MISSING = "???"  # OmegaConf's word for a setting without a value, as it is until the command line is read
 _LABELS = "gsl.storage.importers."  # a mapping's `robot` says whose log it is, and builds none
 _NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)+")
 
@@ -93,10 +95,14 @@ def check_code(plain: Any, trust: Collection[str] = (), where: str = "", *, refe
     """
     foreign = [mention for mention in code_in(plain, where) if not (references and "${" in mention[1])]
     if refused := [mention for mention in foreign if not _below(mention[2], trust)]:
-        path, name, _ = refused[0]
-        wanted = dict.fromkeys(filter(None, [*trust, *(module for _, _, module in refused)]))
+        path, name, module = refused[0]
+        shown = None if name == _MISSING else name
+        if module.partition(".")[0] in sys.stdlib_module_names:
+            raise ConfigError(path, "is of Python's own library, which can run programs; no file needs it", given=shown)
+        needed = [word for word in trust if any(_below(other, [word]) for _, _, other in foreign)]
+        wanted = dict.fromkeys(filter(None, [*needed, *(other for _, _, other in refused)]))
         how = f"{TRUST}={next(iter(wanted), '')}" if len(wanted) < 2 else f"'{TRUST}=[{','.join(wanted)}]'"
-        raise ConfigError(path, f"is code that is not gsl's; say {how} if you know where it comes from", given=name)
+        raise ConfigError(path, f"is code that is not gsl's; say {how} if you know where it comes from", given=shown)
 
 
 def class_of(name: Any, where: str = "") -> Any:

@@ -61,7 +61,7 @@ def make(target: Callable[..., T], values: Mapping[str, Any], *, where: str = ""
             if error.__traceback__ is None or error.__traceback__.tb_next is not None:
                 raise  # within what was called
             name = ".".join(filter(None, [where, TARGET]))
-            raise ConfigError(name, "cannot be made of these settings", given=_name_of(target)) from error
+            raise ConfigError(name, f"cannot be made of its settings ({error})", given=_name_of(target)) from error
         name = ".".join(filter(None, [where, unexpected[1]]))
         raise ConfigError(name, f"no such setting{did_you_mean(unexpected[1], settings_of(target))}") from error
 

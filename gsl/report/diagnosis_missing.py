@@ -32,9 +32,14 @@ _AXES: Mapping[str, str] = {
 ALIKE = 0.9  # share of the best form's share from which on another one does as well
 
 
+def list_missing(document: Document) -> list[str]:
+    """Return of which form what is missing is, a line for each joint; none if that is not known."""
+    return [f"{read_word(form, 'joint')}: {_words(form)}" for form in entries(document, "forms")]
+
+
 def missing_sentence(document: Document) -> str:
-    """Return of which form what is missing is, joint by joint; nothing if that is not known."""
-    joints = [f"{read_word(form, 'joint')}: {_words(form)}" for form in entries(document, "forms")]
+    """Return the same in a sentence."""
+    joints = list_missing(document)
     return f"What is missing looks like this. {'; '.join(joints)}." if joints else ""
 
 
@@ -72,9 +77,9 @@ def missing(document: Document) -> Markup | None:
         for form in forms
     ]
     note = (
-        "A small law of each servo was learned on top of the best effects, and explains held-out motions surely better "
-        "than these. Shares: what terms of one form explain on their own, of what a law explains beyond gains and a "
-        "zero of the simulator as it is. Forms that are alike in these motions have about the same share."
+        "A small law of each servo was learned on top of the best effects, and explains held-out motions significantly "
+        "better than these. Shares: what terms of one form explain on their own, of what a law explains beyond gains "
+        "and a zero of the simulator as it is. Forms that are alike in these motions have about the same share."
     )
     parts = [element("p", prose(missing_sentence(document))), table(("joint", *kinds, "all in all"), rows), *drawn]
     return section("What is missing", *(parts if forms else ()), note=note)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gsl.report.diagnosis_limits import limits_sentence
-from gsl.report.diagnosis_missing import missing_sentence
+from gsl.report.diagnosis_missing import list_missing
 from gsl.report.diagnosis_next import steps
 from gsl.report.diagnosis_policies import policy_lines
 from gsl.report.diagnosis_verdict import (
@@ -53,7 +53,7 @@ def _causes(document: Document) -> Table:
     if not rows:
         alike = [("either", alternatives(group)) for group in entries(document, "inseparable")]
         alike += [("nearest", nearest(document))] if nearest(document) else []
-        alike += [("missing", missing_sentence(document))] if missing_sentence(document) else []
+        alike += [("missing" if k == 0 else "", line) for k, line in enumerate(list_missing(document))]
         return Table(headline(document), ("", ""), [*alike, *_shrinkage(document)], summary)
     columns = ("cause", "parameter", "value", "95 % interval", "probability", "of the rest, back without it")
     caption = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]

@@ -65,7 +65,7 @@ def robot(name: str) -> Robot:
     if is_file(name):
         return from_file(_there(name))
     place, _, function = name.rpartition(".") if "." in name else (f"gsl.robots.{name}", "", name)
-    if not (name in names() or "." in name):
+    if "/" in name or not (name in names() or "." in name):
         hint = f"{did_you_mean(name, names(), listed=True)}, a file such as arm.urdf, or robot_descriptions:NAME"
         raise ConfigError("robot", f"no robot called '{name}'{hint}")
     try:

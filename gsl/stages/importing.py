@@ -110,9 +110,13 @@ class Import:
         }
 
     def _source(self) -> str:
-        source = self.source or self.mapping.source
+        if self.source:
+            return locate(self.source)
+        source = self.mapping.source
         if not source:
             raise ConfigError("source", "has no value yet; say source=... (a file, a folder or a pattern)")
+        if Path(source).is_absolute() or ".." in Path(source).parts:
+            raise ConfigError("mapping.source", "leads out of this folder; type source=... yourself", given=source)
         return locate(source)
 
     def _progress(self, chosen: Source, console: Console) -> Any:

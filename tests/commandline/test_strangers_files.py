@@ -154,6 +154,16 @@ def test_a_misspelt_module_to_trust_is_named(place: Path) -> None:
     said = gsl("import", "source=log.csv", "trust=[evil,evli,numpy.linalg]", "--check", folder=place)
     assert said.err.count("warning: trust=") == 1
     assert "warning: trust=evli is no module of this folder, nor of an installed package" in said.err
+    assert "trust=evil.Thing is no module" in gsl("import", "trust=evil.Thing", "--check", folder=place).err
+    assert refused("import", "trsut=evil", "--check", folder=place) == "trsut: no such setting; did you mean trust?"
+
+
+@pytest.mark.parametrize("source", ["../../etc", "/etc", "logs/../../etc"])
+def test_a_mapping_chooses_no_source_outside_of_the_folder(source: str, place: Path) -> None:
+    (place / "m.yaml").write_text(f"{SIGNALS}source: {source}\n")
+    said = refused("import", "mapping=m.yaml", folder=place)
+    assert said == f"mapping.source = {source}: leads out of this folder; type source=... yourself"
+    done("import", "mapping=m.yaml", "source=log.csv", "--check", folder=place)
 
 
 def test_what_is_typed_is_the_users_own_word(place: Path) -> None:
@@ -408,8 +418,11 @@ def test_code_is_found_wherever_plain_data_names_it() -> None:
     assert [path for path, _, _ in code_in(told)] == ["a.0._target_", "world.robot"]
     assert modules_in(told) == ("os", "x")
     check_code(told, ["os", "x"])
-    with pytest.raises(ConfigError, match=r"a\.0\._target_ = os\.system: .* say 'trust=\[x,os\]'"):
+    with pytest.raises(ConfigError, match=r"a\.0\._target_ = os\.system: is of Python's own library"):
         check_code(told, ["x"])
+    two = {"a": {"_target_": "lab.A"}, "b": {"_target_": "mine.B"}}
+    with pytest.raises(ConfigError, match=r"a\._target_ = lab\.A: .* say 'trust=\[mine,lab\]'"):
+        check_code(two, ["misspelt", "mine"])
     check_code({"_target_": "lab.robots.World"}, ["lab"])
     with pytest.raises(ConfigError):
         check_code({"_target_": "laboratory.World"}, ["lab"])
