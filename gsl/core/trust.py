@@ -96,7 +96,7 @@ def check_code(plain: Any, trust: Collection[str] = (), where: str = "", *, refe
     foreign = [mention for mention in code_in(plain, where) if not (references and "${" in mention[1])]
     if refused := [mention for mention in foreign if not _below(mention[2], trust)]:
         path, name, module = refused[0]
-        shown = None if name == _MISSING else name
+        shown = "" if name == _MISSING else name
         if module.partition(".")[0] in sys.stdlib_module_names:
             raise ConfigError(path, "is of Python's own library, which can run programs; no file needs it", given=shown)
         needed = [word for word in trust if any(_below(other, [word]) for _, _, other in foreign)]

@@ -28,7 +28,6 @@ UNFINISHED = (  # an entry goes once its names are mended
     "gsl/storage",
     "gsl/training/adjoint.py",
     "gsl/training/replay_path.py",
-    "gsl/worlds/chain.py",
     "gsl/worlds/held.py",
     "gsl/worlds/servo.py",
     "tests/commandline",
