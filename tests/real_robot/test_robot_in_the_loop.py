@@ -273,7 +273,7 @@ def test_a_bad_answer_is_refused_in_one_line(
         ("pi0_99,0.1,no", "the request has no episode 'pi0_99'; did you mean pi0_0"),
         ("name,metres\npi0_01,0.1", "needs the columns episode, distance (or value) and fell; it has name, metres"),
         ("pi0_01,far,no", "row 1: distance is 'far', not a number"),
-        ("pi0_01,nan,no", "row 1: distance is not a finite number"),
+        ("pi0_01,nan,no", "row 1: distance is 'nan', which nothing measures"),
         ("pi0_01,140,no", "row 1: a distance of 140 m; is it in metres?"),
         ("pi0_01,0.1,perhaps", "row 1: fell is 'perhaps'; write yes or no"),
         ("pi0_01,0.1,no\npi0_01,0.2,no", "pi0_01 is answered twice"),

@@ -23,11 +23,11 @@ from gsl.robots.catalogue import robot
 from gsl.robots.frames import euler
 from gsl.robots.urdf import urdf
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.drive_train import STOP_STIFFNESS
 from gsl.worlds.engine import Engine
 from gsl.worlds.fits import check_turning
 from gsl.worlds.held import Held, Windows
 from gsl.worlds.physics import Physics
-from gsl.worlds.servo import STOP_STIFFNESS
 from gsl.worlds.servo_state import COMMANDS
 from gsl.worlds.start import resting
 

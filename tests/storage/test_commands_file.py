@@ -79,7 +79,7 @@ BAD: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "a text": (changed(7, 3, "far"), "episode fast: action must be rows of 15"),
     "a null": (changed(7, 3, None), "episode fast, row 7, LKneePitch: the target is not a finite number"),
     "a NaN": (changed(7, 3, float("nan")), "episode fast, row 7, LKneePitch: the target is not a finite number"),
-    "beyond a limit": (changed(7, 3, 2.2), "row 7, LKneePitch: the target of 2.2 rad is above the limit of 2.113 rad"),
+    "beyond a limit": (changed(7, 3, 2.2), "row 7, LKneePitch: the target of 2.2 rad is above the limit, 2.113 rad"),
     "too abrupt": (changed(7, 3, 1.4), "row 7, LKneePitch: the target jumps by"),
     "too fast": (
         lambda stored: [
