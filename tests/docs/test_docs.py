@@ -39,7 +39,7 @@ def test_words_are_plain_and_a_decimal_has_its_zero(page: Path) -> None:
 def test_the_readme_is_a_page_one_reads() -> None:
     text = (ROOT / "README.md").read_text("utf-8")
     assert len(text.splitlines()) <= 150
-    assert len([link for link in LINK.finditer(text) if link[0].startswith("!")]) == 2  # a plot and a film
+    assert len([link for link in LINK.finditer(text) if link[0].startswith("!")]) == 3  # a plot, a page and a film
 
 
 @pytest.mark.parametrize("page", LINKED, ids=name)
