@@ -83,7 +83,7 @@ clean: ## Remove caches and build files; runs/ and the virtual environment stay.
 $(INSTALLED): pyproject.toml
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet 'torch>=2.4,<2.14'
-	$(VENV)/bin/python -m pip install --quiet -e '.[dev,sweep,mujoco,rl]'
+	$(VENV)/bin/python -m pip install --quiet -e '.[dev,sweep,mujoco,rl,mesh]'
 	touch $@
 
 # The chain of single commands. A stage runs when its configuration, the code or what it reads has changed, and a chain that

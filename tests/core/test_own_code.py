@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from commands import refused
+from commands import ENVIRONMENT
 
 from gsl.core.own_code import describe_own
 
@@ -34,7 +36,10 @@ class Mine(WalkEngine):
 def test_work_that_a_users_own_code_ends_has_failed(workers: int, tmp_path: Path) -> None:
     (tmp_path / "exits.py").write_text(EXITS)
     words = ("collect", "policy._target_=exits.Mine", "preset=toy", "task.duration=1.6", f"workers={workers}")
-    said = refused(*words, "name=refused", folder=tmp_path, code=1)
+    line = [sys.executable, "-m", "gsl", *words, "name=refused"]  # workers of an earlier test stand in another folder
+    ended = subprocess.run(line, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    said = ended.stderr.splitlines()[-1].removeprefix("gsl collect: ")
     assert said.startswith("exits.Mine.start failed (exits.py, line 8): SystemExit: 0")
 
 
