@@ -80,7 +80,7 @@ clean: ## Remove caches and build files; runs/ and the virtual environment stay.
 	rm -rf .mypy_cache .pytest_cache .ruff_cache build dist *.egg-info
 	find gsl experiments benchmarks tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-$(INSTALLED): pyproject.toml
+$(INSTALLED): pyproject.toml Makefile
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet 'torch>=2.4,<2.14'
 	$(VENV)/bin/python -m pip install --quiet -e '.[dev,sweep,mujoco,rl,mesh]'
