@@ -17,7 +17,7 @@ from gsl.core.observation import observations, read_sensors
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Trajectory
 from gsl.errors import ConfigError
-from gsl.grounding.gat import ActionTransformation, LoadedTransformation, check_modelled
+from gsl.grounding.gat import ActionTransformation, LoadedTransformation, check_coverage
 from gsl.grounding.none import NoGrounding
 from gsl.models.ensemble import Forward
 from gsl.report.joint_trace import Traces, joint_trace
@@ -154,7 +154,7 @@ def _check(iterate: Iterate, joint: str, duration: float) -> None:
         raise ConfigError("iterate.grounding", "only a transformation of actions can be drawn, such as gat")
     check_trainable(iterate, "iterate.grounding", iterate.grounding)
     joints = iterate.forward_model.joints_of_interest(iterate.sim.layout.joints, "iterate.forward_model")
-    check_modelled([joint], joints, "joint")
+    check_coverage([joint], joints, "joint")
     if round(duration / iterate.sim.layout.control_period) < 1:
         problem = f"is less than a tick, {iterate.sim.layout.control_period:g} s"
         raise ConfigError("duration", problem, given=f"{duration:g}")

@@ -46,7 +46,8 @@ def find_trust(arguments: Sequence[str]) -> tuple[str, ...]:
 
 def find_misspelt(arguments: Sequence[str]) -> list[str]:
     """Return the modules that `trust=` names on a command line and that are nowhere to be imported from."""
-    typed = [module for key, value in _split_words(arguments) if key == TRUST for module in modules_of(value)]
+    words = [argument for argument in arguments if argument.lstrip("+").startswith(f"{TRUST}=")]
+    typed = [module for _, value in _split_words(words) for module in modules_of(value)]
     return [module for module in typed if not _is_there(module)]
 
 

@@ -51,14 +51,14 @@ class BudgetedFiles(FileConfigSource):
         path = Path(os.path.realpath(os.path.join(self.path, self._normalize_file_name(config_path))))
         ours = path.is_relative_to(os.path.realpath(self.path))
         if self.provider == USER or not ours:
-            check_file(path, config_path if ours else path.stem)
-            if config_path.partition("/")[0] in FILE_GROUPS:
-                _check_builds_nothing(path)
+            settings = check_file(path, config_path if ours else path.stem)
+            if config_path.partition("/")[0] in FILE_GROUPS and TARGET in _words(settings):
+                raise InputError(f"{path}: names a class, as {TARGET}, and a mapping builds none; leave it out")
         return super().load_config(config_path)
 
 
-def check_file(path: Path, name: str) -> None:
-    """Refuse a file that is too large, or that sets what only the user can set."""
+def check_file(path: Path, name: str) -> dict[str, Any]:
+    """Return what a file says; refuse one that is too large, or that sets what only the user can set."""
     text = read_text(path)
     tree = yaml_tree(path, text, SETTINGS)
     if not isinstance(tree, dict | None):
@@ -76,11 +76,7 @@ def check_file(path: Path, name: str) -> None:
         raise InputError(f"{path}: refers to {resolver}; a file refers to settings, such as ${{sim.robot}}, alone")
     if TRUST in settings or TRUST in package.split("."):
         raise InputError(f"{path}: says {TRUST}, which only you can say, on the command line")
-
-
-def _check_builds_nothing(path: Path) -> None:
-    if TARGET in _words(yaml_tree(path, read_text(path), SETTINGS)):
-        raise InputError(f"{path}: names a class, as {TARGET}, and a mapping builds none; leave it out")
+    return settings
 
 
 def _words(value: Any) -> Iterator[str]:

@@ -41,7 +41,7 @@ class Console(Protocol):
         """Show a table of results."""
 
     @property
-    def planned(self) -> bool:
+    def is_planned(self) -> bool:
         """Whether it was said how long the work around takes, or nobody listens: a part of it says nothing then."""
 
     def plan(self, noun: str, parts: Sequence[Part]) -> AbstractContextManager[None]:
@@ -75,7 +75,7 @@ class Silent:
         """Show nothing."""
 
     @property
-    def planned(self) -> bool:
+    def is_planned(self) -> bool:
         """Nobody listens."""
         return True
 

@@ -112,7 +112,7 @@ class Workload:
             self._plans.pop()
 
     @property
-    def planned(self) -> bool:
+    def is_planned(self) -> bool:
         """Whether somebody knows how long the present part takes."""
         return any(plan.seconds for plan in self._plans)
 

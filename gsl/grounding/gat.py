@@ -37,7 +37,7 @@ from gsl.storage.references import resolve
 REACH = 0.5  # [rad]; a servo told to go farther than this from the agent's target is at its torque limit anyway
 
 
-def check_modelled(joints: Sequence[str], modelled: Sequence[str], where: str) -> None:
+def check_coverage(joints: Sequence[str], modelled: Sequence[str], where: str) -> None:
     """Refuse joints that models do not know; `where` is the setting that names them."""
     for joint in joints:
         if joint not in modelled:
@@ -133,7 +133,7 @@ class ActionTransformation:
             )
             raise ConfigError("inverse_model", problem)
         x = f.joints if isinstance(self.x, str) else self.x
-        check_modelled(x, f.joints, "x")
+        check_coverage(x, f.joints, "x")
         return LoadedTransformation(f, f_inv, alpha, self.noise, x, self.predicts != "point", self.gate)
 
     def parents(self, path: str) -> Mapping[str, Path]:

@@ -25,9 +25,7 @@ from gsl.models.servo_file import MAKER, read_members, read_servo
 from gsl.storage.references import resolve
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
-from gsl.worlds.fits import check_turning
-from gsl.worlds.held import refuse_hook
-from gsl.worlds.velocity_motors import check_servos
+from gsl.worlds.fits import check_replayable
 
 # Of a joint's torque limit, at every step and constant: motions in the air do not show what loads of the ground do.
 # Chosen for gain and falls together in searches on three other worlds (docs/results/servo.md).
@@ -117,11 +115,9 @@ class LearnedServo:
         """
         if not isinstance(world, BulletWorld):
             raise ConfigError("grounding", "only robots in Bullet worlds have servos to learn; take another grounding")
-        check_servos(world.motors)
-        check_turning(world.plant.robot)
+        check_replayable(world.motors, world.plant)
         if world.servo is not None:
             raise ConfigError("grounding", "the simulator has a learned servo already; say grounding=none")
-        refuse_hook(world.plant)
         return world
 
     @property

@@ -133,9 +133,9 @@ class Console:
         return exit_code
 
     @property
-    def planned(self) -> bool:
+    def is_planned(self) -> bool:
         """Whether it was said how long the work around takes."""
-        return self._work.planned
+        return self._work.is_planned
 
     @contextmanager
     def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:

@@ -60,7 +60,7 @@ def record_shots(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], pat
         except (RuntimeError, OSError) as error:
             raise InputError(f"the viewer cannot be started ({error}); write a file with out=motion.rrd") from error
     recording.send_recording_name(" and ".join(shot.title for shot in shots))
-    _arrange(recording, joints)
+    _arrange(recording, joints, robot.slides)
     recording.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     _log_floor(recording, shots)
     for part, shot in zip(PARTS, shots, strict=False):
@@ -71,14 +71,14 @@ def record_shots(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], pat
     recording.disconnect()
 
 
-def _arrange(recording: rerun.RecordingStream, joints: Sequence[str]) -> None:
+def _arrange(recording: rerun.RecordingStream, joints: Sequence[str], slides: Sequence[str]) -> None:
     """Lay the window out: the robot, and a plot of each joint beside it; the viewer's own guess shows no plot."""
     from rerun import blueprint
 
     curves = [
         blueprint.TimeSeriesView(
             origin=f"/joints/{joint}",
-            name=f"{joint} [°]",
+            name=f"{joint} [{scale_of(joint, slides).unit}]",
             plot_legend=blueprint.PlotLegend(visible=joint == joints[0]),  # it covers curves, and all have the same
         )
         for joint in joints
@@ -179,7 +179,5 @@ def _log_curves(
         time = rerun.TimeColumn("time", duration=trajectory.time[: len(values)])
         for k, joint in enumerate(joints):
             place, scale = f"joints/{joint}/{name}", scale_of(joint, slides)
-            recording.log(
-                place, rerun.SeriesLines(colors=[shade], widths=[width], names=f"{name} [{scale.unit}]"), static=True
-            )
+            recording.log(place, rerun.SeriesLines(colors=[shade], widths=[width], names=name), static=True)
             recording.send_columns(place, [time], rerun.Scalars.columns(scalars=scale.factor * values[:, k]))

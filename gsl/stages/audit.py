@@ -21,9 +21,7 @@ from gsl.storage import documents
 from gsl.storage.diagnosis_report import REPORT as DIAGNOSIS
 from gsl.storage.hashing import PAGE
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.fits import check_turning
-from gsl.worlds.held import refuse_hook
-from gsl.worlds.velocity_motors import check_servos
+from gsl.worlds.fits import check_replayable
 
 REPORT = "audit.json"
 
@@ -39,9 +37,7 @@ class Audit:
 
     def __post_init__(self) -> None:
         """Refuse a simulator that logs cannot be replayed in."""
-        check_servos(self.sim.motors)
-        check_turning(self.sim.plant.robot)
-        refuse_hook(self.sim.plant)
+        check_replayable(self.sim.motors, self.sim.plant)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""

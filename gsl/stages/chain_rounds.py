@@ -19,7 +19,7 @@ from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.diagnosis_file import read_diagnosis
 from gsl.grounding.effects import DiagnosedEffects, evidence_of, innermost, switch_on, with_innermost
-from gsl.grounding.gat import ActionTransformation, check_modelled
+from gsl.grounding.gat import ActionTransformation, check_coverage
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.preparation import check_own
 from gsl.grounding.servo import LearnedServo
@@ -99,7 +99,7 @@ class Chain(Links):
         if joints != self.inverse_model.joints_of_interest(layout.joints, "inverse_model"):
             raise ConfigError("inverse_model.variables", "has to name the joints that forward_model.variables names")
         if isinstance(grounding.x, tuple):
-            check_modelled(grounding.x, joints, "grounding.x")
+            check_coverage(grounding.x, joints, "grounding.x")
 
     def round(
         self,

@@ -48,9 +48,7 @@ from gsl.storage import documents
 from gsl.training.servo_folds import servo_errors
 from gsl.validation.learned_replay import LearnedReplay, Simulated
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.fits import check_turning
-from gsl.worlds.held import refuse_hook
-from gsl.worlds.velocity_motors import check_servos
+from gsl.worlds.fits import check_replayable
 
 TABLE, DATA = "table.md", "folds.json"
 SINGLE = (str, int, float, bool)
@@ -97,9 +95,7 @@ class CrossValidate:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be fitted to all joints, or is to be left out, or replayed."""
-        check_servos(self.sim.motors)
-        check_turning(self.sim.plant.robot)
-        refuse_hook(self.sim.plant)
+        check_replayable(self.sim.motors, self.sim.plant)
         if not self.usual:
             raise ConfigError("usual", "names at least one effect to compare with")
         everywhere = {candidate.effect for candidate in library(lump(self.sim.plant.robot)) if candidate.on_joints}

@@ -34,9 +34,7 @@ from gsl.storage.hashing import PAGE
 from gsl.validation.policy_gap import Effort, policy_gap
 from gsl.validation.real_returns import RealReturns, list_parents, real_returns
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.fits import check_turning
-from gsl.worlds.held import refuse_hook
-from gsl.worlds.velocity_motors import check_servos
+from gsl.worlds.fits import check_replayable
 
 DEFAULT_ROBOT = "nao"  # that commands mean which name none
 
@@ -73,9 +71,7 @@ class Diagnose:
 
     def __post_init__(self) -> None:
         """Refuse a simulator that logs cannot be replayed in."""
-        check_servos(self.sim.motors)
-        check_turning(self.sim.plant.robot)
-        refuse_hook(self.sim.plant)
+        check_replayable(self.sim.motors, self.sim.plant)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""

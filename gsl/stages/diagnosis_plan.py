@@ -26,8 +26,7 @@ from gsl.storage.artifact import Artifact
 from gsl.tasks.excite import Excite
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot, asking
-from gsl.worlds.fits import check_turning
-from gsl.worlds.velocity_motors import check_servos
+from gsl.worlds.fits import check_replayable
 
 EXCITATION = "collect_excitation"
 ROBOTS_ONLY = "only robots in Bullet worlds are excited in the air; take another grounding"
@@ -54,8 +53,7 @@ class DiagnosisPlan:
         """
         if not isinstance(sim, BulletWorld):
             raise ConfigError("grounding", ROBOTS_ONLY)
-        check_servos(sim.motors)
-        check_turning(sim.plant.robot)
+        check_replayable(sim.motors, sim.plant)
         log = self.flown(real, home, workers=workers, seed=seed, console=console)
         stage: Diagnose | Identify = Identify(
             str(log.folder), sim, without=self.without, evaluations=self.evaluations, workers=workers, seed=seed
@@ -85,8 +83,7 @@ class DiagnosisPlan:
         """
         if not isinstance(sim, BulletWorld):
             raise ConfigError("grounding", ROBOTS_ONLY)
-        check_servos(sim.motors)
-        check_turning(sim.plant.robot)
+        check_replayable(sim.motors, sim.plant)
         log = self.flown(real, home, workers=workers, seed=seed, console=console)
         below = sim if effects is None else switch_on(sim, effects)
         assert isinstance(below, BulletWorld), "effects leave a world what it is"

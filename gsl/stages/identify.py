@@ -28,9 +28,7 @@ from gsl.storage import documents
 from gsl.storage.diagnosis_report import REPORT
 from gsl.training.system_identification import identify
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.fits import check_turning
-from gsl.worlds.held import refuse_hook
-from gsl.worlds.velocity_motors import check_servos
+from gsl.worlds.fits import check_replayable
 
 WORLD = "world/identified.yaml"
 
@@ -53,9 +51,7 @@ class Identify:
 
     def __post_init__(self) -> None:
         """Refuse a simulator that logs cannot be replayed in."""
-        check_servos(self.sim.motors)
-        check_turning(self.sim.plant.robot)
-        refuse_hook(self.sim.plant)
+        check_replayable(self.sim.motors, self.sim.plant)
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files that are read."""

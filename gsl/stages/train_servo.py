@@ -32,9 +32,7 @@ from gsl.training.servo_verdict import problems, remarks
 from gsl.training.servo_walks import Walks, walks
 from gsl.training.torque_width import measure_widths
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.fits import check_turning, fitting_step
-from gsl.worlds.held import refuse_hook
-from gsl.worlds.velocity_motors import check_servos
+from gsl.worlds.fits import check_replayable, fitting_step
 
 WORLD, CURVES = "world/learned.yaml", "servo.png"
 
@@ -63,9 +61,7 @@ class TrainServo:
 
     def __post_init__(self) -> None:
         """Refuse to stand on another learned servo, and joints that have none."""
-        check_servos(self.sim.motors)
-        check_turning(self.sim.plant.robot)
-        refuse_hook(self.sim.plant)
+        check_replayable(self.sim.motors, self.sim.plant)
         if self.sim.servo is not None:
             raise ConfigError("sim.servo", "is a learned servo already; learn on top of the world without it")
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gsl.errors import ArtifactError
 from gsl.storage import documents, manifest
 from gsl.storage.hashing import file_hash, sources_hash
 from gsl.storage.manifest import Manifest
@@ -103,9 +102,7 @@ def content_hash(path: Path) -> str:
     if path.is_file():
         return file_hash(path)
     found = manifest.read(path)
-    if damaged := manifest.find_damage(path, found):
-        problem = manifest.describe_damage(path, damaged)
-        raise ArtifactError(path / damaged, f"{problem}; build the artifact again with force=true")
+    manifest.check_intact(path, found)
     return found.contents
 
 

@@ -121,6 +121,16 @@ def describe_damage(folder: Path, name: str) -> str:
     return "is not as the manifest says" if (folder / name).is_file() else "is missing"
 
 
+def check_intact(folder: Path, manifest: Manifest) -> None:
+    """Refuse an artifact of which a file is missing or was changed.
+
+    Raises:
+        ArtifactError: It names the file.
+    """
+    if damaged := find_damage(folder, manifest):
+        raise ArtifactError(folder / damaged, f"{describe_damage(folder, damaged)}; {_DAMAGED}")
+
+
 def strange_file(folder: Path, manifest: Manifest) -> str | None:
     """Return the first file of the folder that the manifest does not name; hidden ones and other artifacts are none."""
     for place, folders, files in os.walk(folder):

@@ -70,9 +70,7 @@ def load(reference: str | Path, kind: str, *, runs: Path = RUNS) -> Artifact:
     artifact = Artifact(folder, manifest.read(folder))
     if artifact.manifest.kind != kind:
         raise ArtifactError(folder, f"holds {artifact.manifest.kind}, but {kind} is needed")
-    if damaged := manifest.find_damage(folder, artifact.manifest):
-        problem = manifest.describe_damage(folder, damaged)
-        raise ArtifactError(folder / damaged, f"{problem}; build the artifact again with force=true")
+    manifest.check_intact(folder, artifact.manifest)
     return artifact
 
 

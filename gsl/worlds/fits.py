@@ -8,7 +8,9 @@ from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant
 from gsl.errors import ConfigError
 from gsl.worlds.encoder import REMEMBERED
+from gsl.worlds.held import refuse_hook
 from gsl.worlds.servo_state import COMMANDS
+from gsl.worlds.velocity_motors import Motors, check_servos
 
 
 def check_periods(step: float, period: float) -> None:
@@ -46,6 +48,21 @@ def check_plant(plant: Plant, step: float, period: float) -> None:
         if bare.any():
             joint = plant.robot.motors[int(np.argmax(bare))]
             raise ConfigError(f"effects.{name}.joints", f"{joint} has no rotor; effects.armature.inertia gives it one")
+
+
+def check_replayable(motors: Motors, plant: Plant) -> None:
+    """Refuse a simulator in which logs of joints cannot be replayed and compared.
+
+    Args:
+        motors: Of the simulator.
+        plant: Of the simulator.
+
+    Raises:
+        ConfigError: Its joints are turned by velocity motors, some of them slide, or it has a torque hook.
+    """
+    check_servos(motors)
+    check_turning(plant.robot)
+    refuse_hook(plant)
 
 
 def check_turning(robot: Robot, setting: str = "sim.robot") -> None:

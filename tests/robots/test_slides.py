@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from both_engines import PERIOD, in_bullet, window
 
 from gsl.commandline.init import write_configuration
 from gsl.core.body import Robot, lump
@@ -24,16 +25,12 @@ from gsl.robots.frames import euler
 from gsl.robots.urdf import urdf
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.drive_train import STOP_STIFFNESS
-from gsl.worlds.engine import Engine
 from gsl.worlds.fits import check_turning
-from gsl.worlds.held import Held, Windows
-from gsl.worlds.physics import Physics
-from gsl.worlds.servo_state import COMMANDS
-from gsl.worlds.start import resting
+from gsl.worlds.held import Held
 
 pytestmark = pytest.mark.slow
 
-PERIOD, STEP, GRAVITY = 0.02, 0.002, 9.81
+STEP, GRAVITY = 0.002, 9.81
 MASS = 0.7
 LIFT = """<robot name="lift">
 <link name="base"><inertial><mass value="5"/>{inertia}</inertial></link>
@@ -72,18 +69,8 @@ def made(tmp_path: Path) -> Callable[[str], Path]:
 
 def play(plant: Plant, targets: np.ndarray, step: float = STEP) -> tuple[np.ndarray, np.ndarray]:
     """Positions after every control period in the chain model and in Bullet, each of shape (T, n_motors)."""
-    padded = np.vstack([np.repeat(targets[:1], COMMANDS - 1, axis=0), targets])
-    start = np.array([[targets[0], np.zeros(targets.shape[1])]])
-    windows = Windows(np.ascontiguousarray(padded[::-1])[None], start, np.zeros(1))
-    engine = Engine(plant, Physics(step, 50, PERIOD, floating=False))
-    begin = resting(lump(plant.robot), targets[0], targets[0], floating=False)
-    engine.load(begin.reading, begin.commands)
-    seen = []
-    for target in targets:
-        engine.run(target)
-        seen.append(engine.encoders(engine.read())[0])
-    engine.close()
-    return Held.of(plant, step, PERIOD).replay(windows)[0], np.array(seen)
+    replayed = Held.of(plant, step, PERIOD).replay(window(targets))[0]
+    return replayed, in_bullet(plant, targets, step)
 
 
 def wander(body: Robot, ticks: int = 150) -> np.ndarray:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from both_engines import PERIOD, in_bullet, window
 from learned_servos import EVERYTHING, lawful, some_law, with_fields
 
 from gsl.core.body import Robot, lump
@@ -12,14 +13,11 @@ from gsl.core.lanes import LANES
 from gsl.core.plant import Plant, Push, nominal
 from gsl.robots.nao import nao
 from gsl.worlds.chain import COLUMNS, Pushed, accelerate, chain, nothing
-from gsl.worlds.engine import Engine
 from gsl.worlds.held import Held, Windows
-from gsl.worlds.physics import Physics
 from gsl.worlds.servo import encoder_motion, servo_torque
 from gsl.worlds.servo_state import COMMANDS, first_state
-from gsl.worlds.start import resting
 
-PERIOD, STEP = 0.02, 0.002
+STEP = 0.002
 NAO = lump(nao())
 
 
@@ -41,24 +39,6 @@ def sweep(robot: Robot, ticks: int) -> np.ndarray:
         middle
         + 0.15 * np.sin(2 * np.pi * np.outer(time, rng.uniform(0.3, 1.5, n))) * np.minimum(1, time / 0.5)[:, None]
     )
-
-
-def window(targets: np.ndarray) -> Windows:
-    padded = np.vstack([np.repeat(targets[:1], COMMANDS - 1, axis=0), targets])
-    start = np.array([[targets[0], np.zeros(targets.shape[1])]])
-    return Windows(np.ascontiguousarray(padded[::-1])[None], start, np.zeros(1))
-
-
-def in_bullet(plant: Plant, targets: np.ndarray, step: float) -> np.ndarray:
-    engine = Engine(plant, Physics(step, 50, PERIOD, floating=False))
-    start = resting(lump(plant.robot), targets[0], targets[0], floating=False)
-    engine.load(start.reading, start.commands)
-    seen = []
-    for target in targets:
-        engine.run(target)
-        seen.append(engine.encoders(engine.read())[0])
-    engine.close()
-    return np.array(seen)
 
 
 @pytest.mark.parametrize(

@@ -183,9 +183,13 @@ def learn_laws(
         shifts: Its calibration, shape (7, n_joints).
         settings: How.
     """
-    fits = _Fits.of(log, simulator, effects, shifts, how := settings or LawSettings())
-    if fits is None:
-        return None
+    fits = _Fits.of(log, simulator, effects, shifts, settings or LawSettings())
+    return None if fits is None else _weigh(log, fits)
+
+
+def _weigh(log: Log, fits: _Fits) -> Laws:
+    """Return what laws save in the held-out windows of a log."""
+    how = fits.settings
     z = np.stack([joint.left(joint.fit()) for joint in map(fits.joint, range(len(log.joints)))], axis=2)
     saved, sample = loss(fits.held.z) - loss(z), log.pieces.take(fits.windows).samples
     sums = np.array([saved[sample == k].sum(axis=(0, 1)) for k in np.unique(sample)])
@@ -208,10 +212,9 @@ def find_forms(log: Log, simulator: Simulator, settings: LawSettings | None = No
     """
     none = no_shifts(len(log.joints))
     fits = _Fits.of(log, simulator, {}, none, how := settings or LawSettings())
-    laws = learn_laws(log, simulator, {}, none, how)
-    if fits is None or laws is None:
+    if fits is None:
         return ()
-    gains, kp = laws.by_joint[0], simulator.plant.servo.kp
+    gains, kp = _weigh(log, fits).by_joint[0], simulator.plant.servo.kp
     worst = [int(k) for k in np.argsort(-gains)[: how.listed] if gains[k] > how.least_share * gains.max()]
     return tuple(_describe(fits, k, log.joints[k], float(kp[k])) for k in worst)
 
