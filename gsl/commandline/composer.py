@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -145,7 +146,12 @@ def options(group: str) -> list[str]:
 
 def groups() -> list[str]:
     """Return the names of all groups of ours and the user's."""
-    return [group for group in _loader().list_groups("") if group != "hydra"]
+    return list(_groups(_loader()))
+
+
+@lru_cache(maxsize=1)  # every word that is typed asks for them, and hydra walks through all folders
+def _groups(loader: Any) -> tuple[str, ...]:
+    return tuple(group for group in loader.list_groups("") if group != "hydra")
 
 
 def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
