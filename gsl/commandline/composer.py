@@ -252,6 +252,20 @@ def _first_value(override: Override) -> str:
 
 
 def _compose(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:
+    """Compose, or take what the same words came to in this process, unless a file has changed; nobody may change it."""
+    if OtherConfiguration.folder is not None:  # who knows how much lies in there
+        return _compose_anew(command, overrides, trust)
+    files = (path for folder in (configuration_folder(), *folders()) for path in folder.rglob("*.yaml"))
+    stamps = frozenset((path, (status := path.stat()).st_mtime_ns, status.st_size) for path in files)
+    return _compose_once(command, tuple(overrides), tuple(trust), stamps)
+
+
+@lru_cache(maxsize=64)  # a study's commands, with and without their choices
+def _compose_once(command: str, overrides: Sequence[str], trust: Sequence[str], stamps: frozenset[Any]) -> DictConfig:
+    return _compose_anew(command, overrides, trust)
+
+
+def _compose_anew(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:
     """Compose; nothing that a file names is imported before it is checked here."""
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None

@@ -6,9 +6,8 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from copy import deepcopy
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from hydra._internal.core_plugins.file_config_source import FileConfigSource
 from hydra._internal.sources_registry import SourcesRegistry
@@ -31,9 +30,6 @@ _SELECT = "oc.select"  # a setting, or a value where there is none
 
 class BudgetedFiles(FileConfigSource):
     """Reads yaml files as hydra does; a file that is not below our folders is checked before."""
-
-    _read: ClassVar[dict[tuple[object, ...], ConfigResult]] = {}
-    """What stood in files below our folders: a command puts its settings together two or three times."""
 
     @classmethod
     @contextmanager
@@ -58,13 +54,7 @@ class BudgetedFiles(FileConfigSource):
             settings = check_file(path, config_path if ours else path.stem)
             if config_path.partition("/")[0] in FILE_GROUPS and TARGET in _words(settings):
                 raise InputError(f"{path}: names a class, as {TARGET}, and a mapping builds none; leave it out")
-        if not (ours and path.is_file()):
-            return super().load_config(config_path)
-        status = path.stat()
-        key = self.provider, config_path, path, status.st_mtime_ns, status.st_size
-        if key not in self._read:
-            self._read[key] = super().load_config(config_path)
-        return deepcopy(self._read[key])
+        return super().load_config(config_path)
 
 
 def check_file(path: Path, name: str) -> dict[str, Any]:
