@@ -91,7 +91,7 @@ class Recording(Silent):
 def test_whatever_bit_is_flipped_the_log_returns_only_what_was_written(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     log = GenerationLog(tmp_path)
-    written = [Generation(n, rng.normal(size=1).tolist(), [n]) for n in range(3)]
+    written = [Generation(n, rng.normal(size=1).tolist(), [n]) for n in range(2)]
     for generation in written:
         log.append(generation)
     path = tmp_path / "generations.jsonl"
@@ -104,7 +104,7 @@ def test_whatever_bit_is_flipped_the_log_returns_only_what_was_written(tmp_path:
         said: list[str] = []
         reader = GenerationLog(tmp_path, said.append)
         intact = int(np.searchsorted(ends, bit // 8, side="right")) - 1
-        assert [reader.read(n) for n in range(3)] == [*written[:intact], *[None] * (3 - intact)]
+        assert [reader.read(n) for n in range(2)] == [*written[:intact], *[None] * (2 - intact)]
         assert len(said) == 1
         assert path.read_bytes() == whole[: ends[intact]]
 
