@@ -51,7 +51,9 @@ pytestmark = pytest.mark.slow
 CART = GymnasiumWorld(env_id="examples.cart:Cart")
 POLE = GymnasiumWorld(env_id="CartPole-v1")
 SLOPE = replace(CART, kwargs={"slope": 2.0})
-SHALLOW = tuple(f"{model}.{size}" for model in ("forward_model", "inverse_model") for size in ("epochs=20", "hidden=[32]"))
+SHALLOW = tuple(
+    f"{model}.{size}" for model in ("forward_model", "inverse_model") for size in ("epochs=20", "hidden=[32]")
+)
 OF_TRIALS = tuple(f"iterate.{setting}" for setting in SHALLOW)
 
 
