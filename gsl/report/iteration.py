@@ -38,7 +38,7 @@ class Rounds:
     @property
     def columns(self) -> tuple[str, ...]:
         """Titles of the rows."""
-        places = ("in simulation", "in real", "95 % interval", ends(self._unit))
+        places = ("in simulation", "on the real side", "95 % interval", ends(self._unit))
         return ("iteration", "policy", *places, "gain over the last", "real episodes")
 
     @property

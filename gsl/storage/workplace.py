@@ -15,11 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from gsl.errors import ArtifactError
-from gsl.storage.hashing import STEPS
+from gsl.storage.hashing import LOG, STEPS
 from gsl.storage.whole import claim, exchange, explain_refusal, flush, remove_temporary
 
 KEY = ".key"
-LOG = "log.txt"
 
 
 @contextmanager

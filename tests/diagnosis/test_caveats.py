@@ -45,7 +45,7 @@ def test_a_value_that_hangs_on_another_effect_is_told() -> None:
     (told,) = [
         line for line in caveats(named(result, selection=chosen), (), {"fraction": 1.0}, []) if "besides" in line
     ]
-    assert told.startswith("With backlash besides, which costs less and was passed over (not surely better): ")
+    assert told.startswith("With backlash besides, which costs less and was passed over (not significantly better): ")
     assert "coulomb friction's torque 0.04 instead of 0.1." in told
 
 

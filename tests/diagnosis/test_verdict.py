@@ -74,7 +74,7 @@ def test_a_spurious_effect_that_is_cheapest_and_fails_hides_no_other() -> None:
     assert Judge(1.0).judge(tried).word == "inseparable"
     verdict = Judge(1.0).judge(replace(tried, rejected=(spurious,)))
     assert (verdict.word, verdict.causes[0].rival) == ("causes", None)
-    assert replace(tried, rejected=(spurious,)).objection(spurious) == "not surely better than a calibration"
+    assert replace(tried, rejected=(spurious,)).objection(spurious) == "not significantly better than a calibration"
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_where_a_calibration_leaves_no_more_than_noise_there_is_nothing_to_expla
     [
         (np.full(8, 110.0), 0.1, None),
         (np.full(8, 90.0), 0.1, "little gain for another effect"),
-        (np.array([0.0] * 4 + [150.0] * 4), 0.1, "not surely better"),
+        (np.array([0.0] * 4 + [150.0] * 4), 0.1, "not significantly better"),
         (np.full(8, 50.0), 50.0, "a value beyond its documented range"),
     ],
 )

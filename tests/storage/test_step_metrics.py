@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -109,3 +113,45 @@ def test_tensorboard_reads_what_is_written_for_it(tmp_path: Path) -> None:
     events.Reload()
     assert [(event.step, event.value) for event in events.Scalars("climb_2/height")] == [(1, 2.0), (2, 4.0), (3, 6.0)]
     assert events.Scalars("climb/height")[0].wall_time == pytest.approx(read_steps(folder)[0].time)
+
+
+class Searching:
+    """A stage that begins three seconds before its first step, on a task whose values are shown in cm/s."""
+
+    kind, task = "optimize", SimpleNamespace(shown=100.0, unit="cm/s")
+
+    def parents(self) -> Mapping[str, Path]:
+        return {}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        with freeze(3.0):
+            note_step("search", 1, best=0.25, falls=2.0)
+        with freeze(4.5):
+            note_step("search", 2, best=0.5, falls=0.0)
+        return {}
+
+
+@contextmanager
+def freeze(after: float) -> Iterator[None]:
+    moment = BEGUN.timestamp() + after
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(time, "time", lambda: moment)
+        yield
+
+
+BEGUN = datetime(2026, 1, 1, tzinfo=UTC)
+
+
+def test_metrics_are_shown_in_the_unit_of_the_task_and_from_the_start_of_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Clock(datetime):
+        @classmethod
+        def now(cls, tz: Any = None) -> Any:
+            return BEGUN
+
+    monkeypatch.setattr("gsl.storage.artifact.datetime", Clock)
+    build(Searching(), config={}, out=tmp_path / "runs/a/optimize", command="", force=False, console=None)  # type: ignore[arg-type]
+    lines = [line.split() for line in done("metrics", "a", folder=tmp_path).out.splitlines()]
+    assert ["run", "step", "time", "[s]", "best", "[cm/s]", "falls"] in lines
+    assert ["1", "1", "3.0", "25.0", "2"] in lines and ["1", "2", "4.5", "50.0", "0"] in lines
