@@ -196,7 +196,7 @@ class Workload:
         """Return in a line where the work is, how much is done, how fast it goes and what has come out."""
         plans, loop, left = [*self._plans], self._loop, self.left()
         whole = [f"{100.0 * self._share:.0f} % done"] if plans and plans[0].parts else []
-        whole += [] if left is None else [f"about {duration(left)} left"]
+        whole += [f"about {duration(left)} left"] if left and left >= 0.5 else []  # nobody knows once it is over
         phase = [] if loop or not self._phase else [self._phase, duration(self.clock() - self._entered)]
         places = [*(plan.words() for plan in plans if plan.noun), *(loop.words() if loop else phase)]
         places += [COMPILING] if is_compiling() else []

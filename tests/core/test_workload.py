@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from gsl.core import compiling
+from gsl.core.compiling import count_compilation
 from gsl.core.workload import Part, Workload
 
 
@@ -78,6 +78,8 @@ def test_the_time_left_is_that_of_the_plan_until_the_clock_knows_better() -> Non
         assert load.left() == pytest.approx(150.0, rel=0.1)
         clock.now += 20.0  # while a step goes on
         assert load.left() == pytest.approx(130.0, rel=0.1)
+        clock.now += 200.0
+        assert load.left() == 0.0 and "left" not in load.text()
 
 
 def test_what_was_done_before_is_no_pace() -> None:
@@ -109,7 +111,7 @@ def test_the_first_step_which_compiles_is_no_pace(seconds: float) -> None:
         assert load.text() == "52 % done, about 10 s left; stage 1 of 1, walking: 11 of 21, 1.0 a second"
 
 
-def test_a_phase_has_its_own_clock_until_a_loop_or_a_part_says_more(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_phase_has_its_own_clock_until_a_loop_or_a_part_says_more() -> None:
     load, clock, _ = work()
     with load.at_work("diagnose"):
         clock.now += 2.0
@@ -117,9 +119,9 @@ def test_a_phase_has_its_own_clock_until_a_loop_or_a_part_says_more(monkeypatch:
         load.enter("looking at the wiring")
         clock.now += 3.0
         assert load.text() == "looking at the wiring, 3 s"
-        monkeypatch.setattr(compiling, "_running", 1)
+        count_compilation(1)
         assert load.text() == "looking at the wiring, 3 s, compiling, once after an installation"
-        monkeypatch.setattr(compiling, "_running", 0)
+        count_compilation(-1)
         with load.plan("fold", [Part(), Part()]):
             load.begin("gain 8")
             assert load.text() == "0 % done; fold 1 of 2 (gain 8)"

@@ -13,7 +13,7 @@ from swinging_arm import FEW, arm, found, log
 from gsl.core.plant import nominal
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.simulate.calibration import INERTIA, clip_shifts
-from gsl.diagnosis.verdict.caveats import out_of_family
+from gsl.diagnosis.verdict.caveats import list_first, out_of_family
 from gsl.diagnosis.verdict.limits import Limit, limits
 from gsl.diagnosis.verdict.shrinkage import find_unexplained
 from gsl.report.diagnosis_limits import limits_sentence
@@ -80,6 +80,12 @@ def test_a_sentence_tells_the_tightest() -> None:
     )
     assert str(limits_sentence({"limits": rows, "causes": [{}]})).startswith("If these causes are right, all joints")
     assert limits_sentence({"limits": []}) is None
+
+
+def test_a_sentence_names_the_first_joints_and_how_many_more_there_are() -> None:
+    assert list_first(["a", "b", "c"]) == "a, b, c"
+    assert list_first(["a", "b", "c", "d"]) == "a, b, c, and 1 joint more: see the calibration"
+    assert list_first(["a", "b", "c", "d", "e"]) == "a, b, c, and 2 joints more: see the calibration"
 
 
 def test_a_rotor_that_is_as_light_as_it_can_be_is_out_of_family() -> None:

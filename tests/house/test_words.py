@@ -10,7 +10,7 @@ import pytest
 
 PLOT = Path(__file__).parents[2]
 PLACES = [path for room in ("gsl", "experiments", "benchmarks") for path in sorted((PLOT / room).rglob("*.py"))]
-BANNED = re.compile(r"\b(?:surely|told)\b|\bin real\b(?!=| (?:episodes|trajectories|world))|(?<![\w.\])*:%])\.\d")
+BANNED = re.compile(r"\b(?:surely|told)\b|\b[Ii]n real\b(?!=| (?:episodes|trajectories|world))|(?<![\w.\])*:%])\.\d")
 
 
 def sentences(path: Path) -> list[str]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from datetime import UTC, datetime
+from collections.abc import Mapping
+from datetime import datetime
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -116,42 +115,26 @@ def test_tensorboard_reads_what_is_written_for_it(tmp_path: Path) -> None:
 
 
 class Searching:
-    """A stage that begins three seconds before its first step, on a task whose values are shown in cm/s."""
+    """A stage on a task whose values are shown in cm/s; its steps are done at times of its own."""
 
     kind, task = "optimize", SimpleNamespace(shown=100.0, unit="cm/s")
+    moments = (time.time() + 3600.0, time.time() + 3601.5)
 
     def parents(self) -> Mapping[str, Path]:
         return {}
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
-        with freeze(3.0):
-            note_step("search", 1, best=0.25, falls=2.0)
-        with freeze(4.5):
-            note_step("search", 2, best=0.5, falls=0.0)
+        for step, (moment, best) in enumerate(zip(self.moments, (0.25, 0.5), strict=True), 1):
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(time, "time", lambda moment=moment: moment)
+                note_step("search", step, best=best, falls=2.0)
         return {}
 
 
-@contextmanager
-def freeze(after: float) -> Iterator[None]:
-    moment = BEGUN.timestamp() + after
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(time, "time", lambda: moment)
-        yield
-
-
-BEGUN = datetime(2026, 1, 1, tzinfo=UTC)
-
-
-def test_metrics_are_shown_in_the_unit_of_the_task_and_from_the_start_of_the_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    class Clock(datetime):
-        @classmethod
-        def now(cls, tz: Any = None) -> Any:
-            return BEGUN
-
-    monkeypatch.setattr("gsl.storage.artifact.datetime", Clock)
-    build(Searching(), config={}, out=tmp_path / "runs/a/optimize", command="", force=False, console=None)  # type: ignore[arg-type]
+def test_metrics_are_shown_in_the_unit_of_the_task_and_from_the_start_of_the_run(tmp_path: Path) -> None:
+    made = build(Searching(), config={}, out=tmp_path / "runs/a/optimize", command="", force=False, console=None)  # type: ignore[arg-type]
+    begun = datetime.fromisoformat(made.manifest.created).timestamp()
     lines = [line.split() for line in done("metrics", "a", folder=tmp_path).out.splitlines()]
     assert ["run", "step", "time", "[s]", "best", "[cm/s]", "falls"] in lines
-    assert ["1", "1", "3.0", "25.0", "2"] in lines and ["1", "2", "4.5", "50.0", "0"] in lines
+    for step, (moment, best) in enumerate(zip(Searching.moments, ("25.0", "50.0"), strict=True), 1):
+        assert ["1", str(step), f"{round(moment, 3) - begun:.1f}", best, "2"] in lines

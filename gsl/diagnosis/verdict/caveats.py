@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.words import several
 from gsl.diagnosis.hypothesis.candidates import Candidate
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, share_of_excess
 from gsl.diagnosis.log.records import FEW
@@ -24,6 +25,8 @@ from gsl.diagnosis.simulate.calibration import (
 )
 from gsl.diagnosis.verdict.findings import Findings
 from gsl.diagnosis.verdict.zero_or_load import Droop
+
+LISTED = 3  # joints with their calibration in a sentence, which has to be read
 
 
 def caveats(
@@ -107,7 +110,7 @@ def _joints(findings: Findings) -> Iterator[str]:
     if far := out_of_family(findings):
         yield (
             "The calibration of these joints is far from what robots of one make differ by, so that it may hide a "
-            f"cause: {', '.join(far)}."
+            f"cause: {list_first(far)}."
         )
 
 
@@ -115,16 +118,23 @@ def _names(names: Sequence[str], mask: np.ndarray) -> str:
     return ", ".join(name for name, is_so in zip(names, mask, strict=True) if is_so)
 
 
+def list_first(joints: Sequence[str]) -> str:
+    """Return joints with commas between; of many the first ones, for the calibration has them all."""
+    more = len(joints) - LISTED
+    rest = f", and {several(more, 'joint')} more: see the calibration" if more > 0 else ""
+    return ", ".join(joints[:LISTED]) + rest
+
+
 def out_of_family(findings: Findings) -> list[str]:
-    """Return the joints whose calibration is further off than robots of one make differ by, largest shift first."""
+    """Return the joints whose calibration is further off than robots of one make differ by, the farthest first."""
     log, shifts = findings.log, findings.shifts
     off = np.abs(shifts / (findings.simulator.spread * SPREADS[:, None]))
     inertias = inertia_unit(findings.uncalibrated.servo)
     joints = []
-    for k, joint in enumerate(log.joints):
+    for k in np.argsort(-off.max(axis=0), kind="stable"):
         rows = [row for row in np.argsort(-off[:, k]) if off[row, k] >= findings.options.verdict.off]
         parts = [_shift(row, shifts[row, k], log.robot.torque_unit, inertias[k]) for row in rows]
-        joints += [f"{joint} ({', '.join(parts)})"] if parts else []
+        joints += [f"{log.joints[k]} ({', '.join(parts)})"] if parts else []
     return joints
 
 
