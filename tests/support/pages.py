@@ -13,7 +13,7 @@ RESULTS = sorted((ROOT / "docs/results").rglob("*.md"))  # figures with their ow
 GUIDES = [ROOT / "README.md", *(page for page in sorted((ROOT / "docs").rglob("*.md")) if page not in RESULTS)]
 
 FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
-ITEM = re.compile(r"\s*([-*]|\d+\.) ")
+ITEM = re.compile(r"^\s*([-*]|\d+\.) ")
 LINK = re.compile(r"!?\[([^\]]*)\]\(([^)\s]+)\)")
 # A sentence ends before a capital letter, a code word, or a name of the paper's.
 END = re.compile(r"(?<=[.!?])[\"')*]*\s+(?=[A-Zπf*\"'(\[]|CODE)")
