@@ -25,7 +25,7 @@ _HASH = hashlib.sha256().digest_size  # [bytes]
 F = TypeVar("F", bound=Callable[..., object])
 
 
-class _Compilations(event.Listener):  # type: ignore[misc]
+class _Compilations(event.Listener):
     """Hears of every compilation, but not of what the cache has."""
 
     def on_start(self, event: Any) -> None:
