@@ -34,7 +34,9 @@ def find_repeats(records: Sequence[Record], period: float, settings: RepeatSetti
         period: Control period [s].
         settings: What counts as the same.
     """
-    how, firsts, repeats, seen = settings or RepeatSettings(), [], [], {}
+    how, repeats = settings or RepeatSettings(), list[Repeat]()
+    firsts: list[Record] = []
+    seen: dict[tuple[bytes, str], Repeat] = {}
     for record in records:
         exact = (np.round(record.commands, DIGITS).tobytes(), repr(record.conditions))
         if (repeat := seen.get(exact)) is None:
