@@ -171,7 +171,7 @@ TEXT = b"t,goal_shoulder\n" + b"0.01,0.5\n" * 500
 FILES = {
     "empty.csv": (b"", "is empty"),
     "empty.csv.gz": (gzip.compress(b""), "is empty"),
-    "cut.csv.gz": (gzip.compress(TEXT)[:-20], "is no gzip file, or truncated or damaged"),
+    "cut.csv.gz": (gzip.compress(TEXT)[:-20], "is cut off, as that of a killed logger is"),
     "plain.csv.gz": (TEXT, "is no gzip file"),
     "binary.csv": (bytes(range(1, 256)), "is no text"),
     "pickle.csv": (pickle.dumps(TIME), "is a Python pickle"),
