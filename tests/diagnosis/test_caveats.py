@@ -29,28 +29,28 @@ def named(result: Findings, **changes: Any) -> Findings:
 
 
 def test_what_remains_is_told_of_held_out_squares() -> None:
-    told = caveats(named(nothing_found()), (), LEFT, [{"part": "fast", "before": 5.1, "after": 5.3}])
-    assert "37 % of the held-out excess remains: something else is at work as well." in told
-    assert told[1].endswith("fast (5.1 → 5.3 ×). What is not named is not excluded there.")
-    assert not any("remains" in one for one in caveats(named(nothing_found()), (), {"fraction": 0.98}, []))
+    lines = caveats(named(nothing_found()), (), LEFT, [{"part": "fast", "before": 5.1, "after": 5.3}])
+    assert "37 % of the held-out excess remains: something else is at work as well." in lines
+    assert lines[1].endswith("fast (5.1 → 5.3 ×). What is not named is not excluded there.")
+    assert not any("remains" in line for line in caveats(named(nothing_found()), (), {"fraction": 0.98}, []))
 
 
 def test_a_value_that_hangs_on_another_effect_is_told() -> None:
-    one = friction("all", 300.0)
+    alone = friction("all", 300.0)
     other = replace(EMPTY.candidates[0].on("elbow"), effect="backlash")
-    both = with_both(one, replace(one, candidates=(other,)), 290.0)
+    both = with_both(alone, replace(alone, candidates=(other,)), 290.0)
     both = replace(both, parameters=(np.array([0.04]), np.array([0.02])), costs=np.array([260.0, 320.0] * 4))
     result = nothing_found()
-    chosen = cast(Any, selection(one, both))
-    (told,) = [
+    chosen = cast(Any, selection(alone, both))
+    (caveat,) = [
         line for line in caveats(named(result, selection=chosen), (), {"fraction": 1.0}, []) if "besides" in line
     ]
-    assert told.startswith("With backlash besides, which costs less and was passed over (not surely better): ")
-    assert "coulomb friction's torque 0.04 instead of 0.1." in told
+    assert caveat.startswith("With backlash besides, which costs less and was passed over (not surely better): ")
+    assert "coulomb friction's torque 0.04 instead of 0.1." in caveat
 
 
 def test_a_value_beyond_its_documented_range_is_told() -> None:
-    one = friction("all", 300.0)
-    beyond = replace(one, parameters=(np.array([99.0]),))
-    told = caveats(named(nothing_found(), selection=cast(Any, selection(beyond))), (), {"fraction": 1.0}, [])
-    assert any(line.startswith("coulomb friction's torque of 99 is beyond what is documented") for line in told)
+    alone = friction("all", 300.0)
+    beyond = replace(alone, parameters=(np.array([99.0]),))
+    lines = caveats(named(nothing_found(), selection=cast(Any, selection(beyond))), (), {"fraction": 1.0}, [])
+    assert any(line.startswith("coulomb friction's torque of 99 is beyond what is documented") for line in lines)

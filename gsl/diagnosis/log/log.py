@@ -82,7 +82,7 @@ class Log:
     @property
     def used(self) -> np.ndarray:
         """How many residuals of a window count for each channel, shape (n_channels,)."""
-        return self.comparison.used(self.pieces.scored)
+        return self.comparison.count_residuals(self.pieces.scored)
 
     @property
     def shaking_share(self) -> float:

@@ -166,7 +166,7 @@ class Comparison:
             z[..., self.shaking] = self._of_shaking(sim[..., self.shaking], real[..., self.shaking])
         return np.clip(np.nan_to_num(z, nan=1e3), -1e3, 1e3)
 
-    def used(self, scored: int) -> np.ndarray:
+    def count_residuals(self, scored: int) -> np.ndarray:
         """Return how many residuals of a window count for each joint, shape (n_joints,)."""
         return np.where(self.shaking, scored // BLOCK + BANDS, scored)
 
@@ -177,7 +177,7 @@ class Comparison:
         simulator does not shake.
         """
         mean = cost.mean(axis=0)
-        levels, first = mean.sum(axis=0) / self.used(len(mean)), len(mean) // BLOCK
+        levels, first = mean.sum(axis=0) / self.count_residuals(len(mean)), len(mean) // BLOCK
         band = OF_BAND * mean[first : first + BANDS].max(axis=0)
         return np.where(self.shaking, np.maximum(levels, band), levels)
 

@@ -50,7 +50,7 @@ def _droops(unsure: Sequence[Droop]) -> Iterator[str]:
         "Inseparable in this log, in which gravity hardly changes: a shifted zero and another droop under gravity, "
         f"by a load or a gain that is off. The fit calls it a zero: {zeros}."
     )
-    if held := ", ".join(droop.joint for droop in unsure if not droop.told):
+    if held := ", ".join(droop.joint for droop in unsure if not droop.separable):
         yield (
             f"No poses of one joint that a ladder may take change gravity enough there to tell: {held}. Turn the base "
             "round, or take poses by hand that a ladder leaves out because limbs might meet."
