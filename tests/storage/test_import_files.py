@@ -242,6 +242,13 @@ def test_names_that_the_command_line_cannot_read_come_with_their_quotes(tmp_path
         (tmp_path / name).rename(tmp_path / "log.csv")
 
 
+def test_a_folder_called_by_a_number_comes_with_its_quotes(tmp_path: Path) -> None:
+    line = refused("import", "source=20", mapping(tmp_path), folder=tmp_path)
+    assert line == "source = 20: must be a text; in quotes inside those of the shell it is: '\"20\"'"
+    line = refused("import", 'source="20"', mapping(tmp_path), folder=tmp_path)
+    assert line == "source = 20: there is no such file, folder or pattern"
+
+
 def test_a_lag_is_the_same_whenever_the_clock_began(tmp_path: Path) -> None:
     lags = []
     for origin in (0.0, 1234.567, 1.7e9 + 0.123):

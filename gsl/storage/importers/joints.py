@@ -39,8 +39,8 @@ def joints_of(mapping: LogMapping, tables: Mapping[str, Table]) -> dict[str, str
         raise TrajectoryError(table.path, problem, column=str(form))
     for name, signal in mapping.signals.items():
         own = tables[signal.file]
-        if name in PER_JOINT and not signal.optional and (there := _list_joints(name, mapping, own)):
-            _check_pairs(name, mapping, (table, own), (names, there))
+        if name in PER_JOINT and not signal.optional and (others := _list_joints(name, mapping, own)):
+            _check_pairs(name, mapping, (table, own), (names, others))
     return {name: name for name in names}
 
 
