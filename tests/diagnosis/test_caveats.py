@@ -12,6 +12,7 @@ from test_verdict import EMPTY, friction, selection, with_both
 
 from gsl.diagnosis.verdict.caveats import caveats
 from gsl.diagnosis.verdict.findings import Findings
+from gsl.diagnosis.verdict.servo_law import Laws
 from gsl.diagnosis.verdict.verdict import Verdict
 
 pytestmark = pytest.mark.slow
@@ -54,3 +55,20 @@ def test_a_value_beyond_its_documented_range_is_told() -> None:
     beyond = replace(alone, parameters=(np.array([99.0]),))
     lines = caveats(named(nothing_found(), selection=cast(Any, selection(beyond))), (), {"fraction": 1.0}, [])
     assert any(line.startswith("coulomb friction's torque of 99 is beyond what is documented") for line in lines)
+
+
+def test_far_above_the_noise_a_tolerance_of_what_a_law_of_each_servo_leaves_is_proposed() -> None:
+    result, far = nothing_found(), Verdict("unknown", (), (), 0.2, 400.0, 0.1)
+    z = np.full((len(result.log.held_out), result.log.pieces.scored, 2), 0.006) / result.log.comparison.floor
+    laws = replace(cast(Laws, result.laws), z=z)
+    caveat = next(
+        line for line in caveats(replace(result, verdict=far, laws=laws), (), LEFT, []) if "far above" in line
+    )
+    assert "tolerance=0.006 [rad]" in caveat and "twice" not in caveat
+    alone = replace(result.log, noise=replace(result.log.noise, source="estimated"))
+    caveat = next(
+        line
+        for line in caveats(replace(result, log=alone, verdict=far, laws=None), (), LEFT, [])
+        if "far above" in line
+    )
+    assert "record a motion twice" in caveat and "tolerance=0.02 [rad]" in caveat

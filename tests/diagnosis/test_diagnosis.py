@@ -14,7 +14,8 @@ from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import to_records
-from gsl.diagnosis.log.residual import noise_floor
+from gsl.diagnosis.log.repeats import find_repeats
+from gsl.diagnosis.log.residual import NoiseFloor, noise_floor
 from gsl.diagnosis.search.screening import interpolate
 from gsl.diagnosis.simulate import calibration
 from gsl.diagnosis.verdict.document import document
@@ -187,12 +188,16 @@ def test_the_document_has_what_the_contract_asks_for() -> None:
 
 
 def test_the_noise_floor_comes_from_repeats_and_else_from_roughness() -> None:
+    def measure(batch: Batch, resolution: float = 1e-4) -> NoiseFloor:
+        records = to_records(batch, arm())
+        return noise_floor(records, find_repeats(records, PERIOD), PERIOD, resolution)
+
     batch = log({}, jitter=0.0)
-    measured = noise_floor(to_records(batch, arm()), 1e-4)
+    measured = measure(batch)
     assert measured.source == "repeats" and measured.sd == pytest.approx(NOISE, rel=0.2)
-    alone = noise_floor(to_records(replace(batch, episodes=batch.episodes[:-1], metadata={}), arm()), 1e-4)
+    alone = measure(replace(batch, episodes=batch.episodes[:-1], metadata={}))
     assert alone.source == "estimated" and alone.sd == pytest.approx(NOISE, rel=0.35)
-    assert noise_floor(to_records(log({}, noise=0.0), arm()), 0.01).sd == pytest.approx(0.01 / np.sqrt(12.0))
+    assert measure(log({}, noise=0.0), 0.01).sd == pytest.approx(0.01 / np.sqrt(12.0))
 
 
 @pytest.mark.parametrize("own_names", [True, False])

@@ -25,6 +25,8 @@ from gsl.diagnosis.simulate.calibration import (
 from gsl.diagnosis.verdict.findings import Findings
 from gsl.diagnosis.verdict.zero_or_load import Droop
 
+TOLERANCE = 0.02  # proposed where no law says what is left [rad]
+
 
 def caveats(
     findings: Findings, unsure: Sequence[Droop], shrunk: Mapping[str, Any], far: Sequence[Mapping[str, Any]]
@@ -83,10 +85,18 @@ def _log(findings: Findings) -> Iterator[str]:
     if tolerance:
         yield f"Differences of {1e3 * tolerance:.0f} mrad count as noise (tolerance): smaller causes cannot show."
     elif findings.verdict.word == "unknown" and findings.verdict.remaining > findings.options.verdict.rough:
-        yield (
-            "What is left is far above the noise, and everything counts as an outlier: say with tolerance=0.02 [rad] "
-            "what does not matter, and the larger causes come out."
-        )
+        yield _ask_for_a_floor(findings)
+
+
+def _ask_for_a_floor(findings: Findings) -> str:
+    """Say how to get a better floor, and propose what even a law of each servo leaves as what does not matter."""
+    log, laws = findings.log, findings.laws
+    left = TOLERANCE if laws is None else float(np.sqrt(np.mean((laws.z * log.comparison.floor) ** 2)))
+    twice = "" if log.noise.source == "repeats" else "record a motion twice, which measures the noise, or "
+    return (
+        f"What is left is far above the noise, so everything counts as an outlier: {twice}say with "
+        f"tolerance={left:.1g} [rad] what does not matter."
+    )
 
 
 def _joints(findings: Findings) -> Iterator[str]:
