@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import shlex
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -53,7 +54,10 @@ def _import(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
         "control period [s]": f"{metrics['control_period']:g}",
     }
     caption = "; ".join([metrics["time"], f"velocities {metrics['velocity']}", *metrics["warnings"]])
-    return Table("imported trajectories", tuple(row), [tuple(map(str, row.values()))], caption)
+    log = shlex.quote(str(folder))
+    following = f"what to type next, with a simulator of the robot as sim:\n  gsl audit real={log} sim=...\n"
+    following += f"  gsl diagnose real={log} sim=..."
+    return Table("imported trajectories", tuple(row), [tuple(map(str, row.values()))], f"{caption}\n{following}")
 
 
 def _of_states(metrics: Mapping[str, Any], what: str) -> Table | None:

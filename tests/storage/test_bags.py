@@ -148,3 +148,31 @@ def test_messages_without_a_definition_are_refused_with_what_to_do(tmp_path: Pat
     chosen = mapping(tmp_path, joints={"hip": 1, "knee": 2}, time="time", signals=signals)
     line = refused("import", "source=bag", chosen, folder=tmp_path)
     assert "holds messages of unitree_go/msg/LowState without their definition; write it as MCAP" in line
+
+
+def test_joints_holes_and_ends_of_a_bag_are_told_as_those_of_files(tmp_path: Path) -> None:
+    store = ros2_store()
+    state, header = store.types["sensor_msgs/msg/JointState"], store.types["std_msgs/msg/Header"]
+    stamp, none = store.types["builtin_interfaces/msg/Time"], np.zeros(0)
+    for name, names, hole in (("renamed", ["hip", "knee_2"], 0), ("hole", ["hip", "knee"], 30)):
+        topics: dict[str, list[Any]] = {"/command": [], "/state": []}
+        for row, (goal, q) in enumerate(zip(GOAL, MEASURED, strict=True)):
+            at = START + 10_000_000 * row + hole * 10**9 * (row > 80)
+            for topic, joints, values in (("/command", names, goal), ("/state", ["hip", "knee"], q)):
+                head = header(stamp(at // 10**9, at % 10**9), "")
+                topics[topic].append(state(head, joints, values.copy(), none, none))
+        write_ros2(tmp_path / name, store, topics, "MCAP")
+    form = "position.{joint}"
+    signals = {"action": {"file": "/command", "column": form}, "position": {"file": "/state", "column": form}}
+    chosen = mapping(tmp_path, time="header.stamp", signals=signals)
+    line = refused("import", "source=renamed", chosen, folder=tmp_path)
+    assert line.startswith(
+        "renamed, column /command position.knee_2: goes with /state position.knee_2, which is missing; did you mean "
+        "/state position.knee? Pair all: 'mapping.signals.action={column: {knee: position.knee_2, ...}}'"
+    )
+    said = done("import", "source=hole", chosen, "name=log", folder=tmp_path)
+    assert "warning: hole: has no row for 30 s after 0.8 s, and is cut into 2 episodes" in said.err
+    file = next((tmp_path / "hole").glob("*.mcap"))
+    file.write_bytes(file.read_bytes()[:-500])
+    line = refused("import", "source=hole", chosen, folder=tmp_path)
+    assert line.endswith(f"if its recorder was killed: mcap recover hole/{file.name} -o whole.mcap")

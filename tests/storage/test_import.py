@@ -165,6 +165,22 @@ def test_units_signs_zeros_and_old_names_are_converted(tmp_path: Path) -> None:
     assert sensors["load"][0] == pytest.approx(-0.1) and batch.metadata["units"]["load"] == "%"
 
 
+def test_a_joint_that_slides_is_mapped_in_millimetres_and_newtons(tmp_path: Path) -> None:
+    columns = {**plain(), "goal_elbow": 1e3 * ACTION[:, 1], "q_elbow": 1e3 * POSITION[:, 1], "f": TIME, "v": TIME}
+    signals = {
+        "action": {"column": "goal_{joint}", "unit": {"elbow": "mm"}},
+        "position": {"column": "q_{joint}", "unit": {"shoulder": "rad", "elbow": "mm"}},
+        "velocity": {"column": ["v", "v[0]"], "unit": {"shoulder": "rad/s", "elbow": "mm/s"}},
+        "torque": {"column": ["f", "f[0]"], "unit": {"shoulder": "mNm", "elbow": "N"}},
+    }
+    batch = imported(tmp_path, csv(tmp_path / "log.csv", columns), mapping(tmp_path / "m.yaml", signals=signals))
+    check_same(batch)
+    (episode,) = batch.episodes
+    np.testing.assert_allclose(episode.velocity, np.column_stack([TIME, 1e-3 * TIME]), atol=1e-12)
+    np.testing.assert_allclose(episode.sensors["torque.elbow"], TIME, atol=1e-12)
+    np.testing.assert_allclose(episode.sensors["torque.shoulder"], 1e-3 * TIME, atol=1e-12)
+
+
 @pytest.mark.parametrize("joints", [JOINTS, None])
 def test_signs_and_columns_may_differ_by_joint_and_by_axis(tmp_path: Path, joints: tuple[str, ...] | None) -> None:
     columns = plain() | {"q_elbow": -POSITION[:, 1], **{f"w{axis}": k + TIME for k, axis in enumerate("abc")}}

@@ -13,6 +13,7 @@ import yaml
 from commands import done, gsl, refused
 
 from gsl.core.trajectory import Batch
+from gsl.storage.importers.sizes import DAMAGED
 from gsl.storage.trajectories import read
 
 pytestmark = pytest.mark.slow
@@ -74,7 +75,7 @@ def test_tensors_come_without_the_code_of_their_pickle(tmp_path: Path) -> None:
         line = refused("import", f"source={name}.pt", mapping(tmp_path), folder=tmp_path)
         assert line.startswith(f"{name}.pt: holds more than tensors (a pickle, which can run code)")
     line = refused("import", "source=c.pt", mapping(tmp_path), folder=tmp_path)
-    assert line == "c.pt: is no file of torch.save, or truncated or damaged; copy it again"
+    assert line == f"c.pt: is no file of torch.save, or {DAMAGED}"
     assert not (tmp_path / "ran").exists()
 
 
@@ -94,7 +95,7 @@ def test_matrices_of_matlab_are_read_and_fields_of_structs(tmp_path: Path) -> No
     check_same(imported(tmp_path, "struct.mat", mapping(tmp_path, "run.goal", "run.q", time="run.t")))
     (tmp_path / "bad.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
     line = refused("import", "source=bad.mat", mapping(tmp_path), folder=tmp_path)
-    assert line == "bad.mat: is no MATLAB file, or truncated or damaged; save it again"
+    assert line == f"bad.mat: is no MATLAB file, or {DAMAGED}"
 
 
 def test_npy_files_are_one_episode_together_or_a_table_alone(tmp_path: Path) -> None:
@@ -239,6 +240,13 @@ def test_names_that_the_command_line_cannot_read_come_with_their_quotes(tmp_path
         assert line.endswith(f"such characters take quotes inside those of the shell: 'source=\"{name}\"'")
         done("import", f'source="{name}"', "--check", folder=tmp_path)
         (tmp_path / name).rename(tmp_path / "log.csv")
+
+
+def test_a_folder_called_by_a_number_comes_with_its_quotes(tmp_path: Path) -> None:
+    line = refused("import", "source=20", mapping(tmp_path), folder=tmp_path)
+    assert line == "source = 20: must be a text; in quotes inside those of the shell it is: '\"20\"'"
+    line = refused("import", 'source="20"', mapping(tmp_path), folder=tmp_path)
+    assert line == "source = 20: there is no such file, folder or pattern"
 
 
 def test_a_lag_is_the_same_whenever_the_clock_began(tmp_path: Path) -> None:

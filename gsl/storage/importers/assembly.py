@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,6 +24,7 @@ from gsl.storage.signals.glitches import find_glitches, mend
 
 ARRAYS = (*COMMANDS, "position", "velocity")
 MOST_ROWS, FINER = 100_000, 20  # rows that any resampling may make, and for each row of a larger log
+GAPS = 3  # that a line names
 SENT = ("action", *OTHER_COMMANDS)  # one of them there has to be
 
 
@@ -37,6 +39,7 @@ class Episode:
         steps: From one row of its positions to the next, as logged [s], shape (T,).
         dropped: Rows left out: repeated stamps, and what came before the first command.
         derived: Whether its velocities are slopes of its positions.
+        remarks: On what was left out of the log, and where it was cut; those of a cut log are at its first part.
     """
 
     trajectory: Trajectory
@@ -45,6 +48,7 @@ class Episode:
     steps: np.ndarray
     dropped: int
     derived: bool
+    remarks: tuple[str, ...] = ()
 
 
 def episodes(raw: Raw, mapping: LogMapping) -> list[Episode]:
@@ -66,7 +70,9 @@ def episodes(raw: Raw, mapping: LogMapping) -> list[Episode]:
         )
     late = int(np.searchsorted(stamps, commands[0] - SAME))
     own = stamps[late:]
-    cuts = pieces(own, mapping.longest_gap * float(np.median(np.diff(stamps))))
+    period = float(np.median(np.diff(stamps)))
+    cuts = pieces(own, mapping.longest_gap * period)
+    remarks = (*raw.remarks, *_list_gaps(raw.name, own, stamps[0], period, mapping.longest_gap, len(cuts)))
     label = read_label(raw, mapping)
     found = []
     for number, cut in enumerate(cuts):
@@ -74,10 +80,23 @@ def episodes(raw: Raw, mapping: LogMapping) -> list[Episode]:
         trajectory = _mend(_trajectory(raw, own[cut], mapping), mapping)
         dropped = raw.dropped + (late if number == 0 else 0)
         derived = "velocity" not in raw.signals
-        found.append(Episode(trajectory, {**label, **part}, raw.joints, np.diff(own[cut]), dropped, derived))
+        said = remarks if number == 0 else ()
+        found.append(Episode(trajectory, {**label, **part}, raw.joints, np.diff(own[cut]), dropped, derived, said))
     if not found:
         raise InputError(f"{raw.name}: no two rows of positions follow its first command")
     return found
+
+
+def _list_gaps(name: str, stamps: np.ndarray, start: float, period: float, longest: float, parts: int) -> Iterator[str]:
+    """Tell in one line of holes longer than `longest` periods, with their times from the log's start."""
+    steps = np.diff(stamps)
+    if not len(gaps := np.flatnonzero(steps > longest * period)):
+        return
+    told = ", ".join(f"{steps[row]:.3g} s after {stamps[row] - start:.6g} s" for row in gaps[:GAPS])
+    more = f" and {len(gaps) - GAPS} more" if len(gaps) > GAPS else ""
+    whole = f"mapping.longest_gap={math.ceil(steps.max() / period) + 1}"
+    cut = f"cut into {parts} episodes" if parts > 1 else "cut to one episode"
+    yield f"{name}: has no row for {told}{more}, and is {cut}; {whole} keeps it whole"
 
 
 def _trajectory(raw: Raw, stamps: np.ndarray, mapping: LogMapping) -> Trajectory:

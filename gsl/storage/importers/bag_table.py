@@ -67,7 +67,8 @@ class BagTable:
         except InputError:
             raise
         except Exception as error:  # a damaged bag ends the reader in many ways
-            raise TrajectoryError(self.path, f"cannot be read as a bag: {' '.join(str(error).split())}") from error
+            problem = f"cannot be read as a bag: {' '.join(str(error).split())}"
+            raise TrajectoryError(self.path, f"{problem}; {_explain_cut(self.path)}") from error
 
 
 def _explain_no_definition(kind: str) -> str:
@@ -76,6 +77,17 @@ def _explain_no_definition(kind: str) -> str:
         f"holds messages of {kind} without their definition; write it as MCAP where the type is installed "
         "(ros2 bag convert), or export the topic as CSV"
     )
+
+
+def _explain_cut(path: Path) -> str:
+    """Return what to type where a bag was never closed."""
+    file = next((one for end in ("mcap", "db3") for one in sorted(path.glob(f"*.{end}"))), path)
+    how = {
+        ".bag": f"rosbag reindex {file}",
+        ".mcap": f"mcap recover {file} -o whole.mcap",
+        ".db3": f"sqlite3 {file} .recover | sqlite3 whole.db3",
+    }.get(file.suffix, f"ros2 bag reindex {file}")
+    return f"copy it again, or if its recorder was killed: {how}"
 
 
 def _library(path: Path) -> tuple[Any, Any]:

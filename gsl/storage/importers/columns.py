@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.errors import ConfigError, TrajectoryError
+from gsl.storage.importers.joints import JOINT
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.signal import AXES, PER_JOINT, Signal
 from gsl.storage.importers.table import Table, missing_column
 
 _ENTRY = re.compile(r"(.+)\[(\d+)\]")
-_JOINT = "{joint}"
 
 
 class Reference(NamedTuple):
@@ -22,30 +22,6 @@ class Reference(NamedTuple):
 
     column: str
     entry: int | None = None
-
-
-def joints_of(mapping: LogMapping, table: Table) -> dict[str, str]:
-    """Return the names of the joints in order, each with its name in the log; found by the positions' columns.
-
-    Raises:
-        TrajectoryError: The mapping names none and the table has no such columns.
-    """
-    if isinstance(mapping.joints, dict):
-        return mapping.joints
-    if mapping.joints is not None:
-        return {joint: joint for joint in mapping.joints}
-    form = mapping.signals["position"].column
-    if not (isinstance(form, str) and form.count(_JOINT) == 1):
-        raise ConfigError("mapping.joints", "has no value; name them in order, or say {joint} in the positions' column")
-    before, after = form.split(_JOINT)
-    shortest = len(before) + len(after)
-    fitting = [one for one in table.names if one.startswith(before) and one.endswith(after) and len(one) > shortest]
-    names = [one[len(before) : len(one) - len(after)] for one in fitting]
-    if not names:
-        there = ", ".join(table.names[:12]) or "none"
-        problem = f"is in no column; there is {there}; say in a mapping where things are (docs/howto/own-logs.md)"
-        raise TrajectoryError(table.path, problem, column=form)
-    return {name: name for name in names}
 
 
 def references(
@@ -84,9 +60,9 @@ def _words(name: str, signal: Signal, joints: Mapping[str, str]) -> list[str]:
         return [str(column[key]) for key in keys]
     if isinstance(column, list):
         return [str(one) for one in column]
-    if _JOINT in str(column) or "{index}" in str(column):
+    if JOINT in str(column) or "{index}" in str(column):
         pairs = enumerate(joints.values())
-        return [str(column).replace(_JOINT, old).replace("{index}", str(index)) for index, old in pairs]
+        return [str(column).replace(JOINT, old).replace("{index}", str(index)) for index, old in pairs]
     return [str(column)]
 
 

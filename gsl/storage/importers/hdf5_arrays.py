@@ -14,6 +14,7 @@ import numpy as np
 from gsl.core.budget import COLUMNS, DEPTH
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.array_table import Shapes
+from gsl.storage.importers.sizes import DAMAGED
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 CHUNK = 256_000_000  # bytes of what is unpacked at once; common ones have one million
@@ -82,14 +83,14 @@ def _opened(path: Path) -> Iterator[Any]:
     try:
         file = h5py.File(path, "r")
     except OSError as error:
-        raise TrajectoryError(path, "is no HDF5 file, or truncated or damaged; copy it again") from error
+        raise TrajectoryError(path, f"is no HDF5 file, or {DAMAGED}") from error
     try:
         with file:
             yield file
     except InputError:
         raise
     except Exception as error:  # a damaged file ends the library in many ways
-        raise TrajectoryError(path, "is truncated or damaged; copy it again") from error
+        raise TrajectoryError(path, f"is {DAMAGED}") from error
 
 
 def _names(file: Any, group: str) -> list[str]:

@@ -67,18 +67,20 @@ def _records(path: Path, memory: float) -> Iterator[Any]:
     with open_log(path, most=100.0 * memory, lines=True) as file:
         for number, line in enumerate(file, 1):
             if line.strip():
-                yield _parse(path, line, number)
+                yield _parse(path, line, number - 1)
 
 
-def _parse(path: Path, text: bytes, line: int | None) -> Any:
+def _parse(path: Path, text: bytes, row: int | None) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
-        where = (
-            f"line {error.lineno}: {error.msg}" if isinstance(error, json.JSONDecodeError) else "not text, or too deep"
-        )
+        where = "not text, or too deep"
+        if isinstance(error, json.JSONDecodeError):
+            where = f"line {error.lineno}: {error.msg}" if row is None else error.msg
         more = "; one record a line is a .jsonl" if "Extra data" in where else ""
-        raise TrajectoryError(path, f"is not JSON ({where}){more}", line=line) from error
+        if row is None and not text.rstrip().endswith((b"]", b"}")):
+            more = "; it is cut off, as that of a killed logger is: copy it again, or log a record a line (.jsonl)"
+        raise TrajectoryError(path, f"is not JSON ({where}){more}", row=row) from error
 
 
 def _at(value: Any, name: str) -> Any:

@@ -12,7 +12,7 @@ import numpy as np
 from gsl.core.budget import DEPTH, within
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.array_table import Shapes
-from gsl.storage.importers.sizes import check_need
+from gsl.storage.importers.sizes import DAMAGED, check_need
 
 NUMBER = 8.0  # bytes of one, the most
 
@@ -33,7 +33,7 @@ class MatlabArrays:
         except InputError:
             raise
         except Exception as error:  # a damaged file ends the reader in many ways
-            raise TrajectoryError(path, "is no MATLAB file, or truncated or damaged; save it again") from error
+            raise TrajectoryError(path, f"is no MATLAB file, or {DAMAGED}") from error
         leaves = dict(_leaves({name: one for name, one in saved.items() if not name.startswith("__")}))
         self.arrays = {name: one for name, one in leaves.items() if isinstance(one, np.ndarray) and one.ndim}
         self.shapes: Shapes = {name: (one.shape, one.dtype) for name, one in self.arrays.items()}

@@ -9,12 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.errors import ConfigError, TrajectoryError
-from gsl.storage.importers.columns import Reference, joints_of, list_columns, output_names, references, side_by_side
+from gsl.storage.importers.columns import Reference, list_columns, output_names, references, side_by_side
 from gsl.storage.importers.formats import table
+from gsl.storage.importers.joints import joints_of, list_left_out
 from gsl.storage.importers.labels import constant, find_label_columns
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, fields_of
 from gsl.storage.importers.signal import AXES, BESIDE, BY_NAME, COMMANDS, FLAGS, Signal
+from gsl.storage.importers.sizes import OPEN_END, find_open_line
 from gsl.storage.importers.stamps import order_rows, seconds
 from gsl.storage.importers.table import Table, missing_column
 from gsl.storage.trajectory_contract import UNITS
@@ -47,6 +49,7 @@ class Raw:
         signals: By the contract's name.
         fields: What its files and its path say once.
         dropped: Rows left out because their stamp had come before.
+        remarks: On columns that were left out.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Raw:
     signals: Mapping[str, Series]
     fields: Mapping[str, Any]
     dropped: int
+    remarks: tuple[str, ...] = ()
 
 
 def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[Raw]:
@@ -75,14 +79,17 @@ def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[R
 def _in_lines(error: TrajectoryError, tables: Iterable[Table]) -> TrajectoryError:
     """Return an error with the line of its row, as an editor counts, where the file has one row a line."""
     first = next((one.first_line for one in tables if one.path == error.path), None)
-    if first is None or error.row is None:
+    line = error.line if first is None or error.row is None else error.row + first
+    if line is None:
         return error
-    return TrajectoryError(error.path, error.problem, column=error.column, line=error.row + first)
+    cut = f"; {OPEN_END}" if line == find_open_line(error.path) else ""
+    return TrajectoryError(error.path, f"{error.problem}{cut}", column=error.column, line=line)
 
 
 def _episodes(place: Place, mapping: LogMapping, tables: Mapping[str, Table]) -> Iterator[Raw]:
-    joints = joints_of(mapping, tables[mapping.signals["position"].file])
+    joints = joints_of(mapping, tables)
     mapping.check_joints(list(joints))
+    remarks = tuple(list_left_out(mapping, joints, tables))
     named = {name: one for name, one in mapping.signals.items() if _there(name, one, joints, tables)}
     others = {role: list_columns(mapping, joints, role) for role in tables}
     found = {name: references(name, one, joints, tables[one.file], others[one.file]) for name, one in named.items()}
@@ -103,7 +110,7 @@ def _episodes(place: Place, mapping: LogMapping, tables: Mapping[str, Table]) ->
                 continue
             series, twice = reading.series(values[one.file], tuple(joints))
             signals[signal], dropped = series, max(dropped, twice)
-        yield Raw(name, tuple(joints), signals, own, dropped)
+        yield Raw(name, tuple(joints), signals, own, dropped, remarks)
 
 
 def _tables(place: Place, mapping: LogMapping, memory: float) -> dict[str, Table]:

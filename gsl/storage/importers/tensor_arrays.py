@@ -14,7 +14,7 @@ import numpy as np
 from gsl.core.budget import DEPTH, within
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.array_table import Shapes
-from gsl.storage.importers.sizes import check_need
+from gsl.storage.importers.sizes import DAMAGED, check_need
 
 _DAMAGED = (RuntimeError, OSError, EOFError, ValueError, KeyError, AttributeError, AssertionError, IndexError)
 
@@ -35,7 +35,7 @@ class TensorArrays:
             problem = "holds more than tensors (a pickle, which can run code): none is read; save a dict of tensors"
             raise TrajectoryError(path, problem) from error
         except _DAMAGED as error:
-            raise TrajectoryError(path, "is no file of torch.save, or truncated or damaged; copy it again") from error
+            raise TrajectoryError(path, f"is no file of torch.save, or {DAMAGED}") from error
         leaves = dict(_leaves(saved if isinstance(saved, dict) else {"tensor": saved}))
         dense = {
             name: one

@@ -24,6 +24,7 @@ CELLS = 2_000_000  # read at once
 FACTOR = 100.0  # bytes of text that may be read for one of memory: only the wanted columns stay
 BLANKS = r"\s+"
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
+_OPEN_QUOTE = re.compile(r"EOF inside string starting at row (\d+)")
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|")
 
 
@@ -74,6 +75,9 @@ class TextTable:
                 return
             except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
                 told = " ".join(str(error).split()).removeprefix("Error tokenizing data. C error: ")
+                if quote := _OPEN_QUOTE.fullmatch(told):
+                    row = int(quote[1]) - int(self.header)
+                    raise TrajectoryError(self.path, "has a quote that does not end", row=row) from error
                 raise TrajectoryError(self.path, f"has rows of another length than its header: {told}") from error
             except UnicodeDecodeError as error:
                 raise TrajectoryError(self.path, "is no text; which format is it?") from error
@@ -123,7 +127,7 @@ def _values(path: Path, name: str, column: pd.Series, first: int) -> np.ndarray:
         except ValueError:
             if row == 0 and all(cells):
                 return np.array(cells, dtype=object)
-            raise TrajectoryError(path, f"{cell[:40]!r} is not a number", column=name, row=first + row) from None
+            raise TrajectoryError(path, f"{cell[:20]!r} is not a number", column=name, row=first + row) from None
     return np.array(found)
 
 

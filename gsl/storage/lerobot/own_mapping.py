@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from gsl.errors import ConfigError, TrajectoryError
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.signal import Signal, Time
 from gsl.storage.lerobot.arms import JAW_CLOSED, JAW_STROKE, OLD, OLD_ZEROS, OURS, bare, family, is_gripper, motor
-from gsl.storage.lerobot.dataset import ACTION, STATE, DataSet
+from gsl.storage.lerobot.dataset import ACTION, INFO, STATE, DataSet
 from gsl.storage.lerobot.encoder_steps import STEP, find_range, on_degrees
 from gsl.storage.lerobot.episode_table import TIME, EpisodeTable
 
@@ -80,6 +81,8 @@ def _entries(data: DataSet, mapping: LogMapping, arm: str | None) -> tuple[dict[
         joints = dict(OURS)
         theirs = ",".join(OURS.values())
         notes += [f"joints are called as in the world so101, {', '.join(OURS)}; mapping.joints=[{theirs}] keeps theirs"]
+    if mapping.joints is None:
+        _check_pairs(data, there)
     wanted = joints if isinstance(joints, dict) else {one: one for one in (joints or known)}
     for ours, theirs in wanted.items():
         if bare(str(theirs)) not in known:
@@ -89,6 +92,30 @@ def _entries(data: DataSet, mapping: LogMapping, arm: str | None) -> tuple[dict[
     left = [one for one in dict.fromkeys([*data.names[STATE], *data.names[ACTION]]) if one not in chosen.values()]
     notes += [f"left out, as no joint's position: {', '.join(left[:SHOWN])}{' ...' * (len(left) > SHOWN)}"] * bool(left)
     return chosen, notes
+
+
+def _check_pairs(data: DataSet, there: Sequence[str]) -> None:
+    """Refuse a joint that only one of the lists has: a renamed one; a state may have more than positions.
+
+    Raises:
+        TrajectoryError: A command has no state, or a position, which `.pos` tells, no command.
+    """
+    own = {key: [one for one in data.names[key] if one not in there] for key in (ACTION, STATE)}
+    if any(one.endswith(".pos") for one in there):
+        own = {key: [one for one in names if one.endswith(".pos")] for key, names in own.items()}
+    elif not own[ACTION]:
+        return
+    for key, other in ((ACTION, STATE), (STATE, ACTION)):
+        if own[key]:
+            joint, choices = own[key][0], own[other]
+            only = len(choices) == 1 == len(own[key])
+            near = choices[0] if only else next(iter(get_close_matches(joint, choices, n=1, cutoff=0.75)), "")
+            mean = f"; did you mean {other}.{near}? Name both alike in {INFO}" if near else ""
+            take = f"mapping.joints=[{','.join(bare(one) for one in there)}]"
+            problem = (
+                f"goes with {other}.{joint}, which is missing{mean}{', or' if near else ';'} leave it out with {take}"
+            )
+            raise TrajectoryError(data.folder, problem, column=f"{key}.{joint}")
 
 
 def _scales(
