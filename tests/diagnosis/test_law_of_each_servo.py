@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from gsl.core.plant import nominal
 from gsl.diagnosis.diagnose import prepare
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Options
+from gsl.diagnosis.search.stepwise import Selection
 from gsl.diagnosis.settings import LawSettings
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.in_the_air import InTheAir
@@ -162,3 +163,9 @@ def test_the_ceiling_is_what_laws_leave_of_the_excess() -> None:
 
 def test_older_targets_reach_back_as_far_as_a_replay_remembers() -> None:
     assert HOW.lags < COMMANDS
+
+
+@pytest.mark.parametrize(("left", "word"), [(30.0, "no_gap"), (99.0, "no_gap"), (101.0, "unknown")])
+def test_what_a_law_explains_of_less_than_the_noise_is_no_gap(left: float, word: str) -> None:
+    calibrated = replace(NONE, costs=np.full(8, left))
+    assert Judge(1.0).judge(Selection(calibrated, calibrated, (calibrated,), cast(Any, None)), 5.0).word == word
