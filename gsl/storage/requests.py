@@ -26,9 +26,9 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "modules"))
 
-from gsl.runner.main import main  # noqa: E402
+from gsl.runner.process import run  # noqa: E402
 
-sys.exit(main(HERE, sys.argv[1:]))
+run(HERE, sys.argv[1:])
 '''
 _TEMPLATE = '''"""Your robot: fill in read and send, or name another file of this kind with --robot."""
 
