@@ -73,6 +73,15 @@ def check_file(path: Path, most: float = math.inf) -> None:
         raise InputError(f"{path}: has {about.st_size:,} bytes; {most:,.0f} are read at most")
 
 
+def is_plain(path: Path) -> bool:
+    """Whether there is a file that can be read to its end."""
+    try:
+        check_file(path)
+    except (OSError, InputError):
+        return False
+    return True
+
+
 def read_text(path: Path, most: float = TEXT_BYTES) -> str:
     """Return the text of a small file.
 

@@ -174,8 +174,9 @@ def _link(looks: Looks, name: str, node: xml.Element) -> Link:
         return Link(name, 0.0, np.zeros(3), np.zeros((3, 3)), shapes)
     com, turn = read_origin(inertial)
     mass = read_number(find_only(inertial, "mass"), "value", "<mass>")
+    tensor = find_only(inertial, "inertia")
     xx, xy, xz, yy, yz, zz = (
-        read_number(find_only(inertial, "inertia"), f"i{pair}", "<inertia>") for pair in ("xx", "xy", "xz", "yy", "yz", "zz")
+        read_number(tensor, f"i{pair}", "<inertia>") for pair in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if mass < 0.0:
