@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import SMALL, done, eventually, gsl, refused, started
+from commands import ENVIRONMENT, SMALL, done, eventually, gsl, refused, started
 from scenarios import QUIET, walk
 from torture_kills import payloads
 
@@ -107,6 +107,14 @@ def test_a_command_comes_to_the_same_payload_on_a_cluster_of_this_machine(tmp_pa
     done(*SEARCH, "executor=dask", "out=runs/dask/optimize", folder=tmp_path)
     assert payloads(tmp_path / "runs/dask") == alone
     assert "(unchanged)" in done(*SEARCH, "executor=dask", f"address={NOWHERE}", folder=tmp_path).out  # it asks nobody
+
+
+def test_a_script_without_a_main_part_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "it.py").write_text(f"from gsl.cli import call\nprint(call({[*SEARCH, 'executor=dask']}))\n")
+    words = [sys.executable, "it.py"]
+    said = subprocess.run(words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120).stderr
+    assert "Traceback" not in said and "internal error" not in said
+    assert "gsl optimize: dask cannot start its workers here (Nanny failed to start.); look at free memory" in said
 
 
 def test_trials_of_a_study_go_to_the_workers(address: str, tmp_path: Path) -> None:
