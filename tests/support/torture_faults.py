@@ -50,7 +50,7 @@ def fill(folder: Path, number: int, rng: np.random.Generator, counts: Counter[st
         name = FULL[index % len(FULL)]
         most = int(rng.integers(1, 3000))
         words = [sys.executable, "-m", "gsl", name, "name=k", *KILLED[name]]
-        if index // len(FULL) % 2 and (count := int(rng.integers(2, 10))) and _is_mounted(folder / "runs/k", count):
+        if index // len(FULL) % 2 and (count := int(rng.integers(2, 7))) and _is_mounted(folder / "runs/k", count):
             process = subprocess.run(words, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True)
             counts["! half an artifact"] += bool(payloads(folder / "runs/k"))
             subprocess.run(["umount", folder / "runs/k"], check=True)
