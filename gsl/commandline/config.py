@@ -108,12 +108,13 @@ def execute(
     from gsl.report.account import account
     from gsl.storage.artifact import build
 
-    stage, settings, own = prepare(config, trust)
-    if getattr(stage, "only_looks", False):
-        return dict(stage.look(console))
-    out = own.folder(command, level)
-    with executing(own.cluster):
-        artifact = build(stage, config=settings, out=out, command=line, force=own.force, console=console)
+    with console.at_work(command):
+        stage, settings, own = prepare(config, trust)
+        if getattr(stage, "only_looks", False):
+            return dict(stage.look(console))
+        out = own.folder(command, level)
+        with executing(own.cluster):
+            artifact = build(stage, config=settings, out=out, command=line, force=own.force, console=console)
     for told in account(artifact):
         console.table(*told)
     more: Callable[[Path], dict[str, Any]] = getattr(stage, "document", lambda folder: {})

@@ -90,10 +90,11 @@ def render(reference: str, words: Sequence[str], console: Console) -> None:
     settings = make(Settings, read_settings(words, "render"))
     path = Path(settings.out)
     check_format(path)
-    cast = assemble(reference, settings, words, console)
+    with console.at_work("render"):
+        cast = assemble(reference, settings, words, console)
     with explain_refusal(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as temporary:
+    with replacing(path) as temporary, console.at_work("drawing the film"):
         named = temporary.with_name(temporary.name + path.suffix.lower())
         film(cast.robot, cast.joints, cast.shots, named, slow=settings.slow)
         named.rename(temporary)

@@ -31,10 +31,12 @@ def verify(reference: str | None, console: Console) -> int:
     folders = artifact_folders(reference)
     if not folders:
         raise ArtifactError(RUNS, "holds no artifact, so nothing is verified; go to the folder that runs/ lies in")
-    for folder in folders:
-        for one in lineage(folder, seen).all():
-            if one.problem and one.place not in wrong:
-                wrong[one.place] = one.problem
+    with console.progress(len(folders), "verifying artifacts") as progress:
+        for folder in folders:
+            for one in lineage(folder, seen).all():
+                if one.problem and one.place not in wrong:
+                    wrong[one.place] = one.problem
+            progress.advance()
     document = {"artifacts": len(folders), "problems": {place.as_posix(): why for place, why in wrong.items()}}
     if not wrong:
         console.result(document, text=f"{len(folders)} of {len(folders)} artifacts are as they were made")

@@ -48,7 +48,8 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
     find_own_modules(trust)
     stage, config = _ask_beside(*rebuild(old, trust), folder)
     command = f"gsl rerun {folder.as_posix()}"
-    new = build(stage, config=config, out=place, command=command, force=False, console=console)
+    with console.at_work(command):
+        new = build(stage, config=config, out=place, command=command, force=False, console=console)
     rows = list(_compare(old, new))
     other = [name for name, _, same in rows if not same]
     document = {"folder": place, "differs": other, "compared": [name for name, _, _ in rows]}

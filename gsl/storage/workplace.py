@@ -16,11 +16,10 @@ from typing import Any
 
 from gsl.core.budget import is_plain
 from gsl.errors import ArtifactError
-from gsl.storage.hashing import STEPS
+from gsl.storage.hashing import LOG, STEPS
 from gsl.storage.whole import claim, exchange, explain_refusal, flush, remove_temporary
 
 KEY = ".key"
-LOG = "log.txt"
 
 
 @contextmanager

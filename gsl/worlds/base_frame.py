@@ -26,25 +26,17 @@ class BaseMotion(NamedTuple):
 
 
 @compile_kernel
-def base_motion(
-    axes: np.ndarray,
-    com: np.ndarray,
-    centre: tuple[float, float, float],
-    quaternion: tuple[float, float, float, float],
-    linear: tuple[float, float, float],
-    angular: tuple[float, float, float],
-) -> BaseMotion:
+def base_motion(axes: np.ndarray, com: np.ndarray, pose: np.ndarray, speed: np.ndarray) -> BaseMotion:
     """Return the motion of the link frame.
 
     Args:
         axes: Of the inertial frame in link axes, columns, shape (3, 3).
         com: Centre of mass in link axes [m], shape (3,).
-        centre: Position of the centre of mass [m].
-        quaternion: Orientation of the inertial frame, x y z w.
-        linear: Velocity of the centre of mass in world axes [m/s].
-        angular: Angular velocity in world axes [rad/s].
+        pose: Position of the centre of mass [m] and orientation of the inertial frame, x y z w, shape (7,).
+        speed: Velocity of the centre of mass [m/s] and angular velocity [rad/s] in world axes, shape (6,).
     """
-    x, y, z, w = quaternion
+    centre, linear, angular = pose[:3], speed[:3], speed[3:]
+    x, y, z, w = pose[3:]
     inertial = np.empty((3, 3))
     inertial[0] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)
     inertial[1] = 2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)

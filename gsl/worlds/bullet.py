@@ -204,18 +204,13 @@ class BulletEnv(gymnasium.Env):
         return values
 
     def _observe(self, reading: Reading) -> np.ndarray:
-        n = self._n
-        observation = np.empty(self.layout.size)
         assert self.engine is not None
-        encoders = self.engine.encoders(reading)
-        observation[:n], observation[n : 2 * n] = encoders[0, :n] + self._plant.sensors.bias[:n], encoders[1, :n]
-        noise = self._plant.sensors.encoder_noise[:n]
-        if noise.any():
-            observation[:n] += noise * self.np_random.standard_normal(n)
-        rest, feet = observation[2 * n :], 3 + len(reading.foot_force)
-        rest[:3], rest[3:feet], rest[feet : feet + 3] = reading.gyro, reading.foot_force, reading.place
-        rest[feet + 3 : feet + 7], rest[feet + 7 :] = reading.quaternion, reading.velocity
-        return observation
+        n, sensors, encoders = self._n, self._plant.sensors, self.engine.encoders(reading)
+        position = encoders[0, :n] + sensors.bias[:n]
+        if (noise := sensors.encoder_noise[:n]).any():
+            position += noise * self.np_random.standard_normal(n)
+        body = reading.gyro, reading.foot_force, reading.place, reading.quaternion, reading.velocity
+        return np.concatenate([position, encoders[1, :n], *body])
 
     def _surface(self) -> np.ndarray | None:
         """Draw the heights of an uneven ground; it has randomness of its own, so that no other noise changes."""

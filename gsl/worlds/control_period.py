@@ -139,8 +139,10 @@ def in_c(
         memory: Moved on.
         turn: From base to world axes, shape (3, 3).
     """
+    pose, speed = np.empty(7), np.empty(6)
     for k in range(substeps):
-        read_joints(handle, body, places, memory.motion, memory.spin[0])
+        read_state(handle, body, places, memory.motion, pose, speed)
+        memory.spin[0] = speed[3:]
         torques(drive, memory, turn, k, step, period)
         command = c.joint_control(handle, body, c.TORQUE_CONTROL)
         for i in range(places.shape[1]):
@@ -154,7 +156,9 @@ def in_c(
 
 
 @compile_kernel
-def read_joints(handle: int, body: int, places: np.ndarray, motion: np.ndarray, spin: np.ndarray) -> None:
+def read_state(
+    handle: int, body: int, places: np.ndarray, motion: np.ndarray, pose: np.ndarray, speed: np.ndarray
+) -> None:
     """Read the state by Bullet's C interface.
 
     Args:
@@ -162,7 +166,8 @@ def read_joints(handle: int, body: int, places: np.ndarray, motion: np.ndarray, 
         body: Bullet's number of the robot.
         places: Of each motor in Bullet's state and velocity vectors, shape (2, n_motors).
         motion: Result, joint positions [rad] and velocities [rad/s], shape (2, n_motors).
-        spin: Result, angular velocity of the base in world axes [rad/s], shape (3,).
+        pose: Result, position [m] and orientation, x y z w, of the base's inertial frame, shape (7,).
+        speed: Result, its velocity [m/s] and angular velocity [rad/s] in world axes, shape (6,).
     """
     n, addresses = places.shape[1], np.zeros(2, dtype=np.intp)
     status = c.submit(handle, c.request_state(handle, body))
@@ -172,8 +177,10 @@ def read_joints(handle: int, body: int, places: np.ndarray, motion: np.ndarray, 
     velocities = carray(c.as_doubles(addresses[1]), (6 + n,))
     for i in range(n):
         motion[0, i], motion[1, i] = positions[places[0, i]], velocities[places[1, i]]
-    for k in range(3):
-        spin[k] = velocities[3 + k]
+    for k in range(7):
+        pose[k] = positions[k]
+    for k in range(6):
+        speed[k] = velocities[k]
 
 
 def in_python(

@@ -17,13 +17,13 @@ from gsl.core.scratch import Scratch
 from gsl.robots.urdf import principal_axes, urdf
 from gsl.worlds.base_frame import base_motion
 from gsl.worlds.bullet_c import NO_HANDLE, client_handle
-from gsl.worlds.control_period import Drive, first_memory, in_c, in_python, read_joints
+from gsl.worlds.control_period import Drive, first_memory, in_c, in_python, read_state
 from gsl.worlds.ground import PLANE, lay
 from gsl.worlds.physics import Load, Physics, Reading
 from gsl.worlds.pushes import aim, apply_push, overlap
 from gsl.worlds.rotor import carry_inertia, rotors
 from gsl.worlds.servo import encoder_motion
-from gsl.worlds.servo_state import ROTOR, first_state, pack
+from gsl.worlds.servo_state import ROTOR, first_state, pack, senses_apart
 from gsl.worlds.velocity_motors import VelocityMotors
 
 NOTHING = -1  # Bullet's number of a robot that is not loaded yet
@@ -72,6 +72,7 @@ class Engine:
         base = self._loaded.links[self.robot.base]
         axes = np.ascontiguousarray(principal_axes(base.inertia)[1])
         self._drive, self._base_com = Drive.of(servo, rotor, axes), base.com
+        self._senses_apart = senses_apart(servo)
         self._pushes = aim(plant, self._loaded)
         self._link_from_inertial = Rotation.from_matrix(axes.T).as_quat().tolist()
         self._folder = Scratch()
@@ -174,17 +175,18 @@ class Engine:
 
     def read(self) -> Reading:
         """Measure the robot now, and remember its orientation for the next control period."""
-        b, body, client = self.bullet, self.body, self.client
-        centre, quaternion = b.getBasePositionAndOrientation(body, client)
-        velocities = b.getBaseVelocity(body, client)
-        base = base_motion(self._drive.base_axes, self._base_com, centre, quaternion, *velocities)
+        motion, pose, speed = self._state()
+        base = base_motion(self._drive.base_axes, self._base_com, pose, speed)
         self._base_turn = base.turn
-        turned = b.multiplyTransforms((0, 0, 0), quaternion, (0, 0, 0), self._link_from_inertial)[1]
+        still = (0, 0, 0)
+        turned = self.bullet.multiplyTransforms(still, pose[3:].tolist(), still, self._link_from_inertial)[1]
         up = float(base.turn[2, 2])
-        return Reading(self._joint_motion(), base.place, turned, base.velocity, base.gyro, up, self._foot_force())
+        return Reading(motion, base.place, turned, base.velocity, base.gyro, up, self._foot_force())
 
     def encoders(self, reading: Reading) -> np.ndarray:
         """Return what the encoders tell of the motors' positions [rad] and velocities [rad/s], shape (2, n_motors)."""
+        if not self._senses_apart:
+            return reading.motion
         readings = np.empty_like(reading.motion)
         encoder_motion(self._drive.servo, self._memory.servo, reading.motion, self.physics.step, readings)
         return readings
@@ -196,14 +198,17 @@ class Engine:
                 apply_push(self.bullet, self.client, self.body, self.links, push, share)
         return np.zeros(len(self.joints)) if self.plant.hook is None else self.plant.hook(motion, time)
 
-    def _joint_motion(self) -> np.ndarray:
-        motion = np.empty((2, len(self.joints)))
-        if self.handle == NO_HANDLE:
-            states = self.bullet.getJointStates(self.body, self.joints, self.client)
-            motion[0], motion[1], _, _ = zip(*states, strict=True)
-        else:
-            read_joints(self.handle, self.body, self._places, motion, np.empty(3))
-        return motion
+    def _state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the motion of the joints, and pose and velocity of the base's inertial frame: see `read_state`."""
+        motion, pose, speed = np.empty((2, len(self.joints))), np.empty(7), np.empty(6)
+        if self.handle != NO_HANDLE:
+            read_state(self.handle, self.body, self._places, motion, pose, speed)
+            return motion, pose, speed
+        b, body, client = self.bullet, self.body, self.client
+        motion[0], motion[1], _, _ = zip(*b.getJointStates(body, self.joints, client), strict=True)
+        pose[:3], pose[3:] = b.getBasePositionAndOrientation(body, client)
+        speed[:3], speed[3:] = b.getBaseVelocity(body, client)
+        return motion, pose, speed
 
     def _foot_force(self) -> tuple[float, ...]:
         force = dict.fromkeys(self._feet, 0.0)

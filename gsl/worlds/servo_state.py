@@ -116,3 +116,9 @@ def settle(memory: np.ndarray, history: np.ndarray, motion: np.ndarray, target: 
         memory[ROTOR_ANGLE, i], memory[ROTOR_SPEED, i], memory[SPEED, i] = motion[0, i], motion[1, i], motion[1, i]
         memory[SMOOTHED, i] = target[i]
     fill_history(history, motion, step)
+
+
+def senses_apart(servos: ServoParameters) -> bool:
+    """Return whether encoders can tell anything but how the outputs move: late, or of a motor behind a spring."""
+    rows = servos.rows
+    return bool((rows[ROW.sensor_delay] > 0.0).any() or (rows[ROW.motor_encoder] * rows[ROTOR] > 0.0).any())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -80,12 +81,17 @@ def _boxes(robot: Robot, positions: np.ndarray) -> Iterator[tuple[Shape, np.ndar
 def _corners(shape: Shape) -> np.ndarray:
     """Return points in link axes whose hull a shape fills [m], shape (3, n)."""
     if shape.kind != MESH:
-        return euler(*shape.turn) @ (_edges(shape)[:, None] * _CORNERS) + np.array(shape.centre)[:, None]
+        return _box_corners(shape)
     if shape.collides:
         return hull_of(shape).vertices.T
     points = np.concatenate([np.array([shape.centre]), *(part.vertices for part in draw_parts(shape))])
     low, high = points.min(axis=0), points.max(axis=0)
     return (high - low)[:, None] * _CORNERS + 0.5 * (low + high)[:, None]
+
+
+@cache
+def _box_corners(shape: Shape) -> np.ndarray:
+    return euler(*shape.turn) @ (_edges(shape)[:, None] * _CORNERS) + np.array(shape.centre)[:, None]
 
 
 def _edges(shape: Shape) -> np.ndarray:

@@ -85,7 +85,9 @@ def test_runs_are_chosen_by_one_word(word: str, left: list[str], home: Path) -> 
 @pytest.mark.parametrize(
     ("word", "line"),
     [
-        ("sort=falls", "did you mean of.falls"), ("kind=fly", "there is evaluate, optimize"), ("newer=soon", "7d"),
+        ("sort=falls", "did you mean of.falls? There is best, of.falls"),
+        ("sort=speed", "none of these artifacts has this metric; there is best, of.falls"),
+        ("kind=fly", "there is evaluate, optimize"), ("newer=soon", "7d"),
         ("metric=best>much", "condition"), ("limit=-1", "at least 0"), ("colour=red", "no such setting"),
         ("best", "name=value"), ("world=mars", "no artifact"),
     ],

@@ -48,10 +48,10 @@ def test_a_filter_that_the_library_lacks_is_unknown_and_its_form_is_said() -> No
     assert findings.verdict.word == "unknown" and findings.verdict.missing > 1.0
     assert {form.joint for form in findings.forms} == {"shoulder", "elbow"}
     assert all(0.005 < form.late < 0.03 for form in findings.forms)
-    told = document(findings)
-    assert [form["joint"] for form in told["forms"]] == [form.joint for form in findings.forms]
-    assert told["causes"] == []
-    assert told["shrinkage"]["fraction"] < told["shrinkage"]["ceiling_fraction"] <= 1.0
+    report = document(findings)
+    assert [form["joint"] for form in report["forms"]] == [form.joint for form in findings.forms]
+    assert report["causes"] == []
+    assert report["shrinkage"]["fraction"] < report["shrinkage"]["ceiling_fraction"] <= 1.0
 
 
 @pytest.mark.slow
