@@ -12,7 +12,7 @@ from omegaconf.errors import OmegaConfBaseException
 from pydantic import AfterValidator, BeforeValidator
 
 from gsl.commandline.composer import Composition
-from gsl.commandline.config_errors import missing, resolution_error
+from gsl.commandline.config_errors import missing, of_the_command, resolution_error
 from gsl.commandline.expansion import check_expansion
 from gsl.commandline.known_settings import plain, read_declared
 from gsl.commandline.overrides import COMMAND_KEYS, file_of
@@ -136,7 +136,10 @@ def prepare(config: Mapping[str, Any], trust: Collection[str] = ()) -> tuple[Any
         raise missing(path)
     if TRUST in settings:
         settings[TRUST] = list(trust)
-    stage = restore(settings, trust=trust)
+    try:
+        stage = restore(settings, trust=trust)
+    except ConfigError as error:
+        raise of_the_command(error, config) from error
     told = describe(stage)  # refuses what could not be written down afterwards
     if own.cluster is not None and not any(name.rpartition(".")[2] == WORKERS for name in flat(told)):
         raise ConfigError("executor", "this command gives nothing to workers; leave it out", given=own.executor)

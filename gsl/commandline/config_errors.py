@@ -5,17 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from hydra.errors import MissingConfigException
 from omegaconf import DictConfig
 from omegaconf.errors import InterpolationToMissingValueError, MissingMandatoryValue
 
 from gsl.commandline.known_settings import list_keys
-from gsl.core.validation import did_you_mean
+from gsl.commandline.overrides import COMMAND_KEYS
+from gsl.core.validation import NO_SUCH, did_you_mean
 from gsl.errors import ConfigError, InputError
 
 _UNKNOWN = re.compile(r"Could not (?:override|delete from config\.) '([^']+)'")  # hydra's exception has no field for it
 _MERGED = "Error merging override "
+_FILE = re.compile(r"In '([^']+)'")  # in which a yaml file says something of another shape
+_ROUND = ("Recursive interpolation", "RecursionError")  # the second within an entry of a list
+_WRITE = "write the value itself"
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,17 @@ def translate(error: Exception, words: Vocabulary) -> Exception:
         key, _, value = text.removeprefix(_MERGED).lstrip("+~").partition("=")
         shape = "a list or a mapping, another shape than what is there"
         return ConfigError(key, f"is {shape}; set single values below it, or take a file without it", given=value)
-    return InputError(f"configuration: {' '.join(text.split())}")
+    if file := _FILE.match(text):
+        return InputError(f"{file[1]}.yaml: says a list where settings by name are, or the other way round; mend that")
+    return InputError(f"configuration: {' '.join(text.split()) or 'holds what no setting can be, such as a set'}")
+
+
+def of_the_command(error: ConfigError, config: Mapping[str, Any]) -> ConfigError:
+    """Return a better error for what a file says of a component, such as a mapping, and is of the command itself."""
+    above, _, name = error.setting.rpartition(".")
+    if above and error.problem.startswith(NO_SUCH) and name in {*COMMAND_KEYS, *config}:
+        return ConfigError(error.setting, f"is a setting of the command, and not of {above}; type {name}=... yourself")
+    return error
 
 
 def misshapen(arguments: Sequence[str], error: ValueError) -> ConfigError:
@@ -79,7 +94,12 @@ def resolution_error(error: Exception) -> Exception:
     problem = str(error).splitlines()[0]
     if isinstance(error, InterpolationToMissingValueError):
         return missing(problem.rpartition(" ")[2])
-    return ConfigError(key, problem)
+    nowhere = re.search(r"key '([^']*)'", problem)
+    if nowhere is not None:
+        return ConfigError(key, f"refers to {nowhere[1].lstrip('.')}, and this command has no such setting; {_WRITE}")
+    if any(word in problem for word in _ROUND):
+        return ConfigError(key, f"refers to itself; {_WRITE}")
+    return ConfigError(key, f"refers to a setting in a way that cannot be read; {_WRITE}")
 
 
 def missing(key: str) -> ConfigError:

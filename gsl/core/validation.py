@@ -16,6 +16,8 @@ from gsl.errors import ConfigError
 
 T = TypeVar("T")
 
+NO_SUCH = "no such setting"
+"""What an error of a setting that is none begins with."""
 _UNEXPECTED = re.compile(r"unexpected keyword argument '(\w+)'")
 _ADDRESS = re.compile(r" (object )?at 0x[0-9a-f]+")  # in memory: it says nothing
 _RULES = {
@@ -63,7 +65,7 @@ def make(target: Callable[..., T], values: Mapping[str, Any], *, where: str = ""
             name = ".".join(filter(None, [where, TARGET]))
             raise ConfigError(name, f"cannot be made of its settings ({error})", given=_name_of(target)) from error
         name = ".".join(filter(None, [where, unexpected[1]]))
-        raise ConfigError(name, f"no such setting{did_you_mean(unexpected[1], settings_of(target))}") from error
+        raise ConfigError(name, f"{NO_SUCH}{did_you_mean(unexpected[1], settings_of(target))}") from error
 
 
 def config_error(error: ValidationError, target: Callable[..., Any], *, where: str = "") -> ConfigError:
@@ -74,7 +76,7 @@ def config_error(error: ValidationError, target: Callable[..., Any], *, where: s
     location += [str(part) for part in details["loc"][1:] if isinstance(part, int)]
     path = ".".join([*filter(None, [where]), *location])
     if details["type"] == "unexpected_keyword_argument":
-        return ConfigError(path, f"no such setting{did_you_mean(location[-1], settings_of(target))}")
+        return ConfigError(path, f"{NO_SUCH}{did_you_mean(location[-1], settings_of(target))}")
     setting = settings_of(target).get(location[0]) if location else None
     unit = f" ({setting.unit})" if setting is not None and setting.unit else ""
     return ConfigError(path or target.__name__, f"{_problems(complaints)}{unit}", given=_quote(details["input"]))

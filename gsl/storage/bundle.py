@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gsl.errors import ConfigError
 
-RUNNER = "gsl.runner.main"
+RUNNER = "gsl.runner.process"
 _STAND_INS = {f"gsl.core.{name}": f"gsl.runner.stand_in.{name}" for name in ("setting", "compiled", "validation")}
 _STAND_INS["gsl"] = "gsl.runner.stand_in.face"
 _THERE = {*sys.stdlib_module_names, "numpy"}

@@ -132,7 +132,8 @@ def _alternatives(reference: str, runs: Path) -> str:
         deeper = [name for name in last if last[name] == meant[0]]
         return f", did you mean {' or '.join(deeper[:ALTERNATIVES])}?"
     maker = f"; gsl {MAKERS[stage]} name={run} makes it" if run and stage in MAKERS else ""
-    names = {path.name for path in runs.iterdir() if not path.name.startswith(".")} if runs.is_dir() else set()
+    there = runs.iterdir() if runs.is_dir() else ()
+    names = {path.name for path in there if path.exists() and not path.name.startswith(".")}
     close = difflib.get_close_matches(reference, sorted({*names, *inside}), n=1, cutoff=0.85 if maker else 0.6)
     return f", did you mean {close[0]}?" if close else maker
 

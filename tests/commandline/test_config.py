@@ -99,7 +99,7 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
         (["episodes"], "episodes: has no value; write key=value"),
         (["episodes=[1"], "episodes = [1: cannot be read"),
         (["episodes=1,2"], "episodes: several values need --multirun; a list is written 'episodes=[1,2]'"),
-        (["episodes=${nope}"], "episodes: Interpolation key 'nope' not found"),
+        (["episodes=${nope}"], "episodes: refers to nope, and this command has no such setting"),
         (["force=maybe"], "force = maybe: must be true or false"),
         (["name="], "name: must not be empty"),
         (["world=plain"], "world.effects.mine.width = -1: must be at least 0 (rad)"),
@@ -163,6 +163,12 @@ def test_a_stage_that_fails_leaves_nothing_behind(
 def test_a_fault_of_gsls_is_an_internal_error() -> None:
     line = "internal error: ZeroDivisionError: division by zero in two lines; GSL_TRACEBACK=1 shows where"
     assert describe_failure(ZeroDivisionError("division by zero\nin two lines")) == (line, 1)
+
+
+@pytest.mark.parametrize("failure", [MemoryError("Unable to allocate 7 TiB"), OSError(12, "Cannot allocate memory")])
+def test_a_lack_of_memory_is_one_line(failure: Exception) -> None:
+    line = "there is not enough memory for this; free some, or try workers=1, or less at once"
+    assert describe_failure(failure) == (line, 1)
 
 
 def test_a_traceback_is_there_for_who_asks(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -126,6 +126,45 @@ def test_the_refusal_says_what_to_type_and_that_is_enough(place: Path) -> None:
     assert manifest["trust"] == ["lab_world"]
 
 
+REFERRING = {
+    "robot: ${sim.robot}": "mapping.robot: refers to sim.robot, and this command has no such setting; ",
+    "robot: ${mapping.robot}": "mapping.robot: refers to itself; ",
+    "about: {x: ['${mapping.about.x[0]}']}": "mapping.about.x[0]: refers to itself; ",
+    'about: {x: "${oc.select:}"}': "mapping.about.x: refers to a setting in a way that cannot be read; ",
+}
+
+
+@pytest.mark.parametrize("line", REFERRING)
+def test_a_reference_to_nothing_is_told_in_our_words(line: str, place: Path) -> None:
+    (place / "m.yaml").write_text(f"{SIGNALS}{line}\n")
+    said = refused("import", "source=log.csv", "mapping=m.yaml", "--check", folder=place)
+    assert said == f"{REFERRING[line]}write the value itself"
+
+
+@pytest.mark.parametrize("key", ["force", "out", "executor", "address", "check", "accept", "memory"])
+def test_a_setting_of_the_command_is_none_of_a_mapping(key: str, place: Path) -> None:
+    (place / "m.yaml").write_text(f"{SIGNALS}{key}: true\n")
+    said = refused("import", "source=log.csv", "mapping=m.yaml", folder=place)
+    assert said == f"mapping.{key}: is a setting of the command, and not of mapping; type {key}=... yourself"
+
+
+SHAPELESS = {
+    "defaults: 3": "its `defaults:` are no list of files",
+    "defaults: ['${x}']": "its `defaults:` are no list of files",
+    "defaults: [_self_, _self_]": "its `defaults:` are no list of files",
+    "defaults: [nao_ideal]\nnull: 4": "None is no name of a setting, which is a text",
+    "defaults: [nao_ideal]\nx: !!set {a}": "holds what no setting can be, such as a set",
+    "defaults: [nao_ideal, _self_]\neffects: [1]": "world/w.yaml: says a list where settings by name are",
+}
+
+
+@pytest.mark.parametrize("text", SHAPELESS)
+def test_a_file_of_another_shape_is_told_in_our_words(text: str, place: Path) -> None:
+    (place / "theirs/world").mkdir(parents=True)
+    (place / "theirs/world/w.yaml").write_text(f"{text}\n")
+    assert SHAPELESS[text] in refused("collect", "--config-dir", "theirs", "world=w", folder=place)
+
+
 def test_an_effect_of_somebody_else_is_not_imported(place: Path) -> None:
     (place / "theirs/effect").mkdir(parents=True)
     (place / "theirs/effect/slop.yaml").write_text("_target_: evil.Thing\n")

@@ -325,7 +325,7 @@ SETTINGS = {
         "mapping.signals.action.file = cmd: is no topic of a bag",
     ),
     "joints twice": ({"joints": ["a", "a"]}, "mapping.joints = a, a: must be different names"),
-    "a negative period": ({"period": -1}, "mapping.period = -1: must be above 0 (s)"),
+    "a negative period": ({"period": -1}, "mapping.period = -1: must be at least 1e-06 (s)"),
     "a field": (
         {"about": {"kp": "{gain}"}},
         "mapping.about.kp = {gain}: there is no field or column gain; there is file",

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.budget import COLUMNS, DEPTH
+from gsl.core.budget import COLUMNS, DEPTH, check_file
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.array_table import Shapes
 from gsl.storage.importers.sizes import DAMAGED
@@ -81,6 +81,7 @@ def _opened(path: Path) -> Iterator[Any]:
     except ImportError as error:
         raise InputError(f"{path}: HDF5 files are read with the library h5py: pip install 'gsl[hdf5]'") from error
     try:
+        check_file(path)
         file = h5py.File(path, "r")
     except OSError as error:
         raise TrajectoryError(path, f"is no HDF5 file, or {DAMAGED}") from error

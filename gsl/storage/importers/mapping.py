@@ -13,7 +13,7 @@ from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
 from gsl.effects.effect import build
 from gsl.errors import ConfigError
-from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, KNOWN, Signal, Time
+from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, KNOWN, SHORTEST, Signal, Time
 from gsl.storage.importers.units import factor
 from gsl.storage.trajectory_contract import INTEGERS, UNITS, suggestion
 
@@ -82,7 +82,9 @@ class Mapping:
     episode: Annotated[str, setting("file, or the column whose value tells episodes apart", min_length=1)] = "file"
     records: Annotated[str, setting("JSON: path of the list of rows; HDF5: a group, or data/demo_* for many")] = ""
     time: Annotated[Time, setting("the stamps: {column, unit}, or {period}"), BeforeValidator(_time)] = Time()  # noqa: RUF009  it is frozen
-    period: Annotated[float | None, setting("resample to it; null keeps the rows as they are", unit="s", gt=0)] = None
+    period: Annotated[
+        float | None, setting("resample to it; null keeps the rows as they are", unit="s", ge=SHORTEST)
+    ] = None
     command_offset: Annotated[float, setting("what the commands' clock is ahead of the sensors'", unit="s")] = 0.0
     synchronised: Annotated[bool, setting("whether commands and sensors share a clock, or the offset is known")] = True
     longest_gap: Annotated[float, setting("periods without a row, above which an episode is cut in two", gt=1)] = 10.0

@@ -15,6 +15,8 @@ from gsl.storage.importers.units import factor
 Columns = str | int | list[str | int] | dict[str, str | int]
 Values = float | dict[str, float]
 
+SHORTEST = 1e-6
+"""Period of a log [s]; no robot is read a million times a second, and the rate of a shorter one may be no number."""
 BESIDE = (*OTHER_COMMANDS, "kp_command", "kd_command")  # of a servo that takes more than a position
 PER_JOINT = ("action", "grounded_action", "position", "velocity", "torque", "temperature", *BESIDE)
 COMMANDS = ("action", "grounded_action")
@@ -37,7 +39,9 @@ class Time:
     wrap: Annotated[
         float | None, setting("what the stamps count to before they begin again, such as 4294967296", gt=0)
     ] = None
-    period: Annotated[float | None, setting("instead of stamps: time from one row to the next", unit="s", gt=0)] = None
+    period: Annotated[
+        float | None, setting("instead of stamps: time from one row to the next", unit="s", ge=SHORTEST)
+    ] = None
 
     def __post_init__(self) -> None:
         """Refuse a unit that is none of time."""

@@ -187,6 +187,7 @@ def _read_episodes(folder: Path, version: str, memory: float) -> Iterator[dict[s
 def _read_table(path: Path, names: list[str], memory: float) -> list[dict[str, Any]]:
     import pyarrow.parquet as pq
 
+    check_file(path)
     with pq.ParquetFile(path) as file:  # what pyarrow raises of a damaged file is a ValueError or an OSError
         there = [name for name in names if name in file.schema_arrow.names]
         check_need(path, 20.0 * count_bytes(file.metadata, there), memory)
