@@ -75,9 +75,8 @@ def diagnose(
         tick("self-test: can the causes that are left be separated")
         trials = duel(log, problem, rivals, options)
     verdict = _judge(log, rivals, trials, options).judge(selection, missing)
-    forms = (
-        find_forms(log, problem.simulator, options.verdict.law) if verdict.word == "unknown" and missing > 1.0 else ()
-    )
+    lacking = verdict.word == "unknown" and missing > 1.0
+    forms = find_forms(log, problem.simulator, options.verdict.law) if lacking else ()
     tested = null_gains, tuple(trials)
     return Findings(log, problem, selection, verdict, *tested, baseline, shift, refuted, laws, forms, options)
 

@@ -201,6 +201,7 @@ class VerdictSettings:
     limit_rounds: int = 3  # of its fits
     asked: float = 0.05  # command [rad],
     stuck: float = 0.1  # and share of it, below which a joint that moves less does not move
+    beneath: float = 0.7  # such a cost of all and of each joint leaves nothing to explain: noise makes 0.9 at least
     rough: float = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
     left: float = 0.1  # share of the held-out excess that is left, from which on something else is at work
     law: LawSettings = field(default_factory=LawSettings)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +15,6 @@ from gsl.core.plant import nominal
 from gsl.diagnosis.diagnose import prepare
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Options
-from gsl.diagnosis.search.stepwise import Selection
 from gsl.diagnosis.settings import LawSettings
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.in_the_air import InTheAir
@@ -165,7 +164,8 @@ def test_older_targets_reach_back_as_far_as_a_replay_remembers() -> None:
     assert HOW.lags < COMMANDS
 
 
-@pytest.mark.parametrize(("left", "word"), [(30.0, "no_gap"), (99.0, "no_gap"), (101.0, "unknown")])
-def test_what_a_law_explains_of_less_than_the_noise_is_no_gap(left: float, word: str) -> None:
-    calibrated = replace(NONE, costs=np.full(8, left))
-    assert Judge(1.0).judge(Selection(calibrated, calibrated, (calibrated,), cast(Any, None)), 5.0).word == word
+@pytest.mark.parametrize(("joints", "word"), [((0.3, 0.3), "no_gap"), ((0.3, 0.9), "unknown")])
+def test_where_nothing_is_left_a_law_explains_nothing(joints: tuple[float, float], word: str) -> None:
+    """As with a tolerance that is wider than what a calibration leaves."""
+    calm = replace(NONE, costs=np.full(8, 100.0 * np.mean(joints)), levels=np.array(joints))
+    assert Judge(1.0).judge(replace(selection(calm), none=calm), 5.0).word == word
