@@ -115,8 +115,8 @@ def execute(
         out = own.folder(command, level)
         with executing(own.cluster):
             artifact = build(stage, config=settings, out=out, command=line, force=own.force, console=console)
-    for told in account(artifact):
-        console.table(*told)
+    for table in account(artifact):
+        console.table(*table)
     more: Callable[[Path], dict[str, Any]] = getattr(stage, "document", lambda folder: {})
     return {"folder": out.as_posix(), "unchanged": artifact.unchanged, "metrics": artifact.metrics, **more(out)}
 
@@ -140,8 +140,8 @@ def prepare(config: Mapping[str, Any], trust: Collection[str] = ()) -> tuple[Any
         stage = restore(settings, trust=trust)
     except ConfigError as error:
         raise of_the_command(error, config) from error
-    told = describe(stage)  # refuses what could not be written down afterwards
-    if own.cluster is not None and not any(name.rpartition(".")[2] == WORKERS for name in flat(told)):
+    described = describe(stage)  # refuses what could not be written down afterwards
+    if own.cluster is not None and not any(name.rpartition(".")[2] == WORKERS for name in flat(described)):
         raise ConfigError("executor", "this command gives nothing to workers; leave it out", given=own.executor)
     return stage, settings, own
 

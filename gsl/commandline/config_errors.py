@@ -44,7 +44,7 @@ def unknown_key(error: Exception) -> str | None:
 
 def unfit(command: str, arguments: Sequence[str], unknown: str | None) -> ConfigError | None:
     """Return the error for an experiment or task that sets what a command does not have, if that is the matter."""
-    typed = dict(one.lstrip("+").partition("=")[::2] for one in arguments)
+    typed = dict(argument.lstrip("+").partition("=")[::2] for argument in arguments)
     key = next((key for key in typed if key.rpartition(".")[2] in ("experiment", "task")), None)
     if unknown is None or unknown in typed or key is None:
         return None
@@ -81,7 +81,7 @@ def of_the_command(error: ConfigError, config: Mapping[str, Any]) -> ConfigError
 def misshapen(arguments: Sequence[str], error: ValueError) -> ConfigError:
     """Return the error for an argument that hydra stumbles over: a key in a list."""
     last = str(error).rpartition(" ")[2].strip("'")
-    keys = [key for one in arguments if last in (key := one.partition("=")[0].lstrip("+~")).split(".")]
+    keys = [key for argument in arguments if last in (key := argument.partition("=")[0].lstrip("+~")).split(".")]
     where = keys[0].rpartition(".")[0] if keys else "configuration"
     return ConfigError(where, "is a list of entries here, which have no names; set all of it: KEY=[{...}, {...}]")
 
@@ -112,11 +112,11 @@ def _no_such_setting(key: str, words: Vocabulary) -> ConfigError:
     if roles:
         return ConfigError(key, f"here a {key} has a role; say {' or '.join(f'{role}=...' for role in roles)}")
     keys, last = list_keys(words.config), key.rpartition(".")[2]
-    deeper = [known for known in keys if known.rpartition(".")[2] == last]
+    deeper = [declared for declared in keys if declared.rpartition(".")[2] == last]
     if deeper:
         return ConfigError(key, f"no such setting; did you mean {' or '.join(deeper[:3])}?")
-    shown = [known for known in keys if not known.endswith("_target_")]
-    level = [known for known in shown if known.rpartition(".")[0] == key.rpartition(".")[0]]
-    level = level or [known for known in shown if "." not in known]
+    shown = [declared for declared in keys if not declared.endswith("_target_")]
+    level = [declared for declared in shown if declared.rpartition(".")[0] == key.rpartition(".")[0]]
+    level = level or [declared for declared in shown if "." not in declared]
     near = did_you_mean(key, keys)
     return ConfigError(key, "no such setting" + (near if "did you mean" in near else did_you_mean(key, level)))

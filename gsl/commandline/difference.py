@@ -32,19 +32,19 @@ def compare(first: str, second: str, console: Console) -> None:
     Raises:
         ArtifactError: There is no such artifact, or it is damaged.
     """
-    one, other = (Artifact(folder, manifest.read(folder)) for folder in map(resolve_main, (first, second)))
-    made = one.manifest, other.manifest
+    left, other = (Artifact(folder, manifest.read(folder)) for folder in map(resolve_main, (first, second)))
+    made = left.manifest, other.manifest
     parents = [{parent.role: parent.hash[:SHORT] for parent in each.parents} for each in made]
     roles = parents[0].keys() & parents[1].keys()  # where such a parent lies is told by its contents
-    settings = [{key: value for key, value in flat(each.config).items() if key not in roles} for each in (one, other)]
+    settings = [{key: value for key, value in flat(each.config).items() if key not in roles} for each in (left, other)]
     software = [{**each.versions, "sources of gsl": each.sources[:SHORT], "kind": each.kind} for each in made]
     parts = {
         "settings": _differ(*settings),
         "made from": _differ(*parents),
         "software": _differ(*software),
-        "metrics": _differ(flat(one.metrics), flat(other.metrics)),
+        "metrics": _differ(flat(left.metrics), flat(other.metrics)),
     }
-    names = [name_run(each.folder) for each in (one, other)]
+    names = [name_run(each.folder) for each in (left, other)]
     for title, pairs in parts.items():
         if pairs:
             rows = [
@@ -52,9 +52,9 @@ def compare(first: str, second: str, console: Console) -> None:
             ]
             columns = [title, *names, *(["change"] if title == "metrics" else [])]
             console.table(f"{title}: {len(rows)} {'differ' if len(rows) > 1 else 'differs'}", columns, rows)
-    causes = _compare_diagnoses((one, other), (names[0], names[1]), console)
+    causes = _compare_diagnoses((left, other), (names[0], names[1]), console)
     same = not any(parts.values())
-    document = {**({"causes": causes} if causes else {}), "folders": [one.folder, other.folder], "same": same}
+    document = {**({"causes": causes} if causes else {}), "folders": [left.folder, other.folder], "same": same}
     text = f"{names[0]} and {names[1]}: the same settings, parents, software and metrics" if same else ""
     console.result({**document, **{title.replace(" ", "_"): pairs for title, pairs in parts.items()}}, text=text)
 

@@ -196,12 +196,12 @@ def _search_of(measured: Artifact) -> Artifact | None:
     return None
 
 
-def _choose(found: Sequence[PolicyRecord], name: str) -> PolicyRecord:
+def _choose(stored: Sequence[PolicyRecord], name: str) -> PolicyRecord:
     """Return the policy of a name, the last one without."""
-    by_name = {record.name: record for record in found}
+    by_name = {record.name: record for record in stored}
     if name and name not in by_name:
         raise ConfigError("policy", f"there is none of this name{did_you_mean(name, by_name)}", given=name)
-    return by_name[name] if name else found[-1]
+    return by_name[name] if name else stored[-1]
 
 
 def _robot_in(world: Any) -> Robot:

@@ -43,7 +43,7 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
         if shown:
             portrait(body, picture)
     about = f"{body.name}: {len(body.controlled)} controlled joints, {len(body.links)} links, {body.mass:.3f} kg"
-    told = [about, *(f"remark: {remark}" for remark in remarks), *files]
+    lines = [about, *(f"remark: {remark}" for remark in remarks), *files]
     document = {
         "robot": body.name,
         "mass_kg": body.mass,
@@ -51,7 +51,7 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
         "remarks": remarks,
         "files": files,
     }
-    console.result(document, text="\n".join(told))
+    console.result(document, text="\n".join(lines))
 
 
 def _check_free(model: Path, picture: Path | None, text: str) -> None:

@@ -111,8 +111,8 @@ def _keys(value: Any) -> Iterator[Any]:
 def _words(value: Any) -> Iterator[str]:
     if isinstance(value, dict):
         yield from (str(key) for key in value)
-    for one in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        yield from _words(one)
+    for entry in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from _words(entry)
     if isinstance(value, str):
         yield value
 

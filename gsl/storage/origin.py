@@ -43,8 +43,8 @@ class Origin:
     def links(self) -> tuple[Parent, ...]:
         """What has been built beside it, as its manifest names it."""
         return tuple(
-            Parent(one.manifest.kind, relative(path, self.folder), one.manifest.contents)
-            for path, one in sorted(self.built.items())
+            Parent(artifact.manifest.kind, relative(path, self.folder), artifact.manifest.contents)
+            for path, artifact in sorted(self.built.items())
         )
 
     @property
@@ -52,7 +52,7 @@ class Origin:
         """What the console has warned of since the work began, and while what it built was made: the logs have it."""
         logs = [self.folder / LOG, *(path / LOG for path in sorted(self.built))]
         lines = [line for log in logs if log.is_file() for line in read_text(log, DOCUMENT_BYTES).splitlines()]
-        return tuple(dict.fromkeys(found[1] for line in lines if (found := _WARNING.search(line))))
+        return tuple(dict.fromkeys(match[1] for line in lines if (match := _WARNING.search(line))))
 
 
 _at_work: ContextVar[Origin | None] = ContextVar("at_work", default=None)

@@ -87,13 +87,13 @@ def write_request(folder: Path, request: Mapping[str, Any], warnings: Sequence[s
         ConfigError: The policy needs a library beside numpy.
         GslError: The folder cannot be written.
     """
-    if found := answer_files(folder):
+    if answers := answer_files(folder):
         if not (folder / NAME).exists():
             raise ArtifactError(
                 folder / NAME, "is missing beside an answer to it; put it back, or move the answer away"
             )
         read_stored(folder)
-        raise ArtifactError(found[0], "answers another request, which has changed since; move it away")
+        raise ArtifactError(answers[0], "answers another request, which has changed since; move it away")
     files = files_of(request)
     with explain_refusal(folder.parent):
         temporary = folder.with_name(f".{folder.name}.tmp-{os.getpid()}")
@@ -175,6 +175,6 @@ def _readme(request: Mapping[str, Any], warnings: Sequence[str]) -> str:
         f"3. python runner.py{trust}                plays on the robot, asks before every movement, writes answer.csv",
         "4. bring answer.csv (and returns.csv) back into this folder and type the gsl command again",
         "",
-        *(["Beware:", *(f"- {one}" for one in warnings), ""] if warnings else []),
+        *(["Beware:", *(f"- {warning}" for warning in warnings), ""] if warnings else []),
     ]
     return "\n".join(lines)

@@ -118,9 +118,9 @@ def test_the_refusal_says_what_to_type_and_that_is_enough(place: Path) -> None:
         words = [sys.executable, "-m", "gsl", *command, *more]
         return subprocess.run(words, cwd=place, env=environment, capture_output=True, text=True, check=False)
 
-    told = run()
-    assert told.returncode == 2
-    assert "say trust=lab_world if" in told.stderr
+    result = run()
+    assert result.returncode == 2
+    assert "say trust=lab_world if" in result.stderr
     assert run("trust=lab_world").returncode == 0
     manifest = json.loads((place / "runs/x/collect_real/manifest.json").read_text())
     assert manifest["trust"] == ["lab_world"]
@@ -248,10 +248,10 @@ def test_a_request_calls_nothing(target: str, place: Path) -> None:
         refused("rehearse", "request=asked", folder=place),
     ]
     runner = [sys.executable, "asked/runner.py", "--dry-run"]
-    told = subprocess.run(runner, cwd=place, env=ENVIRONMENT, capture_output=True, text=True, check=False)
-    assert told.returncode == 2
-    for one in (*said, told.stdout):
-        assert "policy._target_" in one or "policy = " in one, one
+    result = subprocess.run(runner, cwd=place, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert result.returncode == 2
+    for message in (*said, result.stdout):
+        assert "policy._target_" in message or "policy = " in message, message
 
 
 @pytest.mark.parametrize("name", ["argparse.py", "numpy/__init__.py", "json.pyc", "gsl/runner/evil.py", "link"])
@@ -290,7 +290,7 @@ BOMB = "a: &a [x, x]\n" + "".join(
     f"{b}: &{b} [*{a}, *{a}]\n" for a, b in zip("abcdefghijkl", "bcdefghijklm", strict=True)
 )
 HOSTILE = {
-    "nested aliases": f"{SIGNALS}about:\n" + "".join(f"  {one}\n" for one in (BOMB * 1).splitlines())
+    "nested aliases": f"{SIGNALS}about:\n" + "".join(f"  {line}\n" for line in (BOMB * 1).splitlines())
     + "".join(f"  z{k}: [*m, *m, *m, *m, *m, *m, *m, *m]\n" for k in range(9)),
     "an alias of itself": f"{SIGNALS}about: &a [*a]\n",
     "too deep": f"{SIGNALS}about: {'[' * 5000}{']' * 5000}\n",
@@ -453,12 +453,15 @@ def test_the_files_of_a_robot_are_written_over_nobodys(place: Path) -> None:
 
 
 def test_code_is_found_wherever_plain_data_names_it() -> None:
-    told = {"a": [{"_target_": "os.system"}], "world": {"_target_": "gsl.worlds.bullet.BulletWorld", "robot": "x.y"}}
-    assert [path for path, _, _ in code_in(told)] == ["a.0._target_", "world.robot"]
-    assert modules_in(told) == ("os", "x")
-    check_code(told, ["os", "x"])
+    document = {
+        "a": [{"_target_": "os.system"}],
+        "world": {"_target_": "gsl.worlds.bullet.BulletWorld", "robot": "x.y"},
+    }
+    assert [path for path, _, _ in code_in(document)] == ["a.0._target_", "world.robot"]
+    assert modules_in(document) == ("os", "x")
+    check_code(document, ["os", "x"])
     with pytest.raises(ConfigError, match=r"a\.0\._target_ = os\.system: is of Python's own library"):
-        check_code(told, ["x"])
+        check_code(document, ["x"])
     two = {"a": {"_target_": "lab.A"}, "b": {"_target_": "mine.B"}}
     with pytest.raises(ConfigError, match=r"a\._target_ = lab\.A: .* say 'trust=\[mine,lab\]'"):
         check_code(two, ["misspelt", "mine"])

@@ -29,8 +29,8 @@ MOTORS = {
 }
 
 
-def mapping(folder: Path, **told: Any) -> str:
-    (folder / "m.yaml").write_text(yaml.safe_dump(told, sort_keys=False))
+def mapping(folder: Path, **more: Any) -> str:
+    (folder / "m.yaml").write_text(yaml.safe_dump(more, sort_keys=False))
     return "mapping=m.yaml"
 
 
@@ -64,8 +64,8 @@ def test_motors_in_an_array_of_messages_are_named_by_number(tmp_path: Path, plug
     head, rest = np.array([254, 239], np.uint8), 0.0
     topics: dict[str, list[Any]] = {"/lowcmd": [], "/lowstate": []}
     for goal, q in zip(GOAL, MEASURED, strict=True):
-        commands = [command(1, one, 0.0, 0.0, 20.0, 1.5) for one in (rest, *goal, *[0.0] * 10)]
-        states = [state(1, one, 0.1, 0.2, 30) for one in (rest, *q, *0.01 * np.arange(3, 13))]
+        commands = [command(1, goal_now, 0.0, 0.0, 20.0, 1.5) for goal_now in (rest, *goal, *[0.0] * 10)]
+        states = [state(1, position_now, 0.1, 0.2, 30) for position_now in (rest, *q, *0.01 * np.arange(3, 13))]
         topics["/lowcmd"].append(low_cmd(head, commands, 0))
         topics["/lowstate"].append(low_state(head, states, 0))
     write_ros2(tmp_path / "bag", store, topics, plugin)
@@ -120,7 +120,9 @@ def test_the_first_point_of_a_trajectory_is_a_command_by_joint(tmp_path: Path, r
         from rosbags.rosbag1 import Writer
 
         with Writer(tmp_path / "log.bag") as bag:
-            places = {t: bag.add_connection(t, one[0].__msgtype__, typestore=store) for t, one in topics.items()}
+            places = {
+                t: bag.add_connection(t, messages[0].__msgtype__, typestore=store) for t, messages in topics.items()
+            }
             for row in range(len(TIME)):
                 for topic, messages in topics.items():
                     raw = store.serialize_ros1(messages[row], messages[row].__msgtype__)

@@ -48,13 +48,13 @@ def plain() -> dict[str, np.ndarray]:
 
 
 def mapping(file: Path, **settings: Any) -> str:
-    told = {
+    mapping = {
         "joints": list(JOINTS),
         "time": {"column": "t"},
         "signals": {"action": "goal_{joint}", "position": "q_{joint}"},
         **settings,
     }
-    file.write_text(yaml.safe_dump(told, sort_keys=False))
+    file.write_text(yaml.safe_dump(mapping, sort_keys=False))
     return f"mapping={file}"
 
 
@@ -266,7 +266,7 @@ def test_an_episode_is_cut_at_its_holes_and_what_precedes_the_first_command_is_d
     columns = {name: values[keep] for name, values in plain().items()}
     batch = imported(tmp_path, csv(tmp_path / "log.csv", columns), mapping(tmp_path / "m.yaml"))
     assert [label["part"] for label in batch.metadata["episodes"]] == [1, 2]
-    assert [len(one.time) for one in batch.episodes] == [100, 150]
+    assert [len(episode.time) for episode in batch.episodes] == [100, 150]
 
 
 def test_a_column_can_tell_episodes_apart_and_empty_cells_can_mean_no_news(tmp_path: Path) -> None:
@@ -316,11 +316,14 @@ def test_a_mapping_may_lie_anywhere(tmp_path: Path) -> None:
 def test_a_check_writes_nothing_and_finds_the_lag(tmp_path: Path) -> None:
     source, chosen = csv(tmp_path / "log.csv", plain()), mapping(tmp_path / "m.yaml")
     before = sorted(tmp_path.rglob("*"))
-    told = json.loads(done("import", f"source={source}", chosen, "--check", "--json", folder=tmp_path).out)
+    report = json.loads(done("import", f"source={source}", chosen, "--check", "--json", folder=tmp_path).out)
     assert sorted(tmp_path.rglob("*")) == before
-    (episode,) = told["episodes"]
+    (episode,) = report["episodes"]
     assert episode["lag"] == pytest.approx(LAG, abs=0.004) and episode["rate"] == pytest.approx(100.0)
-    assert told["refused"] == [] and {one["column"] for one in told["channels"]} >= {"position.elbow", "action.elbow"}
+    assert report["refused"] == [] and {channel["column"] for channel in report["channels"]} >= {
+        "position.elbow",
+        "action.elbow",
+    }
     assert "nothing is written" in done("import", f"source={source}", chosen, "check=true", folder=tmp_path).out
 
 
@@ -332,8 +335,8 @@ def test_the_shipped_logs_are_imported(tmp_path: Path, name: str, episodes: int,
     done("import", f"mapping={name}", f"name={name}", folder=tmp_path)
     batch = read(tmp_path / f"runs/{name}/import/trajectories.parquet")
     assert (len(batch), len(batch.joints)) == (episodes, joints)
-    assert sum(one.time[-1] for one in batch.episodes) == pytest.approx(seconds, abs=0.1)
-    assert max(np.abs(one.position).max() for one in batch.episodes) < np.pi
+    assert sum(episode.time[-1] for episode in batch.episodes) == pytest.approx(seconds, abs=0.1)
+    assert max(np.abs(episode.position).max() for episode in batch.episodes) < np.pi
 
 
 def test_the_pendulum_says_what_hung_on_it(tmp_path: Path) -> None:
@@ -343,7 +346,9 @@ def test_the_pendulum_says_what_hung_on_it(tmp_path: Path) -> None:
     assert batch.joints == ("joint",) and batch.control_period == 0.005
     assert {label["kp"] for label in labels} == {100, 200, 400, 800}
     assert labels[0].items() >= {"mass": 0.49, "length": 0.1, "vin": 7.4, "trajectory": "sin_sin"}.items()
-    off = next(one for one, label in zip(batch.episodes, labels, strict=True) if label["trajectory"] == "lift_and_drop")
+    off = next(
+        episode for episode, label in zip(batch.episodes, labels, strict=True) if label["trajectory"] == "lift_and_drop"
+    )
     assert 0.0 < np.mean(off.sensors["enabled"]) < 1.0 and off.sensors["voltage"].min() > 5.0
 
 

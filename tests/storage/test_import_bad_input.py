@@ -369,9 +369,9 @@ def test_a_log_that_was_not_imported_says_what_to_do_first(tmp_path: Path) -> No
     for place in ("log.csv", "logs/log.csv"):
         (tmp_path / place).parent.mkdir(exist_ok=True)
         csv(tmp_path / place, plain())
-    for given in ("log.csv", "logs"):
-        line = refused("diagnose", f"real={given}", "sim=so101", "out=runs/refused", folder=tmp_path)
-        assert f"gsl import source={given} " in line
+    for source in ("log.csv", "logs"):
+        line = refused("diagnose", f"real={source}", "sim=so101", "out=runs/refused", folder=tmp_path)
+        assert f"gsl import source={source} " in line
 
 
 def test_sources_and_mappings_that_are_not_there_are_one_clear_line(tmp_path: Path) -> None:

@@ -130,7 +130,7 @@ def test_columns_of_a_closer_form_are_those_of_another_signal(tmp_path: Path) ->
 def test_a_renamed_joint_of_a_data_set_is_refused(tmp_path: Path) -> None:
     folder = write_data_set(tmp_path / "wave", "v3.0", recorded(degrees))
     names = [f"{name}.pos" for name in NAMES]
-    others = [one.replace("elbow_flex", "elbow") for one in names]
+    others = [name.replace("elbow_flex", "elbow") for name in names]
     features = json.loads((folder / "meta/info.json").read_text())["features"]
     edit(folder, features={**features, "action": {**features["action"], "names": others}})
     line = refused("import", "source=wave", folder=tmp_path)

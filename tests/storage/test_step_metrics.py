@@ -87,8 +87,8 @@ def test_a_network_notes_every_epoch_and_is_the_same_with_a_listener(tmp_path: P
 
 def test_the_command_shows_steps_and_says_in_a_line_what_is_wrong(tmp_path: Path) -> None:
     climb(tmp_path / "runs/a/climb")
-    told = json.loads(done("metrics", "a", "--json", folder=tmp_path).out)
-    assert [line["values"] for line in told["artifacts"]["a/climb"]][1] == {"height": 2.0}
+    rows = json.loads(done("metrics", "a", "--json", folder=tmp_path).out)
+    assert [line["values"] for line in rows["artifacts"]["a/climb"]][1] == {"height": 2.0}
     assert "height" in done("metrics", "a", folder=tmp_path).out
     assert "exists" in refused("metrics", "a", "tensorboard=runs", folder=tmp_path)
     assert "no such setting" in refused("metrics", "a", "wandb=x", folder=tmp_path)

@@ -51,9 +51,9 @@ def table(path: Path, *, topic: str, records: str, memory: float, entry: Entry |
         return ArrayTable(path, NpyFolder(path), memory)
     if not path.stat().st_size:
         raise TrajectoryError(path, "is empty; log it again")
-    found = _reader(path, records, memory)()
-    check_columns(path, found.names)
-    return found
+    table = _reader(path, records, memory)()
+    check_columns(path, table.names)
+    return table
 
 
 def _reader(path: Path, records: str, memory: float) -> Callable[[], Table]:

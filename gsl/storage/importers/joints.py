@@ -49,7 +49,7 @@ def list_left_out(mapping: LogMapping, joints: Mapping[str, str], tables: Mappin
     for name, signal in mapping.signals.items():
         there = _list_joints(name, mapping, tables[signal.file]) if signal.optional and name in PER_JOINT else []
         lacking = [old for old in joints.values() if old not in there]
-        others = [one for one in there if one not in joints.values()]
+        others = [name for name in there if name not in joints.values()]
         if there and lacking and len(lacking) < len(joints):
             near = f"; {_fill(signal.column, others)} is of no joint" if others else ""
             yield f"{name}: left out, as there is no {_fill(signal.column, lacking)}{near}"
@@ -62,9 +62,9 @@ def _check_pairs(
 ) -> None:
     """Refuse a joint that has positions and no command, or the other way round."""
     signals = (mapping.signals["position"], mapping.signals[name])
-    topics = [f"{one.file} " * (signals[0].file != signals[1].file) for one in signals]
-    forms = [f"{topic}{one.column}" for topic, one in zip(topics, signals, strict=True)]
-    alone = [[one for one in own if one not in other] for own, other in (names, names[::-1])]
+    topics = [f"{signal.file} " * (signals[0].file != signals[1].file) for signal in signals]
+    forms = [f"{topic}{signal.column}" for topic, signal in zip(topics, signals, strict=True)]
+    alone = [[name for name in own if name not in other] for own, other in (names, names[::-1])]
     for side in (1, 0):  # a command without a position first
         if not alone[side]:
             continue
@@ -78,7 +78,7 @@ def _check_pairs(
             problem += f"; {mean} Pair all: 'mapping.signals.{name}={{column: {{{pairs}}}}}'"
         else:
             problem += "; rename it as its pair"
-        if both := [one for one in names[0] if one in names[1]]:
+        if both := [name for name in names[0] if name in names[1]]:
             chosen = f"{','.join(both[:SHOWN])}{',...' * (len(both) > SHOWN)}"
             problem += f", or leave it out with mapping.joints=[{chosen}]"
         raise TrajectoryError(tables[side].path, problem, column=_fill(forms[side], [joint]))
@@ -90,15 +90,15 @@ def _list_joints(name: str, mapping: LogMapping, table: Table) -> list[str]:
     if not _has_joint(form):
         return []
     others = [
-        str(one.column)
-        for other, one in mapping.signals.items()
-        if other != name and one.file == mapping.signals[name].file and _has_joint(one.column)
+        str(signal.column)
+        for other, signal in mapping.signals.items()
+        if other != name and signal.file == mapping.signals[name].file and _has_joint(signal.column)
     ]
-    closer = [one for one in others if len(one) > len(str(form))]
+    closer = [form_of for form_of in others if len(form_of) > len(str(form))]
     return [
         joint
-        for one in table.names
-        if (joint := _joint(str(form), one)) and not any(_joint(other, one) for other in closer)
+        for column in table.names
+        if (joint := _joint(str(form), column)) and not any(_joint(other, column) for other in closer)
     ]
 
 

@@ -45,16 +45,16 @@ class JsonTable:
         """Return the wanted columns."""
         if self.rows is None and not self.lines:
             return {name: numbers(self.path, name, _at(self.place, name)) for name in wanted}
-        found: dict[str, list[Any]] = {name: [] for name in wanted}
+        columns: dict[str, list[Any]] = {name: [] for name in wanted}
         for row, record in enumerate(_records(self.path, self.memory) if self.lines else self.rows or []):
-            for name, values in found.items():
+            for name, values in columns.items():
                 value = _at(record, name)
                 if value is None and name not in _flat(record):
                     raise TrajectoryError(self.path, "is missing here", column=name, row=row)
                 values.append(value)
             if row % 10_000 == 0:
-                check_need(self.path, 50.0 * row * len(found), self.memory)
-        return {name: numbers(self.path, name, values) for name, values in found.items()}
+                check_need(self.path, 50.0 * row * len(columns), self.memory)
+        return {name: numbers(self.path, name, values) for name, values in columns.items()}
 
 
 def _document(path: Path, memory: float) -> Any:
@@ -98,7 +98,7 @@ def _flat(value: Any, prefix: str = "") -> dict[str, Any]:
     if not isinstance(value, dict):
         return {prefix: value}
     return {
-        key: one for name, part in value.items() for key, one in _flat(part, f"{prefix}.{name}".lstrip(".")).items()
+        key: leaf for name, part in value.items() for key, leaf in _flat(part, f"{prefix}.{name}".lstrip(".")).items()
     }
 
 

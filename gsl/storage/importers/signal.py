@@ -73,7 +73,7 @@ class Signal:
         if any(abs(sign) != 1.0 for sign in signs):
             raise ConfigError("sign", "must be 1 or -1; a scale is factor", given=str(self.sign))
 
-    def signed(self, raw: np.ndarray) -> np.ndarray:
+    def apply_sign(self, raw: np.ndarray) -> np.ndarray:
         """Return raw values with the sign that the upper half of the numbers of `bits` stands for."""
         turn = 2.0**self.bits
         return np.where(raw >= turn / 2.0, raw - turn, raw) if self.bits else raw

@@ -48,11 +48,11 @@ def factor(unit: str, wanted: str) -> float:
     name = unit.replace("·", "").replace("*", "").replace(" ", "").replace("µ", "u").replace("μ", "u")
     name = name.replace("^2", "²")
     name = _SPELLINGS.get(name, name)
-    known = FACTORS[wanted]
-    if name in known:
-        return known[name]
+    factors = FACTORS[wanted]
+    if name in factors:
+        return factors[name]
     ticks = _TICKS.fullmatch(name)
     if ticks and int(ticks.group(1)) and wanted == ("rad/s" if ticks.group(2) else "rad"):
         return TURN / int(ticks.group(1))
     more = {"rad": ["ticks/4096"], "rad/s": ["ticks/4096/s"]}.get(wanted, [])
-    raise ValueError(f"is no unit for what is in {wanted}{did_you_mean(unit, [*known, *more], listed=True)}")
+    raise ValueError(f"is no unit for what is in {wanted}{did_you_mean(unit, [*factors, *more], listed=True)}")
