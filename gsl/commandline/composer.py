@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -145,7 +146,12 @@ def options(group: str) -> list[str]:
 
 def groups() -> list[str]:
     """Return the names of all groups of ours and the user's."""
-    return [group for group in _loader().list_groups("") if group != "hydra"]
+    return list(_groups(_loader()))
+
+
+@lru_cache(maxsize=1)  # every word that is typed asks for them, and hydra walks through all folders
+def _groups(loader: Any) -> tuple[str, ...]:
+    return tuple(group for group in loader.list_groups("") if group != "hydra")
 
 
 def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
@@ -248,6 +254,20 @@ def _first_value(override: Override) -> str:
 
 
 def _compose(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:
+    """Compose, or take what the same words came to in this process, unless a file has changed; nobody may change it."""
+    if OtherConfiguration.folder is not None:  # who knows how much lies in there
+        return _compose_anew(command, overrides, trust)
+    files = (path for folder in (configuration_folder(), *folders()) for path in folder.rglob("*.yaml"))
+    stamps = frozenset((path, (status := path.stat()).st_mtime_ns, status.st_size) for path in files)
+    return _compose_once(command, tuple(overrides), tuple(trust), stamps)
+
+
+@lru_cache(maxsize=64)  # a study's commands, with and without their choices
+def _compose_once(command: str, overrides: Sequence[str], trust: Sequence[str], stamps: frozenset[Any]) -> DictConfig:
+    return _compose_anew(command, overrides, trust)
+
+
+def _compose_anew(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:
     """Compose; nothing that a file names is imported before it is checked here."""
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None

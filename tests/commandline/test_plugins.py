@@ -118,6 +118,15 @@ def test_an_edit_of_any_file_of_its_package_is_noticed(place: Path, chain: Path,
     assert "changed: gsl itself" in refused(*command, folder=tmp_path)
 
 
+def test_an_edit_of_its_settings_is_noticed_by_the_next_command(place: Path, tmp_path: Path) -> None:
+    path = place / "my_gsl/conf/reach.yaml"
+    assert "share: 1.0\n" in done("reach", "data=x", "--cfg", "job", folder=tmp_path).out
+    path.write_text(path.read_text().replace("share: 1.0", "share: 0.5"))  # of the same length
+    assert "share: 0.5\n" in done("reach", "data=x", "--cfg", "job", folder=tmp_path).out
+    path.unlink()
+    assert "reach" in gsl("reach", "data=x", "--cfg", "job", folder=tmp_path).lines[-1]
+
+
 def test_its_settings_have_help_bounds_and_hints(place: Path, tmp_path: Path) -> None:
     assert "of the time that counts" in done("reach", "--help", folder=tmp_path).out
     assert refused("reach", "data=x", "share=2", folder=tmp_path) == "share = 2: must be at most 1"

@@ -352,6 +352,7 @@ def test_a_figure_is_one_command(what: str, figures: list[str], tmp_path: Path) 
 def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
     left_out = ("gat_x_auto", "gat_residual", "gat_multi_step", "gat_gated", "effects", "effects_gat", "effects_servo")
     few = ("preset=toy", "iterate.workers=1", "iterate.task.duration=1.2", *(f"~methods.{name}" for name in left_out))
+    few += ("preset.evaluations=160", "recipe.forward=linear")
     gains = f"gains={Path(__file__).parents[2] / 'experiments/trials/table2/trials.json'}"
     said = done("reproduce", "replays", *few, "~worlds.nao_weak", gains, folder=tmp_path)
     assert "about 1 minute for all of its results" in said.err
@@ -385,7 +386,7 @@ def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
 
 
 def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
-    few = ("preset=toy", "iterate.workers=1", "iterate.optimizer.candidates=4", "iterate.task.duration=1.2")
+    few = (*FEW, "iterate.optimizer.generations=1", "iterate.task.duration=1.2", "recipe.forward=linear")
     said = done("reproduce", "budget", *few, "budgets=[4,6]", folder=tmp_path)
     folder = tmp_path / "runs/budget/reproduce"
     points = json.loads((folder / "points.json").read_text())

@@ -102,7 +102,7 @@ def test_an_error_of_a_job_is_not_one_of_the_scheduler(address: str) -> None:
 
 
 def test_a_command_comes_to_the_same_payload_on_a_cluster_of_this_machine(tmp_path: Path) -> None:
-    done(*SEARCH, folder=tmp_path)
+    done(*SEARCH, "workers=1", folder=tmp_path)
     alone = payloads(tmp_path / "runs/k")
     done(*SEARCH, "executor=dask", "out=runs/dask/optimize", folder=tmp_path)
     assert payloads(tmp_path / "runs/dask") == alone
@@ -123,7 +123,7 @@ def test_workers_that_do_not_start_are_one_line(monkeypatch: pytest.MonkeyPatch)
 def test_trials_of_a_study_go_to_the_workers(address: str, tmp_path: Path) -> None:
     left = ("ane_01", "ane_02", "gat", "gat_005", "effects", "effects_gat")
     words = ("compare", "preset=toy", "trials=2", "iterate.task.duration=1.6", "iterate.workers=1", "~worlds.nao_weak")
-    words = (*words, *(f"~methods.{name}" for name in left))
+    words = (*words, *(f"~methods.{name}" for name in left), "preset.generations=1", "preset.candidates=4")
     done(*words, "name=here", folder=tmp_path)
     said = done(*words, "name=there", "executor=dask", f"address={address}", folder=tmp_path)
     assert "collecting" not in said.err  # nothing is rolled out in this process
@@ -143,13 +143,24 @@ def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path) -> None:
     )
 
 
+LONG = (*SEARCH, "preset.generations=8", "preset.candidates=4", "preset.rollouts=1")  # not over when its first is
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """What the long search comes to undisturbed."""
+    folder = tmp_path_factory.mktemp("whole")
+    done(*LONG, "workers=1", folder=folder)
+    return payloads(folder / "runs/k")
+
+
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGSTOP], ids=["dies", "hangs"])
-def test_a_search_goes_on_without_its_scheduler(end: signal.Signals, tmp_path: Path) -> None:
-    words, port = (*SEARCH, "preset.generations=12"), 20_000 + os.getpid() % 10_000 + (end == signal.SIGKILL)
+def test_a_search_goes_on_without_its_scheduler(end: signal.Signals, whole: dict[str, str], tmp_path: Path) -> None:
+    port = 20_000 + os.getpid() % 10_000 + (end == signal.SIGKILL)
     progress = tmp_path / "runs/k/.optimize.partial/generations.jsonl"
     with (
         scheduler(tmp_path, port) as (address, process),
-        started(*words, "executor=dask", f"address={address}", folder=tmp_path) as search,
+        started(*LONG, "executor=dask", f"address={address}", folder=tmp_path) as search,
     ):
         assert eventually(lambda: progress.exists() and progress.stat().st_size > 0)
         process.send_signal(end)
@@ -160,9 +171,8 @@ def test_a_search_goes_on_without_its_scheduler(end: signal.Signals, tmp_path: P
         assert said.splitlines()[-1].startswith(f"gsl optimize: {address}: no dask scheduler answers there; ")
     begun = progress.read_bytes()
     assert begun
-    done(*words, folder=tmp_path)
-    done(*words, "out=runs/whole/optimize", folder=tmp_path)
-    assert payloads(tmp_path / "runs/k") == payloads(tmp_path / "runs/whole")
+    done(*LONG, "workers=1", folder=tmp_path)
+    assert payloads(tmp_path / "runs/k") == whole
 
 
 @pytest.mark.parametrize(

@@ -207,8 +207,9 @@ def test_the_same_by_hand(iterated: Path, home: Path) -> None:
 
 
 def test_both_appear_in_compare(iterated: Path, home: Path) -> None:
-    methods = [f"~methods.{name}" for name in ("ane_01", "gat", "gat_005", "effects", "effects_gat")]
+    methods = [f"~methods.{name}" for name in ("ane_01", "ane_02", "gat", "gat_005", "effects", "effects_gat")]
     own = ("+grounding@methods.shrink=shrink", "optimizer@iterate.optimizer=random_search", "trials=1")
+    own += ("iterate.optimizer.generations=1",)
     done("compare", *OWN, *SMALL[:1], "iterate.task.duration=1.6", "iterate.workers=1", *methods, "~worlds.nao_weak",
          *own, "name=set", folder=home)  # fmt: skip
     assert "| shrink |" in (home / "runs/set/compare/table.md").read_text()

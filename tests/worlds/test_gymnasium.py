@@ -51,6 +51,8 @@ pytestmark = pytest.mark.slow
 CART = GymnasiumWorld(env_id="examples.cart:Cart")
 POLE = GymnasiumWorld(env_id="CartPole-v1")
 SLOPE = replace(CART, kwargs={"slope": 2.0})
+SHALLOW = tuple(f"{model}.{size}" for model in ("forward_model", "inverse_model") for size in ("epochs=20", "hidden=[32]"))
+OF_TRIALS = tuple(f"iterate.{setting}" for setting in SHALLOW)
 
 
 class Strange(gymnasium.Env):
@@ -341,6 +343,7 @@ def test_choices_are_grounded_by_the_nearest_effect(tmp_path: Path) -> None:
 def test_trpo_learns_and_goes_on_from_what_it_learned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("sb3_contrib")
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.delenv("SB3_LOGDIR", raising=False)
     policy = a_policy(CART, (16,))
     simulator = GroundedSimulator(Scenario(CART, OwnReward(), policy, "sim", NoGrounding()), policy.initial)
     trpo = Trpo(steps=8192, generations=2, rollout=1024)
@@ -362,9 +365,9 @@ def test_trpo_learns_and_goes_on_from_what_it_learned(tmp_path: Path, monkeypatc
 
 
 def test_the_example_of_the_docs_wins_by_its_grounding(tmp_path: Path) -> None:
-    few = ("budget.rollouts=6", "budget.episodes=5", "optimizer.candidates=10", "optimizer.generations=8", "workers=1")
+    few = ("budget.rollouts=3", "budget.episodes=5", "optimizer.candidates=8", "optimizer.generations=6", "workers=1")
     worlds = ("sim.env_id=examples.cart:Cart", "real.env_id=examples.cart:Cart", "real.kwargs.slope=2")
-    search = ("optimizer=cma_es", "optimizer.sigma=0.5", "policy.hidden=[]")
+    search = ("optimizer=cma_es", "optimizer.sigma=0.5", "policy.hidden=[]", *SHALLOW)
     done("iterate", "experiment=gymnasium", "name=cart", *search, *worlds, *few, "beside=true", folder=tmp_path)
     metrics = json.loads((tmp_path / "runs/cart/iterate/metrics.json").read_text())
     assert metrics["gain"]["interval"][0] > 0.0
@@ -374,7 +377,7 @@ def test_the_example_of_the_docs_wins_by_its_grounding(tmp_path: Path) -> None:
 def test_groundings_of_environments_are_compared(tmp_path: Path) -> None:
     worlds = ("iterate.sim.env_id=examples.cart:Cart", "worlds.real.env_id=examples.cart:Cart")
     search = ("optimizer@iterate.optimizer=cma_es", "iterate.policy.hidden=[]", "iterate.optimizer.sigma=0.5")
-    few = ("trials=2", "preset=toy", "~methods.ane_02", "~methods.ane_05", "~methods.sgat")
+    few = ("trials=2", "preset=toy", "~methods.ane_02", "~methods.ane_05", "~methods.sgat", *OF_TRIALS)
     few += tuple(f"iterate.budget.{name}=4" for name in ("real_episodes", "sim_episodes", "episodes", "confirmation"))
     slope = ("worlds.real.kwargs.slope=2", "iterate.workers=1")
     said = done("compare", "experiment=environments", "name=e", *few, *worlds, *slope, *search, folder=tmp_path)
@@ -633,6 +636,7 @@ def test_figure_12_is_one_command(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("sb3_contrib")
     few = ("trials=1", "noises=[0.3]", "workers=1", "iterate.budget.real_episodes=6", "iterate.budget.sim_episodes=8")
+    few += OF_TRIALS
     said = done("reproduce", "fig12", "preset=toy", *few, "iterate.budget.episodes=3", *WITHOUT_NOISE, folder=tmp_path)
     folder = tmp_path / "runs/fig12/reproduce"
     points = json.loads((folder / "points.json").read_text())
@@ -654,6 +658,7 @@ def test_figure_13_is_one_command(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("sb3_contrib")
     few = ("trials=1", "workers=1", "iterate.budget.real_episodes=3", "iterate.budget.sim_episodes=3", "~methods.sgat")
+    few += OF_TRIALS
     few += ("iterate.budget.episodes=1", "iterate.budget.rollouts=1")
     left = ("noises=[0.6]", "~methods.ane_02", "~methods.ane_06", "~worlds.noisy")
     done("reproduce", "fig13", "preset=toy", *few, *left, folder=tmp_path)
@@ -672,6 +677,7 @@ def test_rounds_go_on_from_what_the_real_world_chose(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("sb3_contrib")
     few = ("trials=1", "workers=1", "iterate.budget.real_episodes=3", "iterate.budget.sim_episodes=3", "~methods.sgat")
+    few += OF_TRIALS
     few += ("iterate.budget.episodes=2", "iterate.budget.rollouts=1", "iterate.budget.confirmation=3")
     left = (
         "~methods.ane",
@@ -726,6 +732,7 @@ def test_figure_12_goes_on_with_a_search_instead(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("sb3_contrib")
     few = ("trials=1", "noises=[0.3]", "workers=1", "iterate.budget.real_episodes=6", "iterate.budget.sim_episodes=8")
+    few += OF_TRIALS
     search = ("optimizer@further=cma_es", "further.candidates=4", "further.generations=1", "iterate.budget.rollouts=2")
     settings = (*WITHOUT_NOISE, "~methods.gat", "iterate.policy.hidden=[]", "iterate.budget.episodes=3")
     said = done("reproduce", "fig12", "preset=toy", *few, *search, *settings, folder=tmp_path)
